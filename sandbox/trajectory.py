@@ -3,8 +3,9 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, BinaryIO, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -362,12 +363,22 @@ class Trajectory(HtmlRepr):
             The path of the file.
         """
         path = Path(path)
+        with atomic_write(path) as temporary, temporary.open("xb") as stream:
+            self._write(stream)
+        return path
+
+    def to_bytes(self) -> bytes:
+        """Return the content of the file that `save` writes."""
+        with BytesIO() as stream:
+            self._write(stream)
+            return stream.getvalue()
+
+    def _write(self, stream: BinaryIO) -> None:
+        """Write the compressed arrays."""
         without = {"info", *(key for key in ("spin", "layer") if not len(getattr(self, key)))}
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
-        with atomic_write(path) as temporary, temporary.open("xb") as stream:
-            np.savez_compressed(stream, **arrays)
-        return path
+        np.savez_compressed(stream, **arrays)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

@@ -1,75 +1,148 @@
-"""One job: run it, or fetch its stored run, and describe the run as a row."""
+"""Jobs: one run each, with everything that it needs, and what is computed for it.
 
-from collections.abc import Callable
-from dataclasses import dataclass
+A job and its result are picklable: they travel by value to worker processes and to other machines, which need neither
+the scene file nor the store.
+"""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from time import perf_counter
+from typing import Any, Literal, Self
 
 from sandbox.action import actions_to_json, in_order
-from sandbox.batch.plan import Job
-from sandbox.batch.run_row import FinalBodyState, GameResult, ReplayResult, RunLedger, RunRow
+from sandbox.batch.run_row import ReplayResult, RunRow, details_of
 from sandbox.batch.store import Store, StoreError, run_id
+from sandbox.batch.stored_run import StoredRun
 from sandbox.engines.registry import engine_named
-from sandbox.jsonable import finite
-from sandbox.measure.metrics.contacts import collisions, first_collision
-from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
+from sandbox.games.players import PlayerSpec
+from sandbox.measure.run.bounded_run import RunTimeoutError, clock_without_compilation
 from sandbox.measure.run.runner import run, run_without_frames
 from sandbox.progress import Progress
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
 from sandbox.signals import defer_interrupt, reraise_interrupt
 from sandbox.trajectory import Trajectory
 
-GAME = ("score", "over", "player", "otherwise")
-"""Keys of `info["game"]` in a stored run, in the order of the fields of `GameResult`."""
+Values = tuple[tuple[str, Any], ...]
+"""Keys of a scene and the values that they are set to."""
+KeptParts = Literal["all", "summary"]
+"""What is stored of a run: its arrays too, or its row only."""
+KEEP: tuple[KeptParts, ...] = ("all", "summary")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be made: a scene with all values set, and an engine."""
+
+    label: str
+    """the scene as the user named it"""
+    scene: Scene
+    engine: str
+    actions: tuple[Any, ...] = ()
+    point: Values = ()
+    """the keys that are set, swept or sampled, with their values in this run"""
+    recorded: bool = False
+    """the job replays a recorded session"""
+    state_hash: str | None = None
+    """of the end of that session, if the run must reproduce it: same engine, nothing set"""
+    player: PlayerSpec | None = None
+    """player of the game; None if no game is played"""
+    score: float | None = None
+    """of that session, if the run must reproduce it"""
+    seeds: int = 1
+    """number of seeds that the job stands for: more than 1 if nothing in its scene is random"""
+    plan_key: str | None = None
+    """hash by which a plan finds the stored run again"""
+
+    def replay_of(self, stored: StoredRun) -> ReplayResult | None:
+        """Return whether a replay ended as its recording, bit for bit; None if the job is no replay."""
+        if not self.recorded:
+            return None
+        if self.state_hash is None or stored.state_hash is None:
+            return ReplayResult(None)
+        return ReplayResult(stored.state_hash == self.state_hash and self.score in (None, stored.score))
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How jobs are run, and what their rows contain. Picklable: it travels to the workers."""
+    """How jobs are run and stored, and what their rows contain."""
 
-    store: Path | None = None
-    """folder of the store"""
     audit: bool = True
     """count the contacts that the engine misses"""
     ledger: bool = False
     """keep the energy ledger; a stored run without one is run again and replaced"""
     final: bool = True
     """rows contain the final state"""
+    keep: KeptParts = "all"
+    """`summary` stores rows without arrays; a stored run without arrays is run again where they are wanted"""
+    time_limit: float | None = None
+    """s, computing time of a run, after which it is stopped and recorded as failed"""
+    force: bool = False
+    """run again what is stored already"""
+
+
+@dataclass(frozen=True)
+class CompletedRun:
+    """A run that was computed: what is stored of it."""
+
+    stored: StoredRun
+    arrays: bytes | None
+    """content of its file; None if only the row is kept"""
+    elapsed: float
+    """s, of the whole run, with compilation and compression"""
+    trajectory: Trajectory | None = None
+    """the run itself; None if it was made in another process"""
 
 
 @dataclass(frozen=True)
 class RunRecord:
-    """A completed run."""
+    """A completed run, computed or fetched from a store."""
 
-    job: Job
-    id: str
-    trajectory: Trajectory
+    label: str
+    """the scene as the user named it"""
+    values: Values
+    """the keys that are set, swept or sampled, with their values in this run"""
+    stored: StoredRun
     path: Path | None
     """of the stored arrays"""
     repeated: bool
     """fetched from the store, not run"""
     damaged: str | None = None
     """file and fault of the damaged stored run that this one replaces"""
+    computed: Trajectory | None = None
+    """the run, if it was computed in this process"""
+    replay: ReplayResult | None = None
+    """comparison with the recording; None if the run is no replay"""
+
+    @classmethod
+    def of(cls, job: Job, stored: StoredRun, path: Path | None, **more: Any) -> Self:
+        """Return the record of a job."""
+        return cls(job.label, job.point, stored, path, replay=job.replay_of(stored), **more)
 
     @property
-    def replayed(self) -> bool | None:
-        """Whether a session ended in its recorded state, bit for bit, and score; None if no state was recorded."""
-        wanted, found = self.job.state_hash, self.trajectory.info.get("state_hash")
-        if wanted is None or found is None:
-            return None
-        return bool(wanted == found) and self.job.score in (None, self.score)
+    def id(self) -> str:
+        """Id of the run."""
+        return self.stored.id
 
     @property
-    def _game(self) -> dict[str, Any]:
-        return self.trajectory.info.get("game") or {}
+    def trajectory(self) -> Trajectory:
+        """The run, read from its file unless it was computed in this process.
 
-    @property
-    def score(self) -> float | None:
-        """Final score of the game; None if none was played."""
-        return self._game.get("score")
+        Raises:
+            ValueError: it was computed elsewhere and its arrays were not kept; or its file is damaged.
+            OSError: its file cannot be read.
+            TooLargeError: its arrays would not fit into memory.
+        """
+        if self.computed is not None:
+            return self.computed
+        if self.path is None:
+            raise ValueError(f"run {self.id} was stored without arrays")
+        return Trajectory.load(self.path)
 
     def row(self, final: bool = True, ledger: bool = False) -> RunRow:
         """Return the figures of the run.
@@ -78,74 +151,132 @@ class RunRecord:
             final: include the final state.
             ledger: include the energy ledger.
         """
-        run, info = self.trajectory, self.trajectory.info
-        seconds, steps = info["seconds"], info["steps"]
-        simulated = float(run.time[-1]) if len(run.time) else 0.0
-        return RunRow(
-            id=self.id,
-            scene=self.job.label,
-            title=self.job.scene.title,
-            engine=self.job.engine,
-            settings=info["settings"],
-            seed=info["seed"],
-            set=dict(self.job.point),
-            status=run.status,
-            reason=run.reason,
-            seconds=finite(seconds),
-            steps=steps,
-            steps_per_second=finite(steps / seconds if seconds else None),
-            work=info.get("work", {}),
-            realtime_factor=finite(simulated / seconds if seconds else None),
-            energy_start=finite(info["energy_start"]),
-            energy_end=finite(info["energy_end"]),
-            joint_error=finite(info.get("joint_error")),
-            broken_joints=info.get("broken", 0),
-            contacts=collisions(run),
-            first_contact=first_collision(run),
-            missed_contacts=run.missed_contacts,
-            retired={
-                str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
-            },
-            pocketed=self._pocketed(),
-            state_hash=info.get("state_hash"),
-            replay=ReplayResult(self.replayed) if self.job.recorded else None,
-            game=GameResult(*map(self._game.get, GAME)) if self.job.player is not None else None,
-            account=RunLedger(self._ledger()) if ledger else None,
-            final=self._final() if final else None,
+        return RunRow.of(
+            self.stored,
+            label=self.label,
+            values=dict(self.values),
             path=None if self.path is None else str(self.path),
+            final=final,
+            ledger=ledger,
+            replay=self.replay,
             repeated=self.repeated,
             damaged=self.damaged,
         )
 
-    def _ledger(self) -> LedgerDocument | None:
-        if not len(self.trajectory.energy):
-            return None
-        return ledger_of(self.trajectory, self.job.scene).document()
 
-    def _final(self) -> dict[str, FinalBodyState]:
-        run = self.trajectory
-        if not len(run.time):
-            return {}
-        spins = map(tuple, run.spin[-1].tolist()) if len(run.spin) else [None] * len(run.names)
-        states = zip(
-            map(tuple, run.position[-1].tolist()),
-            map(tuple, run.velocity[-1].tolist()),
-            run.angle[-1].tolist(),
-            run.angular_velocity[-1].tolist(),
-            spins,
-            strict=True,
+def run_job(
+    job: Job, options: RunOptions = RunOptions(), progress: Callable[[float], None] | None = None
+) -> CompletedRun:
+    """Run a job.
+
+    Args:
+        job: what to run.
+        options: how to run it.
+        progress: called with the fraction of the run that is done.
+
+    Returns:
+        The run; with the status `failed` if it exceeded the time limit.
+
+    Raises:
+        TooLargeError: the frames would not fit into memory.
+        SceneError: the game of the scene cannot be played by the player.
+    """
+    began = perf_counter()
+    bout = None if job.player is None else job.player.start_game(job.scene, job.label)
+
+    def report(state: Progress) -> None:
+        if progress is not None:
+            progress(state.fraction or 0.0)
+
+    limit = options.time_limit
+    until = None if limit is None else clock_without_compilation() + limit
+
+    def check_time(_steps: int, _work: Mapping[str, int]) -> None:
+        if until is not None and clock_without_compilation() > until:
+            raise RunTimeoutError
+
+    try:
+        trajectory = run(
+            job.scene,
+            job.engine,
+            actions=job.actions,
+            audit=options.audit,
+            account=options.ledger,
+            on_progress=report,
+            bout=bout,
+            on_work=None if until is None else check_time,
         )
-        return {name: FinalBodyState(*state) for name, state in zip(run.names.tolist(), states, strict=True)}
+    except RunTimeoutError:
+        assert limit is not None
+        return failed_run(job, timeout_reason(limit))
+    number = identify(job)[1]
+    arrays = trajectory.to_bytes() if options.keep == "all" else None
+    return CompletedRun(_stored(job, number, trajectory), arrays, perf_counter() - began, trajectory)
 
-    def _pocketed(self) -> dict[str, str]:
-        """Return the pocket of each captured ball, which lies exactly at the centre of the pocket."""
-        run, scene = self.trajectory, self.job.scene
-        if not len(run.time):
-            return {}
-        names = scene.fixed_names[len(scene.fixed) :]
-        holes = {pocket.position: name for pocket, name in zip(scene.pockets, names, strict=False)}  # zones follow
-        places = zip(run.names.tolist(), run.position[-1].tolist(), strict=True)
-        return {name: holes[x, y] for name, (x, y) in places if (x, y) in holes}
+
+def failed_run(job: Job, reason: str) -> CompletedRun:
+    """Return a failed run without frames, for a job that ended its process or its time; the next call runs it again."""
+    settings, number = identify(job)
+    trajectory = run_without_frames(job.scene, job.engine, settings, in_order(job.actions), "failed", reason)
+    return CompletedRun(_stored(job, number, trajectory), None, 0.0, trajectory)
+
+
+def timeout_reason(limit: float) -> str:
+    """Return the reason of a run that exceeded the time limit, s."""
+    return f"stopped at the time limit of {limit:g} s"
+
+
+def fetch(job: Job, store: Store, options: RunOptions) -> RunRecord | str | None:
+    """Return the stored run of a job; a text with the fault of its file if that is damaged; None if it must be run.
+
+    Raises:
+        StoreError: the store cannot be used, or the file of this run cannot be opened.
+        TooLargeError: the arrays of a run of an earlier version do not fit into memory.
+    """
+    settings, number = identify(job)
+    found = store.find(number)
+    if found is None or options.force:
+        return None
+    fault = store.fault_of_file(found)
+    if fault is None and found.details is None:
+        try:
+            found = _completed_row(store, found, job, settings)
+        except TooLargeError:
+            raise
+        except ValueError as error:
+            fault = str(error)
+    if fault is not None:
+        return fault
+    if not is_sufficient(found, options):
+        return None
+    if job.plan_key is not None and job.plan_key != found.plan_key:
+        store.set_plan_key(found, job.plan_key)
+    return RunRecord.of(job, found, store.file(found), repeated=True)
+
+
+def is_sufficient(stored: StoredRun, options: RunOptions) -> bool:
+    """Tell whether a stored run has all that the options ask for."""
+    if options.force or stored.is_recorded_failure:
+        return False
+    if stored.status == "refused":
+        return True
+    has_ledger = not options.ledger or json.loads(stored.details or "{}").get("ledger") is not None
+    return has_ledger and (stored.path is not None or options.keep != "all")
+
+
+def is_audited(stored: StoredRun) -> bool:
+    """Tell whether the missed contacts of a stored run were counted."""
+    return stored.missed_contacts is not None
+
+
+def store_run(store: Store, job: Job, completed: CompletedRun, damaged: str | None = None) -> RunRecord:
+    """Store a computed run, and return its record; a run with the same id is replaced.
+
+    Raises:
+        StoreError: the store cannot be used.
+    """
+    row = store.add(completed.stored, completed.arrays, values=dict(job.point), replace_run=True)
+    return RunRecord.of(job, row, store.file(row), repeated=False, damaged=damaged, computed=completed.trajectory)
 
 
 @reraise_interrupt()
@@ -162,7 +293,7 @@ def run_or_fetch(
 
     Args:
         job: what to run.
-        store: where the run is looked up and stored; `options.store` is ignored.
+        store: where the run is looked up and stored.
         options: how to run it.
         progress: called with the fraction of the run that is done.
         done: called with the record; no interrupt comes between storing the run and this call.
@@ -172,61 +303,76 @@ def run_or_fetch(
         StoreError: the store cannot be used, or the file of this run cannot be opened.
         SceneError: the game of the scene cannot be played by the player.
     """
-    settings, number = _identified(job)
-    audit = options.audit
-    found = store.find(number) if store is not None else None
-    damaged: str | None = None
-    if store is not None and found is not None:
-        try:
-            stored = _stored(store.file(found), job, settings)
-        except TooLargeError:
-            raise
-        except ValueError as error:
-            damaged = str(error)
-        else:
-            has_ledger = len(stored.energy) or not options.ledger or stored.status == "refused"
-            if has_ledger and not _is_recorded_failure(stored):
-                record = RunRecord(job, number, stored, store.file(found), repeated=True)
-                if done is not None:
-                    done(record)
-                return record
-            audit = audit or bool(stored.info["audited"])  # the new run has all that the replaced one had
-    bout = None if job.player is None else job.player.start_game(job.scene, job.label)
-
-    def report(state: Progress) -> None:
-        if progress is not None:
-            progress(state.fraction or 0.0)
-
-    trajectory = run(
-        job.scene, job.engine, actions=job.actions, audit=audit, account=options.ledger, on_progress=report, bout=bout
-    )
+    found = None if store is None else fetch(job, store, options)
+    if isinstance(found, RunRecord):
+        if done is not None:
+            done(found)
+        return found
+    completed = run_job(job, with_earlier_audit(job, store, options), progress)
     with defer_interrupt():
-        path = None if store is None else store.file(store.add(trajectory, number, replace=found is not None))
-        record = RunRecord(job, number, trajectory, path, repeated=False, damaged=damaged)
+        if store is None:
+            record = RunRecord.of(job, completed.stored, None, repeated=False, computed=completed.trajectory)
+        else:
+            record = store_run(store, job, completed, found)
         if done is not None:
             done(record)
     return record
 
 
-def _stored(file: Path, job: Job, settings: Settings) -> Trajectory:
-    """Read the stored run of a job.
+def with_earlier_audit(job: Job, store: Store | None, options: RunOptions) -> RunOptions:
+    """Return the options with an audit if the stored run that is replaced has one, so that no figure is lost."""
+    if store is None or options.audit:
+        return options
+    found = store.find(identify(job)[1])
+    return replace(options, audit=found is not None and is_audited(found))
 
-    Args:
-        file: file of its arrays.
-        job: the job.
-        settings: its resolved settings.
+
+def identify(job: Job) -> tuple[Settings, str]:
+    """Return the settings of a job, resolved if its engine can run it, and the id of its run."""
+    engine = engine_named(job.engine)
+    settings = job.scene.solver
+    if not engine.missing(job.scene, settings):
+        settings = engine.resolve(job.scene, settings)
+    game = None if job.player is None else job.player.to_dict(job.scene)
+    return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
+
+
+def _stored(job: Job, number: str, trajectory: Trajectory) -> StoredRun:
+    return StoredRun.of(
+        trajectory,
+        number,
+        scene=job.label,
+        values=dict(job.point),
+        plan_key=job.plan_key,
+        details=details_of(trajectory, job.scene, job.player is not None),
+    )
+
+
+def _completed_row(store: Store, found: StoredRun, job: Job, settings: Settings) -> StoredRun:
+    """Return the row of a run that an earlier version stored, with the columns that it did not write.
 
     Raises:
         StoreError: the file cannot be opened.
         TooLargeError: its arrays would not fit into memory.
         ValueError: it is damaged, or the run of another job; `str()` names the file and the fault.
     """
+    file = store.file(found)
+    assert file is not None  # earlier versions stored the arrays of every run
     try:
         run = Trajectory.load(file)
     except TooLargeError as error:
         raise TooLargeError(f"{error}; delete the file to repeat the run") from None
     except OSError as error:
         raise StoreError(f"{file}: {error.strerror or error}; the file must be readable") from None
+    different = _difference(run, job, settings)
+    if different is not None:
+        raise ValueError(f"{file} is not the run of its id: its info.{different} is different")
+    row = replace(_stored(job, found.id, run), path=found.path, created=found.created)
+    return store.complete(row, dict(job.point))
+
+
+def _difference(run: Trajectory, job: Job, settings: Settings) -> str | None:
+    """Return the key in which a stored run differs from that of a job; None if it is the run of the job."""
     scene, stated = to_document(job.scene), dict(run.info["scene"])
     for table in ("solver", "play") if job.player is None else ("solver",):  # they do not affect the run
         scene.pop(table, None)
@@ -236,38 +382,9 @@ def _stored(file: Path, job: Job, settings: Settings) -> Trajectory:
         wanted["settings"] = settings.model_dump(mode="json")
     if job.player is None:  # otherwise the actions of the game are among them
         wanted["actions"] = actions_to_json(in_order(job.actions))
-    different = [] if scene == stated else ["scene"]
-    different += [key for key, value in wanted.items() if run.info.get(key) != value]
+    if scene != stated:
+        return "scene"
+    different = [key for key, value in wanted.items() if run.info.get(key) != value]
     if len(run.time) and bool(run.info.get("game")) != (job.player is not None):
         different.append("game")
-    if different:
-        raise ValueError(f"{file} is not the run of its id: its info.{different[0]} is different")
-    return run
-
-
-def record_failure(job: Job, store: Store | None, reason: str) -> RunRecord:
-    """Return, and store, a failed run without frames, for a job that ends its process; the next call runs it again.
-
-    Raises:
-        StoreError: the store cannot be used.
-    """
-    settings, number = _identified(job)
-    trajectory = run_without_frames(job.scene, job.engine, settings, in_order(job.actions), "failed", reason)
-    with defer_interrupt():
-        path = store.file(store.add(trajectory, number)) if store is not None else None
-    return RunRecord(job, number, trajectory, path, repeated=False)
-
-
-def _is_recorded_failure(trajectory: Trajectory) -> bool:
-    """Tell whether a run is one of `record_failure`: a run that failed by itself has at least its first frame."""
-    return trajectory.status == "failed" and not len(trajectory.time)
-
-
-def _identified(job: Job) -> tuple[Settings, str]:
-    """Return the settings of a job, resolved if its engine can run it, and the id of its run."""
-    engine = engine_named(job.engine)
-    settings = job.scene.solver
-    if not engine.missing(job.scene, settings):
-        settings = engine.resolve(job.scene, settings)
-    game = None if job.player is None else job.player.to_dict(job.scene)
-    return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
+    return different[0] if different else None

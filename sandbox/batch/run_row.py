@@ -1,11 +1,23 @@
-"""Row of a run: its figures, as tables show them and `run --json` prints them."""
+"""Row of a run: its figures, as tables show them and `run --json` prints them.
 
+A row is made from the row of the store, so that a run that was just computed and one that was stored long ago look
+the same. What has no column is in `details`, a JSON object: see `details_of`.
+"""
+
+import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
-from sandbox.jsonable import in_json
-from sandbox.measure.metrics.energy import LedgerDocument
+import numpy as np
+
+from sandbox.batch.stored_run import StoredRun
+from sandbox.jsonable import finite, in_json, to_json
+from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from sandbox.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -119,3 +131,139 @@ class RunRow:
     def score(self) -> float | None:
         """Score of the game; None if none was played or counted."""
         return None if self.game is None else self.game.score
+
+    @classmethod
+    def of(
+        cls,
+        stored: StoredRun,
+        *,
+        label: str,
+        values: Mapping[str, Any],
+        path: str | None,
+        final: bool = True,
+        ledger: bool = False,
+        replay: ReplayResult | None = None,
+        repeated: bool = False,
+        damaged: str | None = None,
+    ) -> Self:
+        """Return the figures of a run.
+
+        Args:
+            stored: its row in a store, with details.
+            label: the scene as the user named it.
+            values: values that the command set, by path.
+            path: of the stored arrays.
+            final: include the final state.
+            ledger: include the energy ledger.
+            replay: comparison with the recording, of a replay.
+            repeated: whether it was read from a store.
+            damaged: file and fault of the stored run that it replaced.
+        """
+        details = json.loads(stored.details or "{}")
+        seconds, simulated = stored.seconds, details.get("simulated", 0.0)
+        game, settings = details.get("game"), json.loads(stored.settings)
+        return cls(
+            id=stored.id,
+            scene=label,
+            title=stored.scene_title,
+            engine=stored.engine,
+            settings={key: settings[key] for key in Settings.model_fields if key in settings},
+            seed=stored.seed,
+            set=values,
+            status=stored.status,
+            reason=stored.reason,
+            seconds=finite(seconds),
+            steps=stored.steps,
+            steps_per_second=finite(stored.steps / seconds if seconds else None),
+            work=json.loads(stored.work or "{}"),
+            realtime_factor=finite(simulated / seconds if seconds else None),
+            energy_start=finite(stored.energy_start),
+            energy_end=finite(stored.energy_end),
+            joint_error=finite(stored.joint_error),
+            broken_joints=stored.broken_joints or 0,
+            contacts=stored.contacts,
+            first_contact=stored.first_contact,
+            missed_contacts=stored.missed_contacts,
+            retired=details.get("retired", {}),
+            pocketed=details.get("pocketed", {}),
+            state_hash=stored.state_hash,
+            replay=replay,
+            game=None if game is None else GameResult(**game),
+            account=RunLedger(_ledger(details.get("ledger"))) if ledger else None,
+            final={name: _final_state(state) for name, state in details.get("final", {}).items()} if final else None,
+            path=path,
+            repeated=repeated,
+            damaged=damaged,
+        )
+
+
+GAME = ("score", "over", "player", "otherwise")
+"""Keys of `info["game"]` in a stored run, in the order of the fields of `GameResult`."""
+
+
+def details_of(run: Trajectory, scene: Scene, has_game: bool) -> dict[str, Any]:
+    """Return the results of a run that have no column, as JSON holds them.
+
+    Args:
+        run: the run.
+        scene: its scene.
+        has_game: whether a game was played.
+    """
+    game = run.info.get("game") or {}
+    retired = zip(run.names.tolist(), run.retired_time.tolist(), strict=True)
+    return {
+        "simulated": float(run.time[-1]) if len(run.time) else 0.0,
+        "audited": bool(run.info["audited"]),
+        "retired": {name: time for name, time in retired if time == time},
+        "pocketed": _pocketed(run, scene),
+        "game": {key: game.get(key) for key in GAME} if has_game else None,
+        "ledger": to_json(ledger_of(run, scene).document()) if len(run.energy) else None,
+        "final": _final_states(run),
+    }
+
+
+def _final_states(run: Trajectory) -> dict[str, dict[str, Any]]:
+    """Return the last state of each body by name; empty if nothing was recorded."""
+    if not len(run.time):
+        return {}
+    columns = {
+        "position": run.position[-1].tolist(),
+        "velocity": run.velocity[-1].tolist(),
+        "angle": run.angle[-1].tolist(),
+        "angular_velocity": run.angular_velocity[-1].tolist(),
+    }
+    if len(run.spin):
+        columns["spin"] = run.spin[-1].tolist()
+    names, states = run.names.tolist(), zip(*columns.values(), strict=True)
+    rows = {name: dict(zip(columns, state, strict=True)) for name, state in zip(names, states, strict=True)}
+    is_finite = all(np.isfinite(getattr(run, column)[-1]).all() for column in columns)
+    return rows if is_finite else to_json(rows)  # JSON has no nan
+
+
+def _pocketed(run: Trajectory, scene: Scene) -> dict[str, str]:
+    """Return the pocket of each captured ball, which lies exactly at the centre of the pocket."""
+    if not len(run.time) or not scene.pockets:
+        return {}
+    names = scene.fixed_names[len(scene.fixed) :]
+    holes = {pocket.position: name for pocket, name in zip(scene.pockets, names, strict=False)}  # zones follow
+    places = zip(run.names.tolist(), run.position[-1].tolist(), strict=True)
+    return {name: holes[x, y] for name, (x, y) in places if (x, y) in holes}
+
+
+def _final_state(state: Mapping[str, Any]) -> FinalBodyState:
+    values: dict[str, Any] = {
+        key: tuple(map(_number, v)) if isinstance(v, list) else _number(v) for key, v in state.items()
+    }
+    return FinalBodyState(**values)
+
+
+def _number(value: float | None) -> float:
+    """Return a number of JSON, which has null for nan."""
+    return math.nan if value is None else value
+
+
+def _ledger(document: Mapping[str, Any] | None) -> LedgerDocument | None:
+    if document is None:
+        return None
+    numbers = {key: _number(value) for key, value in document.items() if key != "causes"}
+    return LedgerDocument(causes={key: _number(value) for key, value in document["causes"].items()}, **numbers)

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.batch.store import Store, StoredRun
+from sandbox.batch.store import Store
+from sandbox.batch.stored_run import StoredRun
 from sandbox.jsonable import JsonObject
 
 FIRST = ("id", "title", "engine", "seed", "status", "reason")
@@ -59,8 +60,11 @@ def run_table(store: Store) -> list[JsonObject]:
 
 def _info(store: Store, run: StoredRun) -> dict[str, Any]:
     """Return the info of a run from its file, without reading the arrays."""
+    path = store.file(run)
+    if path is None:
+        return {}
     try:
-        with np.load(store.file(run), allow_pickle=False) as file:
+        with np.load(path, allow_pickle=False) as file:
             info = json.loads(file["info"].item())
         if isinstance(info, dict):
             return info

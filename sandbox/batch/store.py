@@ -2,27 +2,43 @@
 
 The id of a run is a hash of everything that determines its outcome, so the store has each run once. The row is written
 after the file. A crash can leave a file without a row, which the next `add` replaces.
+
+The table `runs` has the columns of `StoredRun`, and then one for each value that a command set, swept or sampled, named
+by its path, such as "ball.cue.velocity"; it is null in runs that did not set it. The database is in WAL mode: one
+process writes while others read. Beyond `FLAT_RUNS` runs, files go to 256 subfolders, named by the first two digits of
+the id, because folders of 10⁵ files are slow to list.
 """
 
 import errno
 import hashlib
 import json
-import math
-import re
 import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import astuple, dataclass, fields
-from datetime import UTC, datetime
+from dataclasses import astuple, replace
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, Self, get_type_hints
+from typing import Any, Self
 
 from sandbox.action import Action, actions_to_json
 from sandbox.atomic_write import remove_stale, temporary_in
-from sandbox.measure.metrics.contacts import collisions
+from sandbox.batch.stored_run import (
+    COLUMNS,
+    ID,
+    SOLVER,
+    TABLE,
+    StoredRun,
+    column_of,
+    fault_of,
+    has_column,
+    hash_of,
+    is_setting,
+    paths_of,
+    quoted_column,
+    sql_value,
+)
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
@@ -30,89 +46,35 @@ from sandbox.signals import deliver_deferred_interrupt
 from sandbox.trajectory import Trajectory
 
 DATABASE = "runs.sqlite"
-VERSION = 2
-"""Version of the table below. A store of an earlier version is migrated, one of a later version is refused."""
+VERSION = 3
+"""Version of the table. A store of an earlier version is migrated, one of a later version is refused."""
 WAIT = 60.0
 """s, for another process to finish its write, which takes milliseconds, because files are written before the lock."""
 NOTICE = 1.0
 """s of waiting, after which it is reported: many times as long as any write."""
-ECHO = 40
-"""characters of a damaged value that a message quotes"""
-STATUSES = ("ok", "diverged", "refused", "failed")
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
-ID = re.compile(r"[0-9a-f]{20}")
+FLAT_RUNS = 1_000
+"""Runs whose files lie in the folder itself."""
+MAX_VALUE_COLUMNS = 1_900
+"""Columns of set values; SQLite allows 2,000 columns in a table."""
+DIGEST_BLOCK = 2**20
+"""bytes that are hashed at a time"""
 
-TABLE = """
-CREATE TABLE runs (
-    id TEXT PRIMARY KEY,
-    scene_hash TEXT NOT NULL,
-    scene_title TEXT NOT NULL,
-    engine TEXT NOT NULL,
-    settings TEXT NOT NULL,
-    seed INTEGER NOT NULL,
-    versions TEXT NOT NULL,
-    status TEXT NOT NULL,
-    reason TEXT,
-    created TEXT NOT NULL,
-    steps INTEGER NOT NULL,
-    seconds REAL,
-    energy_start REAL,
-    energy_end REAL,
-    contacts INTEGER NOT NULL,
-    missed_contacts INTEGER,
-    path TEXT NOT NULL,
-    score REAL
-)
-"""
-
-MIGRATIONS = {2: "ALTER TABLE runs ADD COLUMN score REAL"}
-"""Migrations: the statement that makes the table of a version from that of the version before."""
+MIGRATIONS = {
+    2: ("ALTER TABLE runs ADD COLUMN score REAL",),
+    3: (
+        "ALTER TABLE runs RENAME TO runs_before",
+        TABLE,
+        "INSERT INTO runs ({0}) SELECT {0} FROM runs_before".format(", ".join(COLUMNS[:18])),
+        "DROP TABLE runs_before",
+    ),
+}
+"""Migrations: the statements that make the table of a version from that of the version before."""
+INDEX = "CREATE INDEX IF NOT EXISTS runs_by_plan_key ON runs (plan_key)"
 
 
 class StoreError(Exception):
     """A folder cannot be used as a store; `str()` names the folder and the remedy."""
-
-
-@dataclass(frozen=True)
-class StoredRun:
-    """Row of the store. The fields are the columns, in their order."""
-
-    id: str
-    """20 hex digits: hash of everything that determines the outcome"""
-    scene_hash: str
-    """20 hex digits: hash of the scene"""
-    scene_title: str
-    """title of the scene"""
-    engine: str
-    """name of the engine"""
-    settings: str
-    """JSON object: settings as the engine resolved them"""
-    seed: int
-    """seed of the scene"""
-    versions: str
-    """JSON object: versions of Python, sandbox and the packages used"""
-    status: str
-    """`ok`, `diverged`, `refused` or `failed`"""
-    reason: str | None
-    """reason for a status other than `ok`"""
-    created: str
-    """time of creation, ISO 8601, UTC"""
-    steps: int
-    """number of steps of dt"""
-    seconds: float | None
-    """s, computing time of the steps"""
-    energy_start: float | None
-    """J, energy at the start; null if it is not finite"""
-    energy_end: float | None
-    """J, energy at the end; null if it is not finite"""
-    contacts: int
-    """number of contacts with an impulse"""
-    missed_contacts: int | None
-    """number of contacts that the engine missed; null if the run was not audited"""
-    path: str
-    """file name of the arrays, in the store's folder"""
-    score: float | None = None
-    """score of the game; null if no game was played"""
 
 
 Notice = Callable[[str], None]
@@ -120,9 +82,7 @@ Notice = Callable[[str], None]
 
 _REMEDY = "name a folder with write permission"
 _REMOVE = "name another folder, or remove the file if it is not needed"
-
-COLUMNS = ", ".join(column.name for column in fields(StoredRun))
-MARKS = ", ".join("?" for _ in fields(StoredRun))
+_SELECTED = ", ".join(COLUMNS)
 
 
 def run_id(
@@ -151,16 +111,7 @@ def run_id(
         "versions": dict(versions),
         "actions": actions_to_json(actions),
     }
-    return _hash(decides if game is None else decides | {"game": dict(game)})
-
-
-def _hash(document: object) -> str:
-    return hashlib.sha256(_json(document).encode("ascii")).hexdigest()[:20]
-
-
-def _json(document: object) -> str:
-    """Return canonical JSON: equal values give equal texts."""
-    return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hash_of(decides if game is None else decides | {"game": dict(game)})
 
 
 class Store:
@@ -181,6 +132,10 @@ class Store:
         self._database = self.directory / DATABASE
         self._notice = notice
         self._noticed: set[str] = set()
+        self._columns: set[str] = set()
+        """paths of set values that have a column"""
+        self._count = 0
+        """number of runs"""
         with self._faults():
             self.directory.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=self.directory):
@@ -193,6 +148,9 @@ class Store:
         try:
             with self._writing():  # looking and setting up are one, or two processes would both set up
                 self._set_up()
+            with self._faults():
+                self._execute("PRAGMA journal_mode = WAL")  # stays as it is on file systems without shared memory
+                self._execute("PRAGMA synchronous = NORMAL")  # a crash of the system may lose the last rows only
         except BaseException:
             self.close()
             raise
@@ -211,45 +169,162 @@ class Store:
 
     def find(self, run: str) -> StoredRun | None:
         """Return the run with an id; None if it is not stored, its row is damaged, or its file is missing."""
-        found = self._select("WHERE id = ?", (run,))
-        return found[0] if found and self.file(found[0]).is_file() else None
+        return self._with_file(self._select("WHERE id = ?", (run,)))
 
-    def file(self, run: StoredRun) -> Path:
-        """Return the path of a run's arrays, for `Trajectory.load`."""
-        return self.directory / run.path
+    def find_planned(self, plan_key: str) -> StoredRun | None:
+        """Return the run that was stored last under the key of a plan; None as for `find`."""
+        return self._with_file(self._select("WHERE plan_key = ? ORDER BY rowid DESC LIMIT 1", (plan_key,)))
+
+    def has_planned(self, plan_key: str) -> bool:
+        """Tell whether there is a row with the key of a plan; it may be damaged, or its file missing."""
+        with self._faults():
+            return bool(self._execute("SELECT 1 FROM runs WHERE plan_key = ? LIMIT 1", (plan_key,)))
+
+    def file(self, run: StoredRun) -> Path | None:
+        """Return the path of a run's arrays, for `Trajectory.load`; None if only its figures are stored."""
+        return None if run.path is None else self.directory / run.path
 
     def rows(self) -> tuple[StoredRun, ...]:
         """Return all runs in the order of adding, without damaged rows; the file of a run may be missing."""
         return self._select("ORDER BY rowid")
 
-    def add(self, trajectory: Trajectory, run: str, replace: bool = False) -> StoredRun:
+    def fault_of_file(self, run: StoredRun) -> str | None:
+        """Return the fault of a run's file: it is not the one that was stored; None if it is, or if there is none.
+
+        Raises:
+            StoreError: the file cannot be opened.
+        """
+        file = self.file(run)
+        if file is None or run.digest is None:
+            return None
+        try:
+            size, digest = file.stat().st_size, _digest_of(file)
+        except OSError as error:
+            raise StoreError(f"{file}: {error.strerror or error}; the file must be readable") from None
+        if size != run.size:
+            return f"{file} is not a stored run: it has {size:,} bytes, and {run.size:,} were stored"
+        return None if digest == run.digest else f"{file} is not a stored run: its content has changed"
+
+    def add(
+        self,
+        row: StoredRun,
+        arrays: bytes | None = None,
+        *,
+        values: Mapping[str, Any] | None = None,
+        replace_run: bool = False,
+    ) -> StoredRun:
         """Store a run under its id and return its row.
 
         Args:
-            trajectory: the run.
-            run: its id.
-            replace: replace a run with the same id; otherwise that run is kept.
+            row: its row, whose `path`, `size` and `digest` are set here.
+            arrays: content of its file (`Trajectory.to_bytes`); None to keep figures only.
+            values: values that the command set, by path; each has a column.
+            replace_run: replace a run with the same id; otherwise that run is kept.
 
         Raises:
             ValueError: the id is not one of `run_id`; it becomes a file name.
             StoreError: the folder cannot be written to.
         """
-        if not ID.fullmatch(run):
-            raise ValueError(f"{run!r} is not a run id, which has 20 hex digits")
-        found = None if replace else self.find(run)
+        if not ID.fullmatch(row.id):
+            raise ValueError(f"{row.id!r} is not a run id, which has 20 hex digits")
+        found = None if replace_run else self.find(row.id)
         if found is not None:
             return found
-        row = _row(trajectory, run)
+        if arrays is None:
+            row = replace(row, path=None, size=None, digest=None)
+            return self._insert(row, values or {}, replace_run, None)
+        row = replace(row, path=self._new_path(row.id), size=len(arrays), digest=_digest(hashlib.sha256(arrays)))
         # The slow part comes first, to a temporary file, and the lock is held for a rename and a row only.
         with self._faults(), temporary_in(self.directory) as staged:
-            trajectory.save(staged)
-            with self._writing():
-                found = None if replace else self.find(run)  # another process may have been faster
-                if found is not None:
-                    return found
-                staged.replace(self.file(row))
-                self._execute(f"INSERT OR REPLACE INTO runs ({COLUMNS}) VALUES ({MARKS})", astuple(row))
+            staged.write_bytes(arrays)
+            return self._insert(row, values or {}, replace_run, staged)
+
+    def add_run(self, run: Trajectory, run_id: str, replace_run: bool = False) -> StoredRun:
+        """Store a run under an id, with its arrays, and return its row; see `add`."""
+        return self.add(StoredRun.of(run, run_id), run.to_bytes(), replace_run=replace_run)
+
+    def set_plan_key(self, run: StoredRun, plan_key: str) -> None:
+        """Store another plan key of a run, which replaces the one before."""
+        with self._writing():
+            self._execute("UPDATE runs SET plan_key = ? WHERE id = ?", (plan_key, run.id))
+
+    def complete(self, row: StoredRun, values: Mapping[str, Any]) -> StoredRun:
+        """Replace the row of a run, which an earlier version wrote without all columns; its file is kept.
+
+        Raises:
+            StoreError: its file or the database cannot be used.
+        """
+        file = self.file(row)
+        if file is not None:
+            with self._faults():
+                row = replace(row, size=file.stat().st_size, digest=_digest_of(file))
+        return self._insert(row, values, True, None)
+
+    def _with_file(self, found: Sequence[StoredRun]) -> StoredRun | None:
+        if not found:
+            return None
+        file = self.file(found[0])
+        return found[0] if file is None or file.is_file() else None
+
+    def _new_path(self, run: str) -> str:
+        """Return the path for the arrays of a new run, relative to the folder, which is created."""
+        flat, sharded = paths_of(run)
+        if self._count < FLAT_RUNS or (self.directory / flat).exists():
+            return flat
+        with self._faults():
+            (self.directory / sharded).parent.mkdir(exist_ok=True)
+        return sharded
+
+    def _insert(self, row: StoredRun, values: Mapping[str, Any], replace_run: bool, staged: Path | None) -> StoredRun:
+        """Write a row, and rename its file; return the run that another process has stored meanwhile, if any."""
+        with self._writing():
+            found = None if replace_run else self.find(row.id)  # another process may have been faster
+            if found is not None:
+                return found
+            if staged is not None:
+                assert row.path is not None
+                staged.replace(self.directory / row.path)
+            cells = dict(zip(COLUMNS, astuple(row), strict=True)) | self._value_cells(row, values)
+            names, marks = ", ".join(map(quoted_column, cells)), ", ".join("?" for _ in cells)
+            self._execute(f"INSERT OR REPLACE INTO runs ({names}) VALUES ({marks})", tuple(cells.values()))
+        self._count += 1
         return row
+
+    def _value_cells(self, row: StoredRun, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the cells of set values by column; columns that are new are added to the table.
+
+        Columns of settings have the setting of every run, whether it was set or not.
+
+        Raises:
+            StoreError: the table would have too many columns.
+        """
+        wanted = {column_of(path): value for path, value in values.items() if has_column(path)}
+        if not set(wanted) <= self._columns:
+            self._columns = set(value_columns(self._connection))  # another process may have added some
+            for column in wanted:
+                self._add_column(column)
+        settings = json.loads(row.settings)
+        known = {column: settings.get(column.removeprefix(SOLVER)) for column in self._columns if is_setting(column)}
+        cells = {column: value for column, value in (wanted | known).items() if column in self._columns}
+        return {column: sql_value(value) for column, value in cells.items()}
+
+    def _add_column(self, column: str) -> None:
+        if column in self._columns:
+            return
+        same = next((each for each in self._columns if each.lower() == column.lower()), None)
+        if same is not None:  # SQL ignores case
+            self.notice(f"{self._database}: {column} has no column beside {same}; it is in set_values")
+            return
+        if len(self._columns) >= MAX_VALUE_COLUMNS:
+            raise StoreError(
+                f"{self._database}: its runs set more than {MAX_VALUE_COLUMNS:,} different values, more than a "
+                "table has columns; name another folder"
+            )
+        self._execute(f"ALTER TABLE runs ADD COLUMN {quoted_column(column)}")
+        if is_setting(column):
+            path = f'$."{column.removeprefix(SOLVER)}"'
+            self._execute(f"UPDATE runs SET {quoted_column(column)} = json_extract(settings, ?)", (path,))
+        self._columns.add(column)
 
     def notice(self, message: str) -> None:
         """Report a message, once."""
@@ -260,10 +335,10 @@ class Store:
     def _select(self, which: str, parameters: Sequence[Any] = ()) -> tuple[StoredRun, ...]:
         """Return the valid rows of a selection, and report the damaged ones."""
         with self._faults():
-            rows = self._execute(f"SELECT {COLUMNS} FROM runs {which}", parameters)
+            rows = self._execute(f"SELECT {_SELECTED} FROM runs {which}", parameters)
         sound = []
         for values in rows:
-            fault = _fault_of(values)
+            fault = fault_of(values)
             if fault is None:
                 sound.append(StoredRun(*values))
             else:
@@ -282,14 +357,20 @@ class Store:
         if version == 0:
             self._execute(TABLE)
         for later in range(version + 1, VERSION + 1) if version > 0 else ():
-            self._execute(MIGRATIONS[later])
-        if version < 0 or _layout(self._connection) != _layout_of_table():
+            for statement in MIGRATIONS[later]:
+                self._execute(statement)
+        columns, others = _layout(self._connection)
+        wanted, _ = _layout_of_table()
+        if version < 0 or columns[: len(wanted)] != wanted or others or not _are_values(columns[len(wanted) :]):
             raise StoreError(
                 f"{self._database}: damaged, or not a database of runs: its table does not have "
                 f"format {version}; {_REMOVE}"
             )
+        self._execute(INDEX)
         if version != VERSION:
             self._execute(f"PRAGMA user_version = {VERSION}")
+        self._columns = set(value_columns(self._connection))
+        self._count = int(self._execute("SELECT count(*) FROM runs")[0][0])
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -344,63 +425,9 @@ class Store:
             raise StoreError(f"{self._database}: {error}; {_REMOVE}") from None
 
 
-def _row(trajectory: Trajectory, run: str) -> StoredRun:
-    info = trajectory.info
-    scene = info["scene"]
-    return StoredRun(
-        id=run,
-        scene_hash=_hash(scene),
-        scene_title=str(scene.get("title", "")),
-        engine=info["engine"],
-        settings=_json(info["settings"]),
-        seed=info["seed"],
-        versions=_json(info["versions"]),
-        status=trajectory.status,
-        reason=trajectory.reason,
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        steps=info["steps"],
-        seconds=_known(info["seconds"]),
-        energy_start=_known(info["energy_start"]),
-        energy_end=_known(info["energy_end"]),
-        contacts=collisions(trajectory),
-        missed_contacts=trajectory.missed_contacts,
-        path=f"{run}.npz",
-        score=_known((info.get("game") or {}).get("score")),
-    )
-
-
-def _fault_of(values: Sequence[Any]) -> str | None:
-    """Return the fault of a row of the database, whose columns may have values of any type; None if it is valid."""
-    for (column, allowed), value in zip(get_type_hints(StoredRun).items(), values, strict=True):
-        if not isinstance(value, allowed) or (isinstance(value, str) and not _is_text(value)):
-            return f"{column} is {repr(value)[:ECHO]}"
-    row = StoredRun(*values)
-    if not ID.fullmatch(row.id):
-        return f"id is {row.id[:ECHO]!r}, not 20 hex digits"
-    if row.path != f"{row.id}.npz":
-        return f"path is {row.path[:ECHO]!r}, not {row.id}.npz"
-    if row.status not in STATUSES:
-        return f"status is {row.status[:ECHO]!r}, not one of {', '.join(STATUSES)}"
-    for name, text in (("settings", row.settings), ("versions", row.versions)):
-        if not _is_json_object(text):
-            return f"{name} is not a JSON object: {text[:ECHO]!r}"
-    return None
-
-
-def _is_text(value: str) -> bool:
-    """Tell whether a text was UTF-8: other bytes have become surrogates."""
-    try:
-        value.encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
-
-
-def _is_json_object(text: str) -> bool:
-    try:
-        return isinstance(json.loads(text), dict)
-    except (ValueError, RecursionError):
-        return False
+def value_columns(connection: sqlite3.Connection) -> list[str]:
+    """Return the columns of set values, in the order in which they were added."""
+    return [str(column[1]) for column in connection.execute("PRAGMA table_xinfo(runs)").fetchall()[len(COLUMNS) :]]
 
 
 def _layout(connection: sqlite3.Connection) -> tuple[list[Any], list[Any]]:
@@ -416,6 +443,23 @@ def _layout_of_table() -> tuple[list[Any], list[Any]]:
         return _layout(connection)
 
 
-def _known(value: float | None) -> float | None:
-    """Return a number, which may be infinite; None for nan, for which SQL has no number."""
-    return None if value is None or math.isnan(value) else float(value)
+def _are_values(columns: Sequence[Any]) -> bool:
+    """Tell whether columns are of set values: paths, without a type, nullable, and without a default."""
+    return all("." in str(name) and row[2:] == ("", 0, None, 0, 0) for row in columns for name in row[1:2])
+
+
+def _digest_of(file: Path) -> str:
+    """Return the digest of a file.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    hashed = hashlib.sha256()
+    with file.open("rb") as stream:
+        while block := stream.read(DIGEST_BLOCK):
+            hashed.update(block)
+    return _digest(hashed)
+
+
+def _digest(hashed: Any) -> str:
+    return str(hashed.hexdigest()[:32])

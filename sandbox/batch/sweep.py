@@ -1,14 +1,46 @@
-"""Sweeps: the grammar of `--sweep`, and conflicts between the keys of `--set`, `--sweep` and `--seeds`."""
+"""Sweeps: the grammar of `--sweep`, and conflicts between the keys of `--set`, `--sweep` and `--seeds`.
+
+A sweep is an axis of a plan: keys, and the points that they take together. Most axes have one key; the ranges of
+`--sample` are one axis of several.
+"""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 from sandbox.echo import short_count, short_repr, shorten
 from sandbox.resource_limits import RUNS
 from sandbox.scene.errors import Fault
 from sandbox.scene.files.overrides import AddressError, parse_assignment, parse_path, parse_value, split_assignment
+
+
+@dataclass(frozen=True)
+class SweepAxis:
+    """Keys of a scene, and the points that a plan multiplies with those of other axes."""
+
+    keys: tuple[str, ...]
+    points: Sequence[tuple[Any, ...]]
+    """values of the keys at each point; computed on access where there may be many"""
+
+    @classmethod
+    def of(cls, key: str, values: Sequence[Any]) -> Self:
+        """Return an axis of one key."""
+        return cls((key,), _Singles(values))
+
+
+class _Singles(Sequence[tuple[Any, ...]]):
+    """Values as points of one component each."""
+
+    def __init__(self, values: Sequence[Any]) -> None:
+        self._values = values
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __getitem__(self, index: Any) -> Any:
+        """Return the point at an index."""
+        return (self._values[index],)
 
 
 def parse_sweep(text: str) -> tuple[str, Sequence[Any]]:
@@ -28,7 +60,9 @@ def parse_sweep(text: str) -> tuple[str, Sequence[Any]]:
         raise AddressError(f"{short_repr(text)}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
     if len(parts) == 2 and all(_is_number(part) for part in parts):
         asked = f"{shorten(key)}={shorten(values)}"
-        raise AddressError(f"{short_repr(text)}: a range needs a count: {asked}:N, such as {asked}:10")
+        raise AddressError(
+            f"{short_repr(text)}: a range needs a count: {asked}:N, such as {asked}:10; or --sample N draws from it"
+        )
     found = [parse_value(value) for value in dict.fromkeys(_split(values))]
     if not values or "" in found:
         raise AddressError(
@@ -43,6 +77,55 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+@dataclass(frozen=True)
+class SampledRange:
+    """Range of a key from which `--sample` draws: `KEY=LOW:HIGH`, with `:log` for even factors, `:int` for integers."""
+
+    key: str
+    low: float
+    high: float
+    is_log: bool
+    is_whole: bool
+    """Values are integers; the ends are among them."""
+
+    @classmethod
+    def parse(cls, text: str) -> Self | None:
+        """Return the range of a sweep; None if the text has another form.
+
+        Raises:
+            AddressError: its ends are not finite or not in order, or do not suit `log` or `int`.
+        """
+        key, _ = parse_assignment(text)
+        ends, words = _ends(split_assignment(text)[2])
+        if len(ends) != 2 or not set(words) <= {"log", "int"}:
+            return None
+        (low, high), is_log, is_whole = ends, "log" in words, "int" in words
+        if not (low <= high and math.isfinite(high - low)):
+            raise AddressError(f"{short_repr(text)}: a range needs finite ends LOW <= HIGH")
+        if is_log and not (low > 0.0 and math.isfinite(high / low)):
+            raise AddressError(f"{short_repr(text)}: logarithmic spacing needs 0 < LOW <= HIGH")
+        if is_whole and not (low.is_integer() and high.is_integer()):
+            raise AddressError(f"{short_repr(text)}: a range of integers needs integer ends")
+        return cls(key, low, high, is_log, is_whole)
+
+    def value(self, fraction: float) -> float:
+        """Return the value at a fraction of the range, from 0 to below 1; each integer has an equal share of it."""
+        low, high = self.low, self.high + self.is_whole
+        value = low * (high / low) ** fraction if self.is_log else low + (high - low) * fraction
+        return min(math.floor(value), int(self.high)) if self.is_whole else value
+
+
+def _ends(values: str) -> tuple[list[float], list[str]]:
+    """Return the leading numbers of a range, and the words after them."""
+    parts = [part.strip() for part in values.split(":", 5)]
+    count = next((k for k, part in enumerate(parts) if not _is_number(part)), len(parts))
+    return [float(part) for part in parts[:count]], parts[count:]
+
+
+def _is_integer(text: str) -> bool:
+    return text.removeprefix("-").isdecimal()
 
 
 @dataclass(frozen=True)
@@ -73,7 +156,7 @@ class _Range(Sequence[float]):
 
 
 def _range(text: str, parts: list[str]) -> _Range:
-    is_whole = all(part.strip().removeprefix("-").isdecimal() for part in parts[:2])
+    is_whole = all(_is_integer(part.strip()) for part in parts[:2])
     try:
         low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:

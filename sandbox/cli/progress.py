@@ -1,13 +1,19 @@
 """Progress of a command on standard error: a status line, or bars. Only on a terminal, and not with `--quiet`."""
 
 import sys
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from time import perf_counter
+from typing import TYPE_CHECKING, Self
+
+import click
 
 from sandbox.progress import ProgressCallback
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.live import Live
     from rich.progress import Progress as RichProgress
     from rich.progress import TaskID
 
@@ -83,3 +89,113 @@ def progress_bars(silent: bool, has_estimate: bool = True) -> Iterator[ProgressB
     columns = TextColumn("{task.description}", markup=False), BarColumn(), time
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         yield ProgressBars(bars)
+
+
+PLAIN_INTERVAL = 10.0
+"""s between two lines where there is no terminal"""
+RATE_WINDOW = 30.0
+"""s, the latest time over which the rate is measured"""
+
+
+class RunMonitor:
+    """Progress of many runs: done, failed, rate, time left and the slowest run.
+
+    On a terminal it is a live table below the output; elsewhere it is a line every `PLAIN_INTERVAL`, so that short
+    commands print nothing.
+
+    Args:
+        total: number of runs, or an upper bound.
+        silent: show nothing.
+    """
+
+    def __init__(self, total: int, silent: bool) -> None:
+        self._total, self._silent = total, silent
+        self._is_terminal = sys.stderr.isatty()
+        self._done = self._failed = self._stored = 0
+        self._running, self._fraction = "", 0.0
+        self._slowest: tuple[float, str] = (0.0, "")
+        self._began = self._last_line = perf_counter()
+        self._completions: deque[float] = deque()
+        """times at which runs of the last `RATE_WINDOW` were completed"""
+        self._live: Live | None = None
+
+    def __enter__(self) -> Self:
+        if self._is_terminal and not self._silent:
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(
+                console=Console(stderr=True), transient=True, refresh_per_second=8, get_renderable=self._render
+            )
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def start(self, name: str) -> None:
+        """Show the run that was started last."""
+        self._running, self._fraction = name, 0.0
+
+    def show_fraction(self, fraction: float) -> None:
+        """Show the completed fraction of the run, where one runs at a time."""
+        self._fraction = fraction
+
+    def add(self, name: str, *, seconds: float | None, is_ok: bool, is_stored: bool) -> None:
+        """Count a completed run.
+
+        Args:
+            name: the run, for messages.
+            seconds: s, its computing time.
+            is_ok: it has the status `ok`.
+            is_stored: it was not made, but read from the store.
+        """
+        now = perf_counter()
+        self._done += 1
+        self._fraction = 0.0
+        self._failed += not is_ok
+        self._stored += is_stored
+        if not is_stored:
+            self._completions.append(now)
+            self._slowest = max(self._slowest, (seconds or 0.0, name))
+        if not (self._is_terminal or self._silent) and now - self._last_line >= PLAIN_INTERVAL:
+            self._last_line = now
+            click.echo(f"{self._done:,} of {self._total:,} runs done{self._state(now)}", err=True)
+
+    def _rate(self, now: float) -> float:
+        """Return the runs a second that were made in the last `RATE_WINDOW`."""
+        while self._completions and self._completions[0] < now - RATE_WINDOW:
+            self._completions.popleft()
+        return len(self._completions) / max(min(now - self._began, RATE_WINDOW), 1e-3)
+
+    def _state(self, now: float) -> str:
+        rate = self._rate(now)
+        parts = [f"{self._stored:,} of them stored before"] if self._stored else []
+        parts += [f"{self._failed:,} not ok"] if self._failed else []
+        if rate:
+            parts += [f"{rate:.3g} runs/s", f"{duration_text((self._total - self._done) / rate)} left"]
+        if self._slowest[1]:
+            parts.append(f"slowest {self._slowest[0]:.2g} s: {self._slowest[1]}")
+        return "".join(f"; {part}" for part in parts)
+
+    def _render(self) -> "RenderableType":
+        """Return the live table."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar as Bar
+        from rich.table import Table
+        from rich.text import Text
+
+        table = Table.grid(padding=(0, 1))
+        current = f"{min(self._done + 1, self._total)}/{self._total} {self._running}"
+        table.add_row(Text(current), Bar(total=max(self._total, 1), completed=self._done + self._fraction, width=40))
+        state = self._state(perf_counter()).removeprefix("; ")
+        return Group(table, Text(f"{self._done:,} done; {state}" if state else f"{self._done:,} done", style="dim"))
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration as text: `42 s`, `3 min`, `5 h`, `2 days`."""
+    for unit, size in (("days", 86_400.0), ("h", 3_600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s" if seconds >= 1.0 else f"{seconds:.1g} s"

@@ -1,34 +1,41 @@
 """Command `run`: headless runs, their table, and a folder of stored runs."""
 
+import json
 import shlex
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import click
 
 from sandbox.action import Spawn
-from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
-from sandbox.batch.job import RunOptions, RunRecord
-from sandbox.batch.plan import Job, plan
+from sandbox.batch.driver import Driver, JobError, Result
+from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor
+from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
+from sandbox.batch.plan import Plan
+from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.run_row import RunRow
-from sandbox.batch.store import Store, StoreError
-from sandbox.batch.sweep import parse_sweep, repeated_keys
+from sandbox.batch.store import DATABASE, Store, StoreError
+from sandbox.batch.study import MAX_SEEDS, Study, is_study, key_of
+from sandbox.batch.sweep import repeated_keys
 from sandbox.cli.common import (
-    EngineChoice,
     collect_errors,
     engine_advice,
     exit_with_errors,
     expand_folders,
     only_engine,
     parse_engines,
-    plural,
+    print_faults,
     require_plot_file,
     scene_paths,
     suggest_names,
 )
+from sandbox.cli.estimate import print_estimate
 from sandbox.cli.options import (
     OutputOptions,
     engines_option,
@@ -38,21 +45,28 @@ from sandbox.cli.options import (
     quiet_option,
     set_option,
     sweep_option,
+    time_limit_option,
     verbose_option,
     workers_option,
 )
-from sandbox.cli.progress import progress_bars, status_line
-from sandbox.cli.run_tables import RunsDocument, print_ledgers, print_runs, print_scores, score_rows
-from sandbox.cli.streams import print_json
+from sandbox.cli.progress import RunMonitor, status_line
+from sandbox.cli.run_tables import MAX_TIMED, RunsDocument, print_ledgers, print_runs, print_scores, score_rows
+from sandbox.cli.streams import JsonSpool, print_json
 from sandbox.echo import short_repr
 from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
 from sandbox.jsonable import to_json
 from sandbox.measure.run.recorder import TooLargeError, require_memory
-from sandbox.measure.seeds import same_random_state
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError
 
+MAX_TABLE = 1_000
+"""Runs in a table; of more runs, only their number is printed."""
+MAX_PROBLEMS = 100
+"""Runs that are not ok and have a line each"""
+MAX_STATED = 5
+"""Swept values that a message states"""
 MAX_MISSED = 3
 """Missed contacts that are listed below the table of a single run."""
 
@@ -65,38 +79,79 @@ class _Options(OutputOptions):
     engines: str | None
     overrides: tuple[str, ...]
     sweeps: tuple[str, ...]
+    sample: str | None
     seeds: int | None
     player: str | None
-    workers: int
+    workers: int | None
+    cluster: str | None
     out: Path | None
+    keep: KeptParts | None
+    force: bool
+    time_limit: float | None
+    dry_run: bool
     plot: Path | None
     bodies: tuple[str, ...]
-    audit: bool
-    ledger: bool
+    audit: bool | None
+    ledger: bool | None
     verbose: bool
 
 
 @dataclass
 class _Batch:
-    """Runs of the command: jobs and completed runs."""
+    """Runs of the command: what was asked for, and the completed runs."""
 
-    jobs: list[Job]
+    plan: Plan
+    study: Study
+    count: int
+    """number of runs; an upper bound in a large plan"""
+    scene: Scene | None = None
+    """of the run, if there is only one"""
     rows: dict[int, RunRow] = field(default_factory=dict)
-    """rows of completed runs by the index of their job"""
-    single: RunRecord | None = None
-    """the run, if there is only one and it was made in this process"""
+    """rows of completed runs by their number, if there are few; without those that only JSON prints"""
+    spool: JsonSpool | None = None
+    """rows of completed runs as JSON, if there are many and --json is given"""
+    statuses: Counter[str] = field(default_factory=Counter)
+    """number of completed runs by status"""
+    problems: dict[int, str] = field(default_factory=dict)
+    """lines about the first runs that are not ok, by their number"""
+    games: dict[int, RunRow] = field(default_factory=dict)
+    """rows of games over several seeds, whose scores are summarised"""
+    faults: list[Fault] = field(default_factory=list)
+    """of scenes that were not checked before"""
+    record: RunRecord | None = None
+    """the run, if there is only one"""
     status: int = 0
     """exit status: 130 interrupted, 2 a job could not be run, 1 no worker could be started"""
 
-    def add(self, result: Result) -> None:
+    @property
+    def is_large(self) -> bool:
+        """Whether there are too many runs for a table."""
+        return self.count > MAX_TABLE
+
+    @property
+    def done(self) -> int:
+        """Number of completed runs."""
+        return self.statuses.total()
+
+    def add(self, result: Result, is_engine_chosen: bool) -> None:
         """Add a completed run."""
-        self.rows[result.index] = result.row
-        if len(self.jobs) == 1:
-            self.single = result.record
+        index, row = result.index, result.row
+        self.statuses[row.status] += 1
+        problem = _problem(row, self, is_engine_chosen)
+        if problem and len(self.problems) < MAX_PROBLEMS:
+            self.problems[index] = problem
+        if not self.is_large:
+            self.rows[index] = row
+        elif self.spool is not None:
+            self.spool.add(index, to_json(row))
+        if self.is_large and self.study.seeds is not None and row.game is not None:
+            self.games[index] = replace(row, final=None, settings={}, work={})
+        if self.count == 1:
+            self.record = result.record
 
     @property
     def ordered_rows(self) -> list[RunRow]:
-        """Rows of completed runs in the order of the jobs."""
+        """Rows of completed runs in the order of the plan."""
         return [self.rows[index] for index in sorted(self.rows)]
 
 
@@ -108,8 +163,14 @@ class _Batch:
 @set_option()
 @sweep_option
 @click.option(
+    "--sample",
+    metavar="N[:sobol]",
+    help="draw N points from the ranges KEY=LOW:HIGH[:log][:int] of --sweep: a Latin hypercube or Sobol points; "
+    "N:METHOD:SEED gives a seed",
+)
+@click.option(
     "--seeds",
-    type=click.IntRange(1, 1_000_000),
+    type=click.IntRange(1, MAX_SEEDS),
     metavar="N",
     help="run with the seeds 1 to N; once if nothing in the scene is random",
 )
@@ -118,15 +179,32 @@ class _Batch:
     metavar="WHO",
     help="player of a game: random, skilled, none, or a script file",
 )
-@workers_option(1, "1")
+@workers_option(None, "1")
+@click.option(
+    "--on", "cluster", metavar="ADDRESS", help="run on the Dask cluster whose scheduler is at tcp://HOST:PORT"
+)
 @out_option("store the runs in a folder; runs that are already there are not repeated")
+@click.option(
+    "--keep",
+    type=click.Choice(KEEP),
+    help="what is stored of a run: all, or a summary (figures and final states) without arrays; default: all",
+)
+@click.option("--force", is_flag=True, help="run again, and replace, what is stored already")
+@time_limit_option("stop a run after S seconds of computing, and record it as failed")
+@click.option("--dry-run", is_flag=True, help="print the number of runs, and estimates of their time and size")
 @plot_option("draw the run to FILE: .png, .svg or .pdf")
 @click.option(
     "--body", "bodies", multiple=True, metavar="NAME", help="body to draw with --plot; may be repeated; default: all"
 )
-@click.option("--audit/--no-audit", default=True, help="count the contacts that the engine misses (tunnelling)")
 @click.option(
-    "--ledger", "ledger", is_flag=True, help="account for energy by cause; a pymunk run takes 3 to 12 times as long"
+    "--audit/--no-audit", default=None, help="count the contacts that the engine misses (tunnelling); default: count"
+)
+@click.option(
+    "--ledger",
+    "ledger",
+    is_flag=True,
+    default=None,
+    help="account for energy by cause; a pymunk run takes 3 to 12 times as long",
 )
 @json_option
 @verbose_option
@@ -134,132 +212,253 @@ class _Batch:
 def run_command(**given: Any) -> int:
     """Run scenes without a window and print the results.
 
-    SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json). Exit status 1: a run
-    diverged or failed, or the engine refused the scene.
+    SCENES are files, folders of files, names of shipped scenes, recorded sessions (.json), or one study file, which
+    names scenes and sweeps. Exit status 1: a run diverged or failed, or the engine refused the scene.
     """
     options = _Options(**given)
     faults: list[Fault] = []
-    jobs = _planned_jobs(options, faults)
-    store = None
-    if options.out is not None and not faults:
-        with collect_errors(faults, "--out", (StoreError,)):
-            store = Store(options.out, _print_notice)
-    if faults:
-        return exit_with_errors(faults, options.as_json, runs=[])
-    if not options.quiet:
-        _report_equal_seeds(jobs)
-    batch = _Batch(jobs)
+    study = _study(options, faults)
+    plan = None if study is None else _plan(study, options, faults)
+    store, batch = None, None
     try:
+        if options.out is not None and not faults and (options.out / DATABASE).is_file():
+            store = _open_store(options.out, faults)
+        if plan is not None and study is not None:
+            batch = _checked_batch(plan, study, options, store, faults)
+        if options.out is not None and store is None and not (faults or options.dry_run):
+            store = _open_store(options.out, faults)
+        if faults or batch is None:
+            return exit_with_errors(faults, options.as_json, runs=[])
+        if not options.quiet:
+            _report_equal_seeds(batch.plan)
+        if options.dry_run:
+            return print_estimate(batch.plan, batch.count, _run_options(batch, options), store, options)
         _run_all(batch, options, store)
     finally:
         if store is not None:
             store.close()
-    status = _report_problems(batch, is_engine_chosen=options.engines is not None)
+    status = _report_problems(batch)
     _print_results(batch, options, status)
     return _draw(batch, options, status)
 
 
-def _planned_jobs(options: _Options, faults: list[Fault]) -> list[Job]:
-    """Return all jobs of the command; add its errors to the faults."""
-    names = parse_engines(options.engines, faults)
+def _open_store(out: Path, faults: list[Fault]) -> Store | None:
+    """Open the store of `--out`; add its errors to the faults, and return None if there are any."""
+    with collect_errors(faults, "--out", (StoreError,)):
+        return Store(out, _print_notice)
+    return None
+
+
+def _study(options: _Options, faults: list[Fault]) -> Study | None:
+    """Return what is to be run, from a study file or the command line; None if there are faults."""
+    given = Study(
+        scenes=options.scenes,
+        overrides=options.overrides,
+        sweeps=options.sweeps,
+        sample=options.sample,
+        seeds=options.seeds,
+        player=options.player,
+        keep=options.keep,
+        time_limit=options.time_limit,
+        audit=options.audit,
+        ledger=options.ledger,
+    )
+    if not any(map(is_study, options.scenes)):
+        return given
+    if len(options.scenes) > 1:
+        faults.append(Fault(options.scenes[0], None, "", "give a study file alone: it names its scenes"))
+        return None
+    with collect_errors(faults):
+        return Study.read(options.scenes[0]).with_options(given)
+    return None
+
+
+def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
+    """Return the plan of the command; add its errors to the faults, and return None if there are any."""
+    stated = ",".join(study.engines) if study.engines and options.engines is None else options.engines
+    names = parse_engines(stated, faults)
     found: list[tuple[str, str]] = []
-    for scene in expand_folders(options.scenes):
+    for scene in expand_folders(study.scenes):
         with collect_errors(faults):
             found += _runnable(scene_paths([scene]))
-    sweeps: list[str] = []
-    for sweep in options.sweeps:
-        with collect_errors(faults, "--sweep", (AddressError,)):
-            parse_sweep(sweep)
-            sweeps.append(sweep)
-    faults += repeated_keys(options.overrides, sweeps, options.seeds)
+    axes, wrong = study.axes()
+    faults += wrong
+    faults += repeated_keys(
+        [each if isinstance(each, str) else f"{each[0]}=0" for each in study.overrides],
+        [f"{key_of(each)}=0" for each in study.sweeps],
+        study.seeds,
+    )
     player: PlayerSpec | None = None
     with collect_errors(faults):
-        player = None if options.player is None else PlayerSpec.parse(options.player)
-    jobs: list[Job] = []
-    with collect_errors(faults, "--sweep", (AddressError,)), status_line(options.is_silent) as progress:
-        jobs = plan(found, names, options.overrides, sweeps, options.seeds, player, progress)
-    if names is None and not faults:
-        jobs = _choose_engines(jobs, options.overrides, sweeps, options.quiet)
-    if player is not None and jobs and not any(job.player == player for job in jobs):
+        player = None if study.player is None else PlayerSpec.parse(study.player)
+    if options.cluster is not None and options.workers is not None:
+        faults.append(Fault("--workers", None, "", "is given with --on too; leave out one of them"))
+    with collect_errors(faults, "--sweep", (AddressError,)):
+        return Plan(found, names, study.overrides, axes, study.seeds, player)
+    return None
+
+
+def _checked_batch(
+    plan: Plan, study: Study, options: _Options, store: Store | None, faults: list[Fault]
+) -> _Batch | None:
+    """Check the plan before its first run; add its errors to the faults, and return None if there are any."""
+    memory: dict[Fault, None] = {}
+    scenes: list[Scene] = []
+
+    def visit(job: Job) -> None:
+        if len(scenes) < 2:
+            scenes.append(job.scene)
+        fault = _memory_fault(job)
+        if fault is not None and len(memory) < MAX_PROBLEMS:
+            memory[fault] = None
+
+    def is_stored(plan_key: str) -> bool:
+        return store is not None and not options.force and store.has_planned(plan_key)
+
+    if plan.engines is None and not faults:
+        _choose_engines(plan, study, options.quiet)
+    with collect_errors(faults), status_line(options.is_silent) as progress:
+        plan.check(is_stored, visit, progress)
+    if plan.player is not None and not plan.has_player and not faults:
         faults.append(Fault("--player", None, "", "has no use: none of the scenes has a game with rules"))
+    count = len(plan)
+    scene = scenes[0] if count == 1 and scenes else None
     if not faults:
+        if count == 1 and scene is None:  # stored, so that it was not checked
+            scene = plan.scene_of(plan.scenes[0][0])
         with collect_errors(faults):
-            _check_drawing(options.plot, options.bodies, jobs)
-            _check_memory(jobs)
-    return jobs
+            _check_drawing(options.plot, options.bodies, count, scene)
+    faults += memory
+    return None if faults else _Batch(plan, study, count, scene)
+
+
+def _run_options(batch: _Batch, options: _Options) -> RunOptions:
+    study = batch.study
+    return RunOptions(
+        audit=study.audit is not False,
+        ledger=study.ledger is True,
+        final=options.as_json or batch.count <= MAX_TIMED,
+        keep=study.keep or "all",
+        time_limit=study.time_limit,
+        force=options.force,
+    )
 
 
 def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
     """Run all jobs, and add each run to the batch when it completes; an interrupt or error ends the batch."""
-    jobs = batch.jobs
-    is_single = all(len(job.scene.bodies) == 1 for job in jobs)  # then the table can show the final position
-    run_options = RunOptions(options.out, options.audit, options.ledger, options.as_json or is_single)
-    kept = "of {} runs are complete and kept"
+    kept = f"of {batch.count} runs are complete and kept"
+    if batch.is_large and options.as_json:
+        batch.spool = JsonSpool()
+    is_chosen = options.engines is not None
     try:
-        with progress_bars(options.is_silent) as bars:
-            bar = bars.add(plural(len(jobs), "run"), float(len(jobs)))
-
-            def show(index: int, fraction: float = 0.0) -> None:
-                done = len(batch.rows)
-                bar.update(done + fraction, f"{min(done + 1, len(jobs))}/{len(jobs)} {jobs[index].label}")
+        with RunMonitor(batch.count, options.is_silent) as monitor:
 
             def done(result: Result) -> None:
-                batch.add(result)
-                show(result.index)
+                row = result.row
+                batch.add(result, is_chosen)
+                name = _name(row.scene, row.engine, row.set)
+                monitor.add(name, seconds=row.seconds, is_ok=row.status == "ok", is_stored=row.repeated)
 
-            executor: Executor
-            if min(options.workers, len(jobs)) > 1:
-                executor = ProcessExecutor(run_options, options.workers, _print_notice)
-            else:
-                executor = InProcessExecutor(run_options, store, show)
-            for job in jobs:
-                executor.submit(job)
-            executor.wait(done)
+            executor = _executor(batch, options, monitor)
+            driver = Driver(
+                batch.plan,
+                batch.count,
+                executor,
+                _run_options(batch, options),
+                store,
+                done,
+                lambda job: monitor.start(job.label),
+                lambda error: batch.faults.extend(error.faults),
+            )
+            driver.run()
     except KeyboardInterrupt:
         batch.status = 130
-        click.echo(f"interrupted: {len(batch.rows)} {kept.format(len(jobs))}", err=True)
+        click.echo(f"interrupted: {batch.done} {kept}", err=True)
     except JobError as error:
         batch.status = 2
         click.echo(str(error), err=True)
     except ExecutorError as error:
         batch.status = 1
-        click.echo(f"--workers: {error}; {len(batch.rows)} {kept.format(len(jobs))}", err=True)
+        option = "--on" if options.cluster is not None else "--workers"
+        click.echo(f"{option}: {error}; {batch.done} {kept}", err=True)
 
 
-def _report_problems(batch: _Batch, is_engine_chosen: bool) -> int:
-    """Print a line for each failed or repeated run, and return the exit status."""
-    status = batch.status
-    for index, row in sorted(batch.rows.items()):
-        if row.status != "ok":
-            status = status or 1
-            advice = engine_advice(batch.jobs[index].scene, is_engine_chosen) if row.status == "refused" else ""
-            click.echo(f"{row.scene}: {row.status}: {row.reason}{advice}", err=True)
-        if row.damaged is not None:
-            click.echo(f"{row.damaged}; the run was repeated", err=True)
-        if row.replay is not None and row.replay.replayed is False:
-            status = status or 1
-            otherwise = None if row.game is None else row.game.otherwise
-            subject = "state" if otherwise is None else f"game, from {otherwise:g} s on,"
-            message = (
-                f"ended in a different {subject} than the session; a possible cause is another version of an engine"
-            )
-            click.echo(f"{row.scene}: {message}", err=True)
-    return status
+def _executor(batch: _Batch, options: _Options, monitor: RunMonitor) -> Executor:
+    """Return the executor of the command.
+
+    Raises:
+        ExecutorError: the cluster cannot be used.
+    """
+    if options.cluster is not None:
+        from sandbox.batch.cluster import ClusterExecutor
+
+        return ClusterExecutor(options.cluster, _print_notice)
+    if min(options.workers or 1, batch.count) > 1:
+        return ProcessExecutor(min(options.workers or 1, batch.count))
+    return InProcessExecutor(monitor.show_fraction)
+
+
+def _name(scene: str, engine: str, values: Mapping[str, Any]) -> str:
+    """Return a run as progress shows it."""
+    return " ".join((scene, engine, *(f"{key}={value}" for key, value in values.items())))
+
+
+def _problem(row: RunRow, batch: _Batch, is_engine_chosen: bool) -> str:
+    """Return the lines about a run that is not ok, was damaged, or ended otherwise than its recording; or nothing."""
+    lines = []
+    if row.status != "ok":
+        advice = ""
+        if row.status == "refused":
+            with suppress(SceneError):  # of a scene that is stored and was changed since
+                advice = engine_advice(batch.scene or batch.plan.scene_of(row.scene), is_engine_chosen)
+        lines.append(f"{row.scene}: {row.status}: {row.reason}{advice}")
+    if row.damaged is not None:
+        lines.append(f"{row.damaged}; the run was repeated")
+    if _is_different_replay(row):
+        otherwise = None if row.game is None else row.game.otherwise
+        subject = "state" if otherwise is None else f"game, from {otherwise:g} s on,"
+        lines.append(
+            f"{row.scene}: ended in a different {subject} than the session; a possible cause is another version of an "
+            "engine"
+        )
+    return "\n".join(lines)
+
+
+def _is_different_replay(row: RunRow) -> bool:
+    return row.replay is not None and row.replay.replayed is False
+
+
+def _report_problems(batch: _Batch) -> int:
+    """Print the lines about runs that are not ok, and return the exit status."""
+    for _, problem in sorted(batch.problems.items()):
+        click.echo(problem, err=True)
+    print_faults(list(dict.fromkeys(batch.faults)))
+    not_ok = batch.done - batch.statuses["ok"]
+    if not_ok > len(batch.problems):
+        click.echo(f"… and {not_ok - len(batch.problems):,} more runs that are not ok", err=True)
+    is_wrong = not_ok or batch.faults or any(map(_is_different_replay, batch.rows.values()))
+    return batch.status or int(bool(is_wrong))
 
 
 def _print_results(batch: _Batch, options: _Options, status: int) -> None:
     """Print the JSON document, or the tables."""
     rows = batch.ordered_rows
+    scores = [] if batch.study.seeds is None else score_rows(rows or [batch.games[k] for k in sorted(batch.games)])
     if options.as_json:
-        scores = score_rows(rows) if options.seeds is not None else []
-        print_json(to_json(RunsDocument(runs=rows, scores=scores or None, interrupted=batch.status == 130)))
-    elif not options.quiet and rows:
-        print_runs(rows, options.verbose)
-        if batch.single is not None:
-            _print_missed(batch.single)
-        if options.seeds is not None:
-            print_scores(score_rows(rows))
-        if options.ledger:
+        document = RunsDocument(runs=rows, scores=scores or None, interrupted=batch.status == 130)
+        if batch.spool is None:
+            print_json(to_json(document))
+        else:
+            batch.spool.print("runs", {key: value for key, value in to_json(document).items() if key != "runs"})
+    elif not options.quiet and batch.done:
+        if batch.is_large:
+            _print_summary(batch)
+        else:
+            print_runs(rows, options.verbose)
+        if batch.record is not None:
+            _print_missed(batch.record, batch.scene)
+        print_scores(scores)
+        if batch.study.ledger:
             print_ledgers(rows)
         if options.out is not None:
             click.echo(f"stored: {options.out}")
@@ -268,14 +467,23 @@ def _print_results(batch: _Batch, options: _Options, status: int) -> None:
             _suggest_next(rows[0].scene)
 
 
+def _print_summary(batch: _Batch) -> None:
+    """Print the number of runs by status, for more runs than a table shows."""
+    counts = ", ".join(f"{count:,} {status}" for status, count in batch.statuses.most_common())
+    click.echo(f"{batch.done:,} runs: {counts}; `sandbox runs DIR` lists and summarises the stored ones")
+
+
 def _draw(batch: _Batch, options: _Options, status: int) -> int:
     """Draw the single run to the file of `--plot`, and return the exit status."""
-    if options.plot is None or batch.status or batch.single is None or not len(batch.single.trajectory.time):
+    if options.plot is None or batch.status or batch.record is None or batch.scene is None:
         return status
     from sandbox.report.run_plot import plot_run
 
+    trajectory = batch.record.trajectory
+    if not len(trajectory.time):
+        return status
     try:
-        plot_run(batch.single.trajectory, batch.jobs[0].scene, options.plot, list(options.bodies) or None)
+        plot_run(trajectory, batch.scene, options.plot, list(options.bodies) or None)
     except OSError as error:
         click.echo(f"--plot: {options.plot}: {error.strerror or error}", err=True)
         return status or 2
@@ -297,29 +505,46 @@ def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
     return paths
 
 
-def _choose_engines(jobs: list[Job], overrides: Sequence[str], sweeps: Sequence[str], quiet: bool) -> list[Job]:
-    """Return the jobs; if the default engine lacks a given setting, on the only engine that has it.
+def _choose_engines(plan: Plan, study: Study, quiet: bool) -> None:
+    """Where the default engine lacks a given setting, let the plan use the only engine that has it.
 
-    All runs of a scene are on one engine. The engine of a recorded session is not changed.
+    All runs of a scene are on one engine. The engine of a recorded session is not changed. Scenes with faults are left
+    out; `Plan.check` reports them.
     """
-    axes = [parse_sweep(sweep) for sweep in sweeps]
-    found: dict[str, EngineChoice] = {}
-    for label in dict.fromkeys(job.label for job in jobs if not job.recorded):
-        scene_jobs = [job for job in jobs if job.label == label]
-        if all(scene_jobs[0].engine in able(job.scene) for job in scene_jobs):
+    overrides = [each if isinstance(each, str) else f"{each[0]}={json.dumps(each[1])}" for each in study.overrides]
+    if not any(key_of(each).startswith("solver.") for each in (*study.overrides, *study.sweeps)):
+        return
+    axes = [
+        (key, list(dict.fromkeys(str(point[k]) for point in islice(axis.points, MAX_STATED))))
+        for axis in plan.axes
+        for k, key in enumerate(axis.keys)
+    ]
+    found: dict[str, Job] = {}
+    scenes: dict[str, list[Scene]] = {}
+    for planned in plan.representatives():
+        with suppress(SceneError):
+            job = planned.job()
+            if not job.recorded:
+                found.setdefault(job.label, job)
+                scenes.setdefault(job.label, []).append(job.scene)
+    sentences: dict[str, None] = {}
+    for label, job in found.items():
+        if all(job.engine in able(scene) for scene in scenes[label]):
             continue
-        choice = only_engine([job.scene for job in scene_jobs], overrides, axes)
+        choice = only_engine(scenes[label], overrides, axes)
         if choice is not None:
-            found[label] = choice
+            plan.chosen[label] = choice.engine
+            sentences[choice.sentence] = None
     if not quiet:
-        for sentence in dict.fromkeys(choice.sentence for choice in found.values()):
+        for sentence in sentences:
             click.echo(sentence, err=True)
-    return [replace(job, engine=found[job.label].engine) if job.label in found else job for job in jobs]
 
 
-def _print_missed(record: RunRecord) -> None:
+def _print_missed(record: RunRecord, scene: Scene | None) -> None:
     """Print the first contacts that the engine missed, and the number of the others."""
-    run, fixed = record.trajectory, record.job.scene.fixed_names
+    if scene is None or not record.stored.missed_contacts or (record.computed is None and record.path is None):
+        return
+    run, fixed = record.trajectory, scene.fixed_names
     missed = list(zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True))
     for time, pair in missed[:MAX_MISSED]:
         one, other = (short_repr(str(run.names[k]) if k >= 0 else fixed[-1 - k]) for k in pair)
@@ -335,7 +560,7 @@ def _suggest_next(scene: str) -> None:
         click.secho(f"next: sandbox compare {name} (error of each engine), sandbox play {name} (window)", dim=True)
 
 
-def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) -> None:
+def _check_drawing(plot: Path | None, bodies: tuple[str, ...], count: int, scene: Scene | None) -> None:
     """Check, before the run, that `--plot` can draw it.
 
     Raises:
@@ -349,60 +574,43 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
     if plot is None and bodies:
         fault("--body", "works only together with --plot FILE")
     if plot is not None:
-        if len(jobs) != 1:
+        if count != 1:
             remedy = "run one scene on one --engine, without --sweep and --seeds"
             alternative = "sandbox compare SCENE --out DIR plots several engines"
-            fault("--plot", f"draws a single run, but this command makes {len(jobs):,}; {remedy}; {alternative}")
+            fault("--plot", f"draws a single run, but this command makes {count:,}; {remedy}; {alternative}")
         with collect_errors(faults):
             require_plot_file(plot)
-        names = jobs[0].scene.bodies.names
-        for name in bodies:
+        names = () if scene is None else scene.bodies.names
+        for name in bodies if scene is not None else ():
             if name not in names:
                 fault("--body", f"no body is named {short_repr(name)}; {suggest_names(name, names)}")
     if faults:
         raise SceneError(faults)
 
 
-def _report_equal_seeds(jobs: list[Job]) -> None:
+def _report_equal_seeds(plan: Plan) -> None:
     """Report scenes without randomness, in which several seeds give the same run."""
-    for label in dict.fromkeys(job.label for job in jobs):
-        if any(job.label == label and job.player is not None for job in jobs):
-            continue  # the game and its player are random
-        seed_count = max(job.seeds for job in jobs if job.label == label)
-        if seed_count > 1:
-            prefix = (
-                "" if all(job.seeds > 1 for job in jobs if job.label == label) else "for some of the swept values, "
-            )
+    for label, _ in plan.scenes:
+        alike, points = plan.alike_points(label)
+        if alike:
+            prefix = "" if alike == points else "for some of the swept values, "
             click.echo(
-                f"{label}: {prefix}nothing is random, so the seeds 1 to {seed_count} give one and the same run, "
+                f"{label}: {prefix}nothing is random, so the seeds 1 to {plan.seeds} give one and the same run, "
                 "which is made once",
                 err=True,
             )
-            continue
-        # Seeds change fastest: the first two jobs with different seeds are equal in every other value.
-        first, *others = (job.scene for job in jobs if job.label == label)
-        other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
-        if other is first:
-            continue
-        if same_random_state(first, other):
+        elif plan.has_useless_seeds(label):
             click.echo(f"{label}: nothing is random, so all seeds give the same run", err=True)
 
 
-def _check_memory(jobs: list[Job]) -> None:
-    """Check that every run fits into memory, before the first one.
-
-    Raises:
-        SceneError: some do not.
-    """
-    faults = []
-    for job in jobs:
-        try:
-            spawned = sum(isinstance(action, Spawn) for action in job.actions)
-            require_memory(job.scene, job.scene.solver, len(job.scene.bodies) + spawned, job.actions)
-        except TooLargeError as error:
-            faults.append(Fault(job.label, None, "solver.record_every", str(error)))
-    if faults:
-        raise SceneError(tuple(dict.fromkeys(faults)))
+def _memory_fault(job: Job) -> Fault | None:
+    """Return a fault if the frames of a run do not fit into memory."""
+    try:
+        spawned = sum(isinstance(action, Spawn) for action in job.actions)
+        require_memory(job.scene, job.scene.solver, len(job.scene.bodies) + spawned, job.actions)
+    except TooLargeError as error:
+        return Fault(job.label, None, "solver.record_every", str(error))
+    return None
 
 
 def _print_notice(message: str) -> None:

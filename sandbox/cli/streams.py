@@ -54,6 +54,37 @@ def print_json(document: Any) -> None:
     click.echo(json.dumps(document, ensure_ascii=not can_write_unicode(), allow_nan=False))
 
 
+class JsonSpool:
+    """Elements of a long JSON array, kept in a temporary file until they are printed in their order."""
+
+    def __init__(self) -> None:
+        from tempfile import TemporaryFile
+
+        self._file = TemporaryFile()  # noqa: SIM115, open until the process ends
+        self._places: dict[int, tuple[int, int]] = {}
+        """offset and size of each element, bytes"""
+
+    def add(self, index: int, element: Any) -> None:
+        """Keep an element under its index in the array."""
+        import json
+
+        text = json.dumps(element, ensure_ascii=not can_write_unicode(), allow_nan=False).encode("utf-8")
+        self._places[index] = self._file.seek(0, os.SEEK_END), len(text)
+        self._file.write(text)
+
+    def print(self, key: str, others: dict[str, Any]) -> None:
+        """Print an object with the array under a key, followed by other keys."""
+        import json
+
+        click.echo(f"{{{json.dumps(key)}: [", nl=False)
+        for k, index in enumerate(sorted(self._places)):
+            offset, size = self._places[index]
+            self._file.seek(offset)
+            click.echo((", " if k else "") + self._file.read(size).decode("utf-8"), nl=False)
+        rest = json.dumps(others, ensure_ascii=not can_write_unicode(), allow_nan=False)
+        click.echo(f"]{', ' if others else ''}{rest[1:]}")
+
+
 class _Output(io.FileIO):
     """Standard output, unbuffered."""
 

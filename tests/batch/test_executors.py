@@ -1,25 +1,37 @@
-"""Executors: the same rows from each, an index per job, and workers that are killed or cannot start."""
+"""Executors: the same outcomes from each; workers that die, hang, cannot start or have other versions."""
 
 import os
 import pickle
 import signal
-import sys
-import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
-from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
 
-from sandbox.batch import executors, worker
-from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
-from sandbox.batch.job import RunOptions, RunRecord, run_or_fetch
-from sandbox.batch.plan import Job
-from sandbox.batch.run_row import RunRow
-from sandbox.batch.store import Store
+from sandbox.batch import executors, process_pool
+from sandbox.batch.executors import (
+    Executor,
+    ExecutorError,
+    InProcessExecutor,
+    JobFailure,
+    JobOutcome,
+    RunTask,
+    TaskLostError,
+    VersionMismatchError,
+    run_task,
+)
+from sandbox.batch.job import CompletedRun, Job, RunOptions
+from sandbox.batch.process_pool import ProcessExecutor
+from sandbox.batch.stored_run import StoredRun
+from sandbox.provenance import versions
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import loads
 
 DROP = """
@@ -31,67 +43,108 @@ name = "a"
 position = [0, {height}]
 radius = 1
 """
-LARGE = 50_000_000
-"""Bytes of a row, far more than the buffer of a pipe: sending it takes about 10 ms."""
+LARGE = 10_000_000
+"""Bytes of a message, far more than the buffer of a pipe"""
 
 
 def jobs(count: int) -> list[Job]:
     return [Job(f"drop {k}", loads(DROP.format(height=k)), "pymunk") for k in range(count)]
 
 
-def results_of(executor: Executor, submitted: list[Job]) -> dict[int, Result]:
-    """Run jobs, check that each is reported once under its index, and return the results by index."""
-    assert [executor.submit(job) for job in submitted] == list(range(len(submitted)))
-    found: list[Result] = []
-    executor.wait(found.append)
-    assert sorted(result.index for result in found) == list(range(len(submitted)))
-    return {result.index: result for result in found}
+def task_of(*submitted: Job, **options: Any) -> RunTask:
+    return RunTask(submitted, RunOptions(**options), dict(versions()))
 
 
-def reproducible(row: RunRow) -> RunRow:
-    """Return a row without the figures that depend on the machine, and without the folder of its store."""
-    return replace(row, seconds=None, steps_per_second=None, realtime_factor=None, path=None)
+def reproducible(stored: StoredRun) -> StoredRun:
+    """Return a row without the figures that depend on the machine and on the time."""
+    return replace(stored, seconds=None, created="")
+
+
+@contextmanager
+def pool(workers: int = 1) -> Iterator[ProcessExecutor]:
+    executor = ProcessExecutor(workers)
+    try:
+        yield executor
+    finally:
+        executor.shut_down()
+
+
+def completed(future: "Future[tuple[JobOutcome, ...]]") -> list[CompletedRun]:
+    outcomes = future.result(120)
+    assert all(isinstance(each, CompletedRun) for each in outcomes)
+    return [each for each in outcomes if isinstance(each, CompletedRun)]
 
 
 @pytest.mark.full
-def test_all_executors_yield_the_same_rows(tmp_path: Path) -> None:
-    with Store(tmp_path / "one") as store:
-        in_process = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
-    in_workers = results_of(ProcessExecutor(RunOptions(tmp_path / "two"), 2), jobs(4))
-    for index, result in in_process.items():
-        assert result.row.scene == f"drop {index}"
-        assert result.record is not None and result.record.trajectory.status == "ok"
-        assert in_workers[index].record is None
-        assert reproducible(in_workers[index].row) == reproducible(result.row)
-        assert Path(in_workers[index].row.path or "").is_file()
+def test_worker_processes_have_the_outcomes_of_this_process() -> None:
+    submitted = jobs(6)
+    here = completed(InProcessExecutor().submit(task_of(*submitted)))
+    with pool(2) as executor:
+        futures = [executor.submit(task_of(*submitted[k : k + 2])) for k in (0, 2, 4)]
+        there = [each for future in futures for each in completed(future)]
+    for one, other in zip(here, there, strict=True):
+        assert reproducible(one.stored) == reproducible(other.stored)
+        assert one.trajectory is not None
+        assert other.trajectory is None
+        assert one.arrays is not None and other.arrays is not None
+    assert {each.stored.scene for each in there} == {job.label for job in submitted}
 
 
-def test_jobs_options_and_results_can_be_pickled() -> None:
+def test_tasks_and_outcomes_can_be_pickled() -> None:
     (job,) = jobs(1)
-    result = results_of(InProcessExecutor(RunOptions()), [job])[0]
-    for value in (job, RunOptions(), result.row):
-        assert pickle.loads(pickle.dumps(value)) == value
+    (outcome,) = run_task(task_of(job))
+    for value in (task_of(job), outcome, TaskLostError("a", (outcome,), knows_job=True), JobFailure("b")):
+        again = pickle.loads(pickle.dumps(value))
+        assert vars(again) == vars(value) if isinstance(value, Exception) else again == value
 
 
-def test_progress_has_the_index_of_the_running_job() -> None:
-    states: list[tuple[int, float]] = []
-    results_of(InProcessExecutor(RunOptions(), progress=lambda *state: states.append(state)), jobs(2))
-    assert (states[0], states[-1]) == ((0, 0.0), (1, 1.0))
-    assert states == sorted(states)
+def test_progress_of_a_run_in_this_process_ends_at_one() -> None:
+    fractions: list[float] = []
+    InProcessExecutor(fractions.append).submit(task_of(*jobs(1))).result()
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
 
 
-def test_job_that_cannot_be_stored_ends_the_executor(tmp_path: Path) -> None:
-    submitted = jobs(2)
-    with Store(tmp_path) as store:
-        path = run_or_fetch(submitted[0], store).path
-        assert path is not None
-        path.unlink()
-        path.mkdir()
-        for executor in (InProcessExecutor(RunOptions(tmp_path), store), ProcessExecutor(RunOptions(tmp_path), 1)):
-            for job in submitted:
-                executor.submit(job)
-            with pytest.raises(JobError, match="Is a directory"):
-                executor.wait(lambda _: None)
+def test_worker_with_other_versions_runs_nothing() -> None:
+    task = RunTask(tuple(jobs(1)), RunOptions(), {**versions(), "pymunk": "0.1"})
+    with pytest.raises(VersionMismatchError, match=r"pymunk .* instead of 0\.1"):
+        run_task(task)
+
+
+def test_job_with_faults_is_a_failure_with_its_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = SceneError([Fault("a.toml", 1, "b", "c")])
+
+    def fail(*_: object) -> NoReturn:
+        raise error
+
+    monkeypatch.setattr(executors, "run_job", fail)
+    for outcomes in (run_task(task_of(*jobs(1))), InProcessExecutor().submit(task_of(*jobs(1))).result()):
+        assert outcomes == (JobFailure("a.toml:1: b: c", error),)
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (MemoryError(), "out of memory; use fewer workers"),
+        (ZeroDivisionError("division"), "internal error: ZeroDivisionError in test_executors.py:"),
+    ],
+)
+def test_job_that_raises_is_a_failure_with_the_reason(
+    error: Exception, reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(job: Job, *_: object) -> Any:
+        if job.label == "drop 1":
+            raise error
+        return run(job)
+
+    run = executors.run_job
+    monkeypatch.setattr(executors, "run_job", fail)
+    first, second, third = run_task(task_of(*jobs(3)))
+    assert isinstance(first, CompletedRun)
+    assert isinstance(third, CompletedRun)
+    assert isinstance(second, JobFailure)
+    assert second.error is None
+    assert second.reason.startswith(reason)
 
 
 def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,44 +152,116 @@ def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytes
         raise OSError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr(SpawnProcess, "start", start)
-    executor = ProcessExecutor(RunOptions(), 2)
-    executor.submit(jobs(1)[0])
-    with pytest.raises(ExecutorError, match="Resource temporarily unavailable"):
-        executor.wait(lambda _: None)
+    with pool(2) as executor, pytest.raises(ExecutorError, match="Resource temporarily unavailable"):
+        executor.submit(task_of(*jobs(1))).result(60)
 
 
 @pytest.mark.full
-@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/self/task/*/syscall")
-def test_run_of_a_worker_killed_while_sending_its_row_is_repeated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(executors, "serve", partial(serve_large_rows, tmp_path / "killed"))
-    found = results_of(ProcessExecutor(RunOptions(), 2), jobs(3))
-    assert (tmp_path / "killed").exists()
-    assert [len(found[index].row.reason or "") for index in range(3)] == [LARGE] * 3
+def test_process_that_ends_at_its_start_raises_executor_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process_pool, "serve", end_at_once)
+    with pool() as executor, pytest.raises(ExecutorError, match="ended with status 3"):
+        executor.submit(task_of(*jobs(1))).result(120)
 
 
-def serve_large_rows(mark: Path, pipe: Any, options: RunOptions) -> None:
-    """Serve with rows that take long to send; the first worker that sends one kills itself meanwhile."""
-    worker.run_or_fetch = partial(large_record, mark)
-    worker.serve(pipe, options)
+def end_at_once(_: object) -> NoReturn:
+    os._exit(3)
 
 
-def large_record(mark: Path, job: Job, *more: Any) -> RunRecord:
-    record = run_or_fetch(job, *more)
-    record.trajectory.info["reason"] = " " * LARGE
-    try:
-        mark.touch(exist_ok=False)
-    except FileExistsError:
-        return record
-    threading.Thread(target=kill_in_write, args=(os.getpid(),), daemon=True).start()
-    return record
+@pytest.mark.full
+def test_fewer_workers_run_where_no_more_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    start, started = SpawnProcess.start, list[SpawnProcess]()
+
+    def start_one(process: SpawnProcess) -> None:
+        if started:
+            raise OSError(12, "Cannot allocate memory")
+        started.append(process)
+        start(process)
+
+    monkeypatch.setattr(SpawnProcess, "start", start_one)
+    with pool(3) as executor:
+        first = executor.submit(task_of(*jobs(1)))
+        completed(first)  # the first worker is ready
+        futures = [executor.submit(task_of(job)) for job in jobs(4)]
+        assert len([each for future in futures for each in completed(future)]) == 4
+        assert executor.slots < 3
 
 
-def kill_in_write(main: int, is_large: Callable[[int], bool] = lambda size: size > LARGE // 100) -> None:
-    """Wait until the main thread is in a large write (system call 1 on x86-64, 64 on ARM), then kill the process."""
-    number = {"x86_64": "1", "aarch64": "64"}[os.uname().machine]
-    while True:
-        call = Path(f"/proc/self/task/{main}/syscall").read_text().split()
-        if call[0] == number and is_large(int(call[3], 16)):
-            os.kill(main, signal.SIGKILL)
+@pytest.mark.full
+def test_killed_worker_loses_the_job_that_it_ran(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process_pool, "serve", partial(serve_with, die_at_drop_1))
+    with pool() as executor:
+        lost = executor.submit(task_of(*jobs(3))).exception(120)
+        assert isinstance(lost, TaskLostError)
+        assert (lost.reason, lost.knows_job, lost.is_timeout) == ("the process was killed by SIGKILL", True, False)
+        assert len(lost.outcomes) == 1  # that of the job before
+        assert len(completed(executor.submit(task_of(jobs(1)[0])))) == 1  # in another process
+
+
+def serve_with(replacement: Callable[..., Any], pipe: Any) -> None:
+    """Serve as a worker in which `run_job` is replaced."""
+    executors.run_job = partial(replacement, executors.run_job)
+    process_pool.serve(pipe)
+
+
+def die_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> CompletedRun:
+    if job.label == "drop 1":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return run(job, *more)
+
+
+@pytest.mark.full
+def test_worker_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
+    monkeypatch.setattr(executors, "COMPILING", 20.0)
+    with pool() as executor:
+        lost = executor.submit(task_of(*jobs(3), time_limit=0.5)).exception(120)
+        assert isinstance(lost, TaskLostError)
+        assert (lost.reason, lost.is_timeout, len(lost.outcomes)) == ("stopped at the time limit of 0.5 s", True, 1)
+        assert len(completed(executor.submit(task_of(jobs(1)[0])))) == 1
+
+
+def hang_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> CompletedRun:
+    while job.label == "drop 1":
+        time.sleep(1.0)
+    return run(job, *more)
+
+
+@pytest.mark.full
+def test_worker_killed_while_it_sends_an_outcome_does_not_block_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process_pool, "serve", partial(serve_with, large_run))
+    with pool(2) as executor:
+        futures = [executor.submit(task_of(job)) for job in jobs(3)]
+        lost = futures[1].exception(120)
+        assert isinstance(lost, TaskLostError)
+        assert "SIGKILL" in lost.reason
+        assert [len(each.stored.reason or "") for k in (0, 2) for each in completed(futures[k])] == [LARGE] * 2
+
+
+def large_run(run: Callable[..., CompletedRun], job: Job, *more: Any) -> CompletedRun:
+    """Return a run that takes long to send; that of the second job kills its process in the middle of the message."""
+    found = run(job, *more)
+    if job.label == "drop 1":
+        Connection._send = send_half  # type: ignore[method-assign]
+    return replace(found, stored=replace(found.stored, reason=" " * LARGE))
+
+
+def send_half(pipe: Connection, data: Any, write: Callable[[int, Any], int] = os.write) -> None:
+    half = memoryview(data)[: len(data) // 2] if len(data) > LARGE // 2 else memoryview(data)
+    while half:
+        half = half[write(pipe.fileno(), half) :]
+    if len(data) > LARGE // 2:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.full
+def test_shut_down_ends_workers_in_the_middle_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
+    with pool() as executor:
+        running = executor.submit(task_of(*jobs(2)))
+        time.sleep(1.0)
+    assert isinstance(running.exception(60), TaskLostError)
+
+
+def test_executors_have_the_members_of_the_protocol() -> None:
+    found: list[Executor] = [InProcessExecutor(), ProcessExecutor(3)]
+    assert [(each.slots, each.is_remote) for each in found] == [(1, False), (3, True)]

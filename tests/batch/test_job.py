@@ -1,24 +1,28 @@
 """Jobs: runs that are computed or loaded from a store, and their rows."""
 
 import json
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
 from sandbox import run_file
 from sandbox.action import Force, Remove, Spawn
-from sandbox.batch.job import RunOptions, run_or_fetch
-from sandbox.batch.plan import Job
+from sandbox.batch import store as store_module
+from sandbox.batch.job import Job, RunOptions, run_or_fetch
 from sandbox.batch.store import Store, StoreError
+from sandbox.batch.stored_run import COLUMNS
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.jsonable import to_json
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from tests.batch.test_store import files
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -123,7 +127,7 @@ def test_damaged_run_is_repeated_and_replaced(tmp_path: Path) -> None:
         assert (found.repeated, found.damaged, "damaged" in to_json(found.row())) == (True, None, False)
         assert found.trajectory.info["state_hash"] == first.trajectory.info["state_hash"]
         assert [row.seconds for row in store.rows()] == [again.trajectory.info["seconds"]]
-    assert {entry.name for entry in tmp_path.iterdir()} == {"runs.sqlite", first.path.name}
+    assert files(tmp_path) == {"runs.sqlite", first.path.name}
 
 
 OTHERS = [
@@ -135,31 +139,59 @@ OTHERS = [
 ]
 
 
+def written_by_an_earlier_version(folder: Path) -> None:
+    """Remove the columns that format 2 of a store did not have."""
+    with closing(sqlite3.connect(folder / "runs.sqlite", isolation_level=None)) as database:
+        added = ", ".join(f"{column} = NULL" for column in COLUMNS[18:])
+        database.execute(f"UPDATE runs SET {added}")
+
+
 @pytest.mark.parametrize(("key", "other"), OTHERS)
-def test_run_stored_under_a_wrong_id_is_repeated(key: str, other: Job, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_old", [False, True])
+def test_run_stored_under_a_wrong_id_is_repeated(key: str, other: Job, is_old: bool, tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         path, theirs = run_or_fetch(JOB, store).path, run_or_fetch(other, store).path
         assert path is not None
         assert theirs is not None
         path.write_bytes(theirs.read_bytes())
+        if is_old:
+            written_by_an_earlier_version(tmp_path)
         again = run_or_fetch(JOB, store)
         assert again.damaged is not None
-        assert f"is not the run of its id: its info.{'scene' if key == 'seed' else key} is" in again.damaged
+        if is_old:
+            assert f"is not the run of its id: its info.{'scene' if key == 'seed' else key} is" in again.damaged
+        else:
+            assert again.damaged.startswith(f"{path} is not a stored run: ")
         assert run_or_fetch(JOB, store).repeated
         assert run_or_fetch(other, store).repeated
+
+
+def test_row_of_an_earlier_version_is_completed_from_its_file(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        first = run_or_fetch(JOB, store)
+        written_by_an_earlier_version(tmp_path)
+        again = run_or_fetch(JOB, store)
+        assert again.repeated
+        assert again.stored == first.stored
+        assert store.find(first.id) == first.stored
+        assert again.row() == replace(first.row(), repeated=True)
 
 
 @pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), OSError(5, "Input/output error")])
 def test_stored_run_that_cannot_be_opened_raises_store_error(
     error: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def fail(_: Path) -> NoReturn:
+        raise error
+
     with Store(tmp_path) as store:
         path = run_or_fetch(JOB, store).path
-
-        def load(path: Path) -> Trajectory:
-            raise error
-
-        monkeypatch.setattr(Trajectory, "load", load)
+        with monkeypatch.context() as patched:
+            patched.setattr(store_module, "_digest_of", fail)
+            with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
+                run_or_fetch(JOB, store)
+        written_by_an_earlier_version(tmp_path)
+        monkeypatch.setattr(Trajectory, "load", fail)
         with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
             run_or_fetch(JOB, store)
 
@@ -171,10 +203,45 @@ def test_stored_run_that_does_not_fit_into_memory_is_not_replaced(
         path = run_or_fetch(JOB, store).path
         assert path is not None
         before = path.read_bytes()
+        written_by_an_earlier_version(tmp_path)
         monkeypatch.setattr(run_file, "free_memory", lambda: 1000)
         with pytest.raises(TooLargeError, match="delete the file to repeat the run"):
             run_or_fetch(JOB, store)
         assert path.read_bytes() == before
+
+
+def test_summary_keeps_the_row_and_the_arrays_are_made_where_they_are_wanted(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        summary = run_or_fetch(JOB, store, RunOptions(keep="summary"))
+        assert (summary.path, summary.stored.digest) == (None, None)
+        again = run_or_fetch(JOB, store, RunOptions(keep="summary"))
+        assert again.repeated
+        assert again.row() == replace(summary.row(), repeated=True)
+        assert again.row().final == summary.row().final is not None
+        with pytest.raises(ValueError, match="was stored without arrays"):
+            _ = again.trajectory
+        whole = run_or_fetch(JOB, store)
+        assert not whole.repeated
+        assert whole.path is not None
+        assert run_or_fetch(JOB, store, RunOptions(keep="summary")).repeated
+        assert len(store.rows()) == 1
+    assert whole.stored.state_hash == summary.stored.state_hash
+
+
+def test_force_repeats_a_stored_run(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        run_or_fetch(JOB, store)
+        assert not run_or_fetch(JOB, store, RunOptions(force=True)).repeated
+        assert len(store.rows()) == 1
+
+
+def test_run_is_stopped_at_its_time_limit_and_tried_again(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        stopped = run_or_fetch(JOB, store, RunOptions(time_limit=1e-9))
+        assert (stopped.stored.status, stopped.stored.reason) == ("failed", "stopped at the time limit of 1e-09 s")
+        assert stopped.stored.is_recorded_failure
+        again = run_or_fetch(JOB, store, RunOptions(time_limit=600.0))
+        assert (again.repeated, again.stored.status) == (False, "ok")
 
 
 @pytest.mark.parametrize("changes", [{}, {"solver": SCENE.solver.replace(integrator="rk4")}])

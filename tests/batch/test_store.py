@@ -8,12 +8,15 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 
 from sandbox.action import Remove
-from sandbox.batch.store import VERSION, Store, StoredRun, StoreError, run_id
+from sandbox.batch import store as module
+from sandbox.batch.store import VERSION, Store, StoreError, run_id
+from sandbox.batch.stored_run import StoredRun
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, loads
@@ -63,12 +66,14 @@ def sample_run(**info: object) -> Trajectory:
 
 
 def files(directory: Path) -> set[str]:
-    return {path.name for path in directory.iterdir()}
+    """Return the names of the files of a store, but for those of an open database in WAL mode."""
+    names = {path.name for path in directory.iterdir()}
+    return names - {"runs.sqlite-wal", "runs.sqlite-shm"}
 
 
 def test_added_run_is_found_with_all_its_values(tmp_path: Path) -> None:
     with Store(tmp_path / "new" / "runs") as store:
-        added = store.add(sample_run(), ID)
+        added = store.add_run(sample_run(), ID)
         assert store.find(ID) == added
         assert store.rows() == (added,)
         assert store.file(added) == tmp_path / "new" / "runs" / f"{ID}.npz"
@@ -87,30 +92,30 @@ def test_added_run_is_found_with_all_its_values(tmp_path: Path) -> None:
 
 def test_reopened_store_still_holds_its_runs(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
-        added = store.add(sample_run(), ID)
+        added = store.add_run(sample_run(), ID)
     with Store(tmp_path) as store:
         assert store.find(ID) == added
 
 
 def test_same_id_twice_keeps_the_first(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
-        first = store.add(sample_run(seconds=1.0), ID)
+        first = store.add_run(sample_run(seconds=1.0), ID)
         before = store.file(first).read_bytes()
-        assert store.add(sample_run(seconds=2.0), ID) == first
+        assert store.add_run(sample_run(seconds=2.0), ID) == first
         assert store.rows() == (first,)
         assert store.file(first).read_bytes() == before
 
 
 def test_run_added_concurrently_is_kept(tmp_path: Path) -> None:
     class Slow(Trajectory):
-        def save(self, path: str | Path) -> Path:
+        def to_bytes(self) -> bytes:
             with Store(tmp_path) as other:
-                other.add(sample_run(seconds=1.0), ID)
-            return super().save(path)
+                other.add_run(sample_run(seconds=1.0), ID)
+            return super().to_bytes()
 
     slow = Slow(**{**vars(sample_run()), "info": {**sample_run().info, "seconds": 2.0}})
     with Store(tmp_path) as store:
-        assert store.add(slow, ID).seconds == 1.0
+        assert store.add_run(slow, ID).seconds == 1.0
         assert len(store.rows()) == 1
     assert Trajectory.load(tmp_path / f"{ID}.npz").info["seconds"] == 1.0
     assert files(tmp_path) == {"runs.sqlite", f"{ID}.npz"}
@@ -118,9 +123,9 @@ def test_run_added_concurrently_is_kept(tmp_path: Path) -> None:
 
 def test_run_with_a_deleted_file_can_be_added_again(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
-        (tmp_path / store.add(sample_run(seconds=1.0), ID).path).unlink()
+        (tmp_path / store.add_run(sample_run(seconds=1.0), ID).path).unlink()
         assert store.find(ID) is None
-        again = store.add(sample_run(seconds=2.0), ID)
+        again = store.add_run(sample_run(seconds=2.0), ID)
         assert again.seconds == 2.0
         assert store.rows() == (again,)
 
@@ -129,43 +134,45 @@ def test_file_without_a_row_is_replaced(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         (tmp_path / f"{ID}.npz").write_bytes(b"left by a crash")
         assert store.find(ID) is None
-        store.add(sample_run(), ID)
+        store.add_run(sample_run(), ID)
     assert Trajectory.load(tmp_path / f"{ID}.npz").status == "ok"
 
 
-def test_failure_while_saving_leaves_neither_row_nor_file(tmp_path: Path) -> None:
-    class Unsavable(Trajectory):
-        def save(self, path: str | Path) -> Path:
-            Path(path).write_bytes(b"half a file")
-            raise KeyboardInterrupt
+def test_interrupt_while_saving_leaves_neither_row_nor_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def write_half(path: Path, data: bytes) -> NoReturn:
+        with path.open("wb") as stream:
+            stream.write(data[:100])
+        raise KeyboardInterrupt
 
     with Store(tmp_path) as store:
-        with pytest.raises(KeyboardInterrupt):
-            store.add(Unsavable(**vars(sample_run())), ID)
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_bytes", write_half)
+            with pytest.raises(KeyboardInterrupt):
+                store.add_run(sample_run(), ID)
         assert store.rows() == ()
         assert files(tmp_path) == {"runs.sqlite"}
-        store.add(sample_run(), ID)
+        store.add_run(sample_run(), ID)
 
 
 def test_failure_while_inserting_leaves_no_row(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         with pytest.raises(StoreError):
-            store.add(sample_run(seed=None), ID)
+            store.add_run(sample_run(seed=None), ID)
         assert store.rows() == ()
         assert store.find(ID) is None
-        assert store.add(sample_run(), ID) == store.find(ID)
+        assert store.add_run(sample_run(), ID) == store.find(ID)
 
 
 def test_rows_are_in_insertion_order(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         for run in (OTHER, ID):
-            store.add(sample_run(), run)
+            store.add_run(sample_run(), run)
         assert [row.id for row in store.rows()] == [OTHER, ID]
 
 
 def test_nan_is_stored_as_null(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
-        row = store.add(sample_run(energy_end=float("nan"), energy_start=float("inf"), audited=False), ID)
+        row = store.add_run(sample_run(energy_end=float("nan"), energy_start=float("inf"), audited=False), ID)
         assert (row.energy_start, row.energy_end, row.missed_contacts) == (float("inf"), None, None)
         assert store.find(ID) == row
 
@@ -174,7 +181,7 @@ def test_nan_is_stored_as_null(tmp_path: Path) -> None:
 def test_invalid_id_is_rejected_and_creates_no_file(tmp_path: Path, run: str) -> None:
     with Store(tmp_path) as store:
         with pytest.raises(ValueError, match="not a run id"):
-            store.add(sample_run(), run)
+            store.add_run(sample_run(), run)
         assert store.find(run) is None
     assert files(tmp_path) == {"runs.sqlite"}
 
@@ -185,7 +192,7 @@ from tests.batch.test_store import Store, sample_run
 sys.stdin.read(1)
 with Store(sys.argv[1]) as store:
     for run in sys.argv[2:]:
-        store.add(sample_run(), run)
+        store.add_run(sample_run(), run)
 """
 
 
@@ -288,7 +295,7 @@ def test_store_of_a_newer_version_is_rejected(tmp_path: Path) -> None:
 
 def test_store_can_be_closed_twice(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
-        store.add(sample_run(), ID)
+        store.add_run(sample_run(), ID)
         store.close()
         store.close()
     with Store(tmp_path) as again:
@@ -327,7 +334,139 @@ def test_id_depends_on_every_input_of_a_run() -> None:
 def test_scene_hash_depends_on_the_scene_alone(tmp_path: Path) -> None:
     other = loads(dumps(SCENE), overrides=["world.duration=3.0"])
     with Store(tmp_path) as store:
-        one = store.add(sample_run(), ID)
-        same = store.add(sample_run(engine="box2d", seed=8), OTHER)
-        third = store.add(replace(sample_run(), info={**sample_run().info, "scene": to_document(other)}), OTHER[::-1])
+        one = store.add_run(sample_run(), ID)
+        same = store.add_run(sample_run(engine="box2d", seed=8), OTHER)
+        third = store.add_run(
+            replace(sample_run(), info={**sample_run().info, "scene": to_document(other)}), OTHER[::-1]
+        )
     assert one.scene_hash == same.scene_hash != third.scene_hash
+
+
+def add_with(store: Store, run: str, **values: Any) -> StoredRun:
+    """Store a run with values that a command has set; two underscores stand for a dot."""
+    set_values = {path.replace("__", "."): value for path, value in values.items()}
+    return store.add(StoredRun.of(sample_run(), run, scene="x", values=set_values), None, values=set_values)
+
+
+def cells(folder: Path, columns: str) -> list[tuple[Any, ...]]:
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as database:
+        return database.execute(f"SELECT {columns} FROM runs ORDER BY rowid").fetchall()
+
+
+def test_each_value_that_is_set_has_a_column(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        add_with(store, ID, ball__a__mass=2.5, world__gravity=[0, -1], world__seed=3, title="other")
+        add_with(store, OTHER, ball__a__fixed=True, ball__a__name="b")
+    found = cells(tmp_path, '"ball.a.mass", "world.gravity", "ball.a.fixed", "ball.a.name"')
+    assert found == [(2.5, "[0,-1]", None, None), (None, None, 1, "b")]
+    columns = [row[1] for row in cells_of_table(tmp_path)][len(StoredRun.__dataclass_fields__) :]
+    assert columns == ["ball.a.mass", "world.gravity", "ball.a.fixed", "ball.a.name"]  # seed and title have their own
+    assert json.loads(cells(tmp_path, "set_values")[0][0]) == {
+        "ball.a.mass": 2.5,
+        "world.gravity": [0, -1],
+        "world.seed": 3,
+        "title": "other",
+    }
+
+
+def cells_of_table(folder: Path) -> list[tuple[Any, ...]]:
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as database:
+        return database.execute("PRAGMA table_info(runs)").fetchall()
+
+
+def test_column_of_a_setting_has_the_setting_of_every_run(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        add_with(store, ID)
+        add_with(store, OTHER, solver__dt=0.5)  # as swept; the stored settings have the scene's 0.01
+        add_with(store, OTHER[::-1])
+    assert cells(tmp_path, '"solver.dt"') == [(0.01,)] * 3
+
+
+def test_spellings_of_a_path_share_a_column_and_names_in_sql_are_quoted(tmp_path: Path) -> None:
+    notices: list[str] = []
+    with Store(tmp_path, notices.append) as store:
+        for run, path in ((ID, "ball[0].mass"), (OTHER, "ball.0.mass"), (OTHER[::-1], 'ball."a\'; DROP TABLE".mass')):
+            values = {path: 2.0}
+            store.add(StoredRun.of(sample_run(), run, values=values), None, values=values)
+        assert not notices
+        values = {"Ball.0.mass": 3.0}
+        store.add(StoredRun.of(sample_run(), "f" * 20, values=values), None, values=values)
+        assert "has no column beside ball.0.mass" in notices[0]  # SQL ignores case
+        assert len(store.rows()) == 4
+    assert cells(tmp_path, '"ball.0.mass"') == [(2.0,), (2.0,), (None,), (None,)]
+
+
+def test_number_of_value_columns_is_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MAX_VALUE_COLUMNS", 2)
+    with Store(tmp_path) as store:
+        add_with(store, ID, a__b=1, a__c=2)
+        with pytest.raises(StoreError, match="more than 2 different values"):
+            add_with(store, OTHER, a__d=3)
+        assert [row.id for row in store.rows()] == [ID]
+        add_with(store, OTHER, a__b=1)
+
+
+def test_values_may_be_added_by_two_processes_in_turns(tmp_path: Path) -> None:
+    with Store(tmp_path) as one, Store(tmp_path) as other:
+        add_with(one, ID, a__b=1)
+        add_with(other, OTHER, a__b=2)
+        add_with(one, OTHER[::-1], a__b=3)
+    assert cells(tmp_path, '"a.b"') == [(1,), (2,), (3,)]
+
+
+def test_files_beyond_the_first_runs_are_in_subfolders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "FLAT_RUNS", 2)
+    runs = [f"{k:x}" * 20 for k in range(4)]
+    with Store(tmp_path) as store:
+        added = [store.add_run(sample_run(), run) for run in runs]
+        assert [row.path for row in added] == [
+            f"{runs[0]}.npz",
+            f"{runs[1]}.npz",
+            f"22/{runs[2]}.npz",
+            f"33/{runs[3]}.npz",
+        ]
+    with Store(tmp_path) as store:
+        assert store.rows() == tuple(added)
+        for run in runs:
+            found = store.find(run)
+            assert found is not None and store.fault_of_file(found) is None
+            file = store.file(found)
+            assert file is not None and Trajectory.load(file).status == "ok"
+        assert store.add_run(sample_run(), runs[0], replace_run=True).path == f"{runs[0]}.npz"  # stays where it was
+
+
+def test_changed_file_is_noticed_without_reading_its_arrays(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        row = store.add_run(sample_run(), ID)
+        assert store.fault_of_file(row) is None
+        file = store.file(row)
+        assert file is not None
+        intact = file.read_bytes()
+        for damaged in (intact[:-1], b"", intact + b"x", bytes([intact[0] ^ 1]) + intact[1:]):
+            file.write_bytes(damaged)
+            fault = store.fault_of_file(row)
+            assert fault is not None and fault.startswith(f"{file} is not a stored run: ")
+
+
+def test_run_without_arrays_is_found_and_has_no_file(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        row = add_with(store, ID)
+        assert (row.path, row.size, store.file(row), store.fault_of_file(row)) == (None, None, None, None)
+        assert store.find(ID) == row
+    assert files(tmp_path) == {"runs.sqlite"}
+
+
+def test_run_is_found_by_the_key_of_its_plan(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        row = store.add(StoredRun.of(sample_run(), ID, plan_key="a" * 20))
+        assert store.find_planned("a" * 20) == row
+        assert store.find_planned("b" * 20) is None
+        store.set_plan_key(row, "b" * 20)
+        assert store.find_planned("a" * 20) is None
+        assert store.find_planned("b" * 20) is not None
+
+
+def test_database_is_in_wal_mode(tmp_path: Path) -> None:
+    with Store(tmp_path), closing(sqlite3.connect(tmp_path / "runs.sqlite")) as other:
+        assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert other.execute("SELECT count(*) FROM runs").fetchone() == (0,)  # while the store is open

@@ -13,23 +13,22 @@ from pathlib import Path
 import pytest
 
 from sandbox.batch import store as module
-from sandbox.batch.store import DATABASE, TABLE, Store, StoreError
+from sandbox.batch.store import DATABASE, Store, StoreError
+from sandbox.batch.stored_run import COLUMNS, TABLE
 from sandbox.signals import defer_interrupt
 from tests.batch.test_store import ID, OTHER, files, sample_run
 from tests.environment import with_root_on_path
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
-SAVING = f"""
+SAVING = """
 import sys
-from tests.batch.test_store import Store, Trajectory, sample_run
-class Slow(Trajectory):
-    def save(self, path):
-        path.write_bytes(b"half")
-        print("ready", flush=True)
-        sys.stdin.read()
-with Store(sys.argv[1]) as store:
-    store.add(Slow(**vars(sample_run())), "{OTHER}")
+from pathlib import Path
+from sandbox.atomic_write import temporary_in
+with temporary_in(Path(sys.argv[1])) as staged:  # as `Store.add` does
+    staged.write_bytes(b"half")
+    print("ready", flush=True)
+    sys.stdin.read()
 """
 
 
@@ -37,7 +36,7 @@ with Store(sys.argv[1]) as store:
 def filled(tmp_path: Path) -> Path:
     """A folder with one run."""
     with Store(tmp_path) as store:
-        store.add(sample_run(), ID)
+        store.add_run(sample_run(), ID)
     return tmp_path
 
 
@@ -101,7 +100,7 @@ def test_damaged_row_is_reported_and_its_run_can_be_added_again(filled: Path, da
         assert f"{DATABASE}: a damaged row" in notices[0]
         assert len(notices[0]) < len(str(filled)) + 200
         assert store.rows() == ()
-        added = store.add(sample_run(seconds=2.0), ID)
+        added = store.add_run(sample_run(seconds=2.0), ID)
         assert store.find(ID) == added
         assert store.rows() == (added,)
 
@@ -123,6 +122,7 @@ LAYOUTS = {
     "no table": ["DROP TABLE runs"],
     "a missing column": ["ALTER TABLE runs DROP COLUMN reason"],
     "a column more": ["ALTER TABLE runs ADD COLUMN more TEXT"],
+    "a column of a value with a type": ['ALTER TABLE runs ADD COLUMN "solver.dt" REAL'],
     "a column of another name": ["ALTER TABLE runs RENAME COLUMN score TO points"],
     "a view in place of the table": ["ALTER TABLE runs RENAME TO others", "CREATE VIEW runs AS SELECT * FROM others"],
     "a trigger": ["CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END"],
@@ -141,16 +141,36 @@ def test_database_with_a_different_layout_is_rejected_and_unchanged(filled: Path
     assert (filled / DATABASE).read_bytes() == before
 
 
-def test_store_of_the_first_version_is_migrated(filled: Path) -> None:
-    change(filled, "ALTER TABLE runs DROP COLUMN score", "PRAGMA user_version = 1")
+FORMER_TABLE = TABLE.partition("    scene TEXT,")[0].replace("path TEXT,", "path TEXT NOT NULL,").rstrip().rstrip(",")
+"""The table of format 2; format 1 had no scores."""
+
+
+@pytest.mark.parametrize(("version", "dropped"), [(2, []), (1, ["ALTER TABLE runs DROP COLUMN score"])])
+def test_store_of_an_earlier_version_is_migrated(filled: Path, version: int, dropped: list[str]) -> None:
+    columns = ", ".join(COLUMNS[:18])
+    change(
+        filled,
+        "DROP INDEX runs_by_plan_key",
+        "ALTER TABLE runs RENAME TO newer",
+        FORMER_TABLE + ")",
+        f"INSERT INTO runs ({columns}) SELECT {columns} FROM newer",
+        "DROP TABLE newer",
+        *dropped,
+        f"PRAGMA user_version = {version}",
+    )
     with Store(filled) as store:
-        assert store.find(ID) is not None
+        found = store.find(ID)
+        assert found is not None
+        assert (found.steps, found.scene, found.digest, found.details) == (10, None, None, None)
+        store.add_run(sample_run(), OTHER)
+    with Store(filled) as store:
+        assert len(store.rows()) == 2
 
 
 def test_any_damage_of_the_database_raises_store_error(filled: Path) -> None:
     with Store(filled) as store:
         for k in range(30):
-            store.add(sample_run(scene={"title": "μ" * 50}), f"{k:020x}")
+            store.add_run(sample_run(scene={"title": "μ" * 50}), f"{k:020x}")
     intact = (filled / DATABASE).read_bytes()
     rng = random.Random(3)
     for k in range(150):
@@ -166,15 +186,15 @@ def test_any_damage_of_the_database_raises_store_error(filled: Path) -> None:
             with Store(filled) as store:
                 store.rows()
                 store.find(ID)
-                store.add(sample_run(), ID)
+                store.add_run(sample_run(), ID)
         except StoreError as error:
             assert DATABASE in str(error)
 
 
 def test_run_is_replaced_with_its_row(filled: Path) -> None:
     with Store(filled) as store:
-        assert store.add(sample_run(seconds=9.0), ID).seconds == 0.25
-        assert store.add(sample_run(seconds=9.0), ID, replace=True).seconds == 9.0
+        assert store.add_run(sample_run(seconds=9.0), ID).seconds == 0.25
+        assert store.add_run(sample_run(seconds=9.0), ID, replace_run=True).seconds == 9.0
         assert [row.seconds for row in store.rows()] == [9.0]
     assert files(filled) == {DATABASE, f"{ID}.npz"}
 
@@ -217,7 +237,7 @@ def test_folder_removed_while_open_raises_store_error(filled: Path) -> None:
             path.unlink()
         filled.rmdir()
         with pytest.raises(StoreError, match=str(filled)):
-            store.add(sample_run(), OTHER)
+            store.add_run(sample_run(), OTHER)
     filled.mkdir()
 
 
@@ -232,7 +252,7 @@ long = replace(sample_run(), time=np.random.default_rng(0).random(100_000))
 for limit in (0, 100, 4096, 100_000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     try:
-        store.add(long, "{OTHER}")
+        store.add_run(long, "{OTHER}")
     except StoreError as error:
         print(error)
 """

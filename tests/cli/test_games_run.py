@@ -1,14 +1,12 @@
 """`sandbox run`, `check` and `replay` of games: scores, players, replayed sessions."""
 
 import json
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 
 from sandbox.batch.find_run import read_run
-from sandbox.batch.store import VERSION, Store
+from sandbox.batch.store import Store
 from sandbox.cli.window import _computed
 from sandbox.games import registry
 from sandbox.measure.run.sessions import play_out
@@ -95,18 +93,6 @@ def test_store_has_the_score_and_separates_players(
     assert (other["repeated"], other["id"] != first["id"]) == (False, True)
     with Store(out) as store:
         assert [row.score for row in store.rows()] == [first["score"], other["score"]]
-
-
-def test_store_of_version_1_is_migrated(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    out = tmp_path / "runs"
-    json_of(capfd, "run", scene, "--out", str(out))
-    with closing(sqlite3.connect(out / "runs.sqlite", isolation_level=None)) as old:
-        old.execute("ALTER TABLE runs DROP COLUMN score")  # as version 1 had it
-        old.execute("PRAGMA user_version = 1")
-    with Store(out) as store:
-        assert [row.score for row in store.rows()] == [None]
-    with closing(sqlite3.connect(out / "runs.sqlite")) as new:
-        assert new.execute("PRAGMA user_version").fetchone()[0] == VERSION == 2
 
 
 def test_script_is_accepted_as_a_player(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,8 @@ pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 COLUMNS = (
     "id scene_hash scene_title engine settings seed versions status reason created steps seconds energy_start "
-    "energy_end contacts missed_contacts path score"
+    "energy_end contacts missed_contacts path score scene set_values first_contact joint_error broken_joints "
+    "state_hash work plan_key size digest details"
 )
 
 

@@ -13,10 +13,9 @@ from typing import Any, NoReturn
 
 import pytest
 
-from sandbox.batch import executors, worker
-from sandbox.batch.executors import ATTEMPTS
-from sandbox.batch.job import RunOptions, RunRecord, run_or_fetch
-from sandbox.batch.plan import Job
+from sandbox.batch import executors, process_pool
+from sandbox.batch.driver import ATTEMPTS
+from sandbox.batch.job import CompletedRun, Job, run_job
 from sandbox.batch.store import Store, StoreError
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
@@ -80,56 +79,56 @@ def pid_file(folder: Path) -> Path:
     return folder / "pids"
 
 
-def die(job: Job, store: Store | None, *_: object) -> NoReturn:
-    """Replacement of `run_or_fetch`: record the attempt in a file and die by a signal."""
+def die(job: Job, *_: object) -> NoReturn:
+    """Replacement of `run_job`: record the attempt in a file and die by a signal."""
     with pid_file(Path(job.label).parent).open("a") as stream:
         stream.write(f"{os.getpid()}\n")
     os.kill(os.getpid(), signal.SIGSEGV if job.scene.world.seed == 2 else signal.SIGKILL)
     raise AssertionError("still alive")
 
 
-def die_for_seed_2(job: Job, *args: Any) -> RunRecord:
-    """Replacement of `run_or_fetch`: die only for seed 2."""
-    return die(job, *args) if job.scene.world.seed == 2 else run_or_fetch(job, *args)
+def die_for_seed_2(job: Job, *args: Any) -> CompletedRun:
+    """Replacement of `run_job`: die only for seed 2."""
+    return die(job, *args) if job.scene.world.seed == 2 else run_job(job, *args)
 
 
-def die_once(job: Job, *args: Any) -> RunRecord:
-    """Replacement of `run_or_fetch`: die only at the first attempt."""
-    return run_or_fetch(job, *args) if pid_file(Path(job.label).parent).exists() else die(job, *args)
+def die_once(job: Job, *args: Any) -> CompletedRun:
+    """Replacement of `run_job`: die only at the first attempt."""
+    return run_job(job, *args) if pid_file(Path(job.label).parent).exists() else die(job, *args)
 
 
-def fail_for_seed_2(job: Job, *args: Any) -> RunRecord:
-    """Replacement of `run_or_fetch`: raise an unexpected error for seed 2."""
+def fail_for_seed_2(job: Job, *args: Any) -> CompletedRun:
+    """Replacement of `run_job`: raise an unexpected error for seed 2."""
     if job.scene.world.seed == 2:
         raise ZeroDivisionError("here")
-    return run_or_fetch(job, *args)
+    return run_job(job, *args)
 
 
-def run_out_of_memory(job: Job, *args: Any) -> RunRecord:
-    """Replacement of `run_or_fetch`: raise MemoryError."""
+def run_out_of_memory(job: Job, *args: Any) -> CompletedRun:
+    """Replacement of `run_job`: raise MemoryError."""
     raise MemoryError
 
 
 @pytest.fixture
-def replace_run_or_fetch(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., RunRecord]], None]:
-    """Return a function that replaces `run_or_fetch` in all workers."""
+def replace_run_job(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., CompletedRun]], None]:
+    """Return a function that replaces `run_job` in all workers."""
 
-    def replace(function: Callable[..., RunRecord]) -> None:
+    def replace(function: Callable[..., CompletedRun]) -> None:
         # A worker imports the function by its module; this folder is on its path.
-        monkeypatch.setattr(executors, "serve", partial(serve_with, function))
+        monkeypatch.setattr(process_pool, "serve", partial(serve_with, function))
 
     return replace
 
 
-def serve_with(function: Callable[..., RunRecord], pipe: Any, options: RunOptions) -> None:
-    worker.run_or_fetch = function  # type: ignore[assignment]
-    worker.serve(pipe, options)
+def serve_with(function: Callable[..., CompletedRun], pipe: Any) -> None:
+    executors.run_job = function  # type: ignore[assignment]
+    process_pool.serve(pipe)
 
 
 def test_run_whose_worker_is_killed_is_repeated(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_job: Callable[[Callable[..., CompletedRun]], None]
 ) -> None:
-    replace_run_or_fetch(die_once)
+    replace_run_job(die_once)
     words = ("run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
     status, document, err = json_of(capfd, *words)
     assert (status, err) == (0, [])
@@ -139,9 +138,9 @@ def test_run_whose_worker_is_killed_is_repeated(
 
 @pytest.mark.slow
 def test_run_that_kills_every_worker_fails_and_the_others_complete(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_job: Callable[[Callable[..., CompletedRun]], None]
 ) -> None:
-    replace_run_or_fetch(die_for_seed_2)
+    replace_run_job(die_for_seed_2)
     scene, folder = write_scene(tmp_path, DROP + SPARKS), tmp_path / "runs"
     words = ("run", scene, "--seeds", "4", "--workers", "2", "--out", str(folder))
     status, document, err = json_of(capfd, *words)
@@ -153,7 +152,7 @@ def test_run_that_kills_every_worker_fails_and_the_others_complete(
     with Store(folder) as store:
         assert sorted(row.status for row in store.rows()) == ["failed", "ok", "ok", "ok"]
     # A failed run counts as not finished: the next call repeats it.
-    replace_run_or_fetch(run_or_fetch)
+    replace_run_job(run_job)
     status, document, _ = json_of(capfd, *words)
     assert status == 0
     assert [run["repeated"] for run in document["runs"]] == [True, False, True, True]
@@ -167,11 +166,11 @@ def test_run_that_kills_every_worker_fails_and_the_others_complete(
 def test_internal_error_in_a_worker_names_its_run_and_the_others_complete(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
-    replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None],
-    function: Callable[..., RunRecord],
+    replace_run_job: Callable[[Callable[..., CompletedRun]], None],
+    function: Callable[..., CompletedRun],
     phrase: str,
 ) -> None:
-    replace_run_or_fetch(function)
+    replace_run_job(function)
     scene = write_scene(tmp_path, DROP + SPARKS)
     status, document, err = json_of(capfd, "run", scene, "--seeds", "3", "--workers", "2")
     assert status == 1
@@ -185,7 +184,7 @@ def test_internal_error_in_a_worker_names_its_run_and_the_others_complete(
 def test_workers_that_cannot_start_end_the_command(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(executors, "serve", end_at_once)
+    monkeypatch.setattr(process_pool, "serve", end_at_once)
     status, document, err = json_of(
         capfd, "run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2"
     )
@@ -194,7 +193,7 @@ def test_workers_that_cannot_start_end_the_command(
     assert "status 3" in err[-1]
 
 
-def end_at_once(pipe: object, options: object) -> NoReturn:
+def end_at_once(_: object) -> NoReturn:
     os._exit(3)
 
 
@@ -258,16 +257,6 @@ def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
         assert err.startswith("interrupted: 0 of 9")
         assert not any(map(is_alive, pids))
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"runs.sqlite"}
-
-
-def test_handler_of_a_worker_raises_for_the_first_signal_only() -> None:
-    before = signal.signal(signal.SIGINT, worker.raise_once())
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.slow

@@ -7,9 +7,10 @@ relations between elements, such as references to bodies by name.
 import re
 import tomllib
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from pydantic import ValidationError
 
@@ -73,20 +74,57 @@ def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) 
     Raises:
         SceneError: the scene is invalid; the error has every fault that was found.
     """
-    try:
-        check_text(text)
-        document = tomllib.loads(text)
-        check_value(document)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError([_syntax_fault(file, text, error)]) from None
-    except NestingError as error:
-        raise SceneError([Fault(file, error.line, "", str(error))]) from None
-    except ValueError as error:  # an integer of thousands of digits
-        raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
-    if not document:
-        message = "the file is empty; a scene needs at least one body, such as a [[ball]] with position and radius"
-        raise SceneError([Fault(file, 1, "", message)])
-    return from_document(document, file, overrides, text)
+    return SceneText.of(text, file).scene(overrides)
+
+
+@dataclass(frozen=True)
+class SceneText:
+    """Text of a scene file, parsed once for many scenes that differ in values set."""
+
+    file: str
+    """name of the text in faults"""
+    text: str
+    document: dict[str, Any]
+    """the parsed text, not yet checked as a scene"""
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """Read a scene file.
+
+        Raises:
+            SceneError: the file cannot be read, or is not TOML.
+        """
+        return cls.of(_read(path), str(path))
+
+    @classmethod
+    def of(cls, text: str, file: str = "<scene>") -> Self:
+        """Parse a text.
+
+        Raises:
+            SceneError: it is not TOML, or empty.
+        """
+        try:
+            check_text(text)
+            document = tomllib.loads(text)
+            check_value(document)
+        except tomllib.TOMLDecodeError as error:
+            raise SceneError([_syntax_fault(file, text, error)]) from None
+        except NestingError as error:
+            raise SceneError([Fault(file, error.line, "", str(error))]) from None
+        except ValueError as error:  # an integer of thousands of digits
+            raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
+        if not document:
+            message = "the file is empty; a scene needs at least one body, such as a [[ball]] with position and radius"
+            raise SceneError([Fault(file, 1, "", message)])
+        return cls(file, text, document)
+
+    def scene(self, overrides: Iterable[Override] = ()) -> Scene:
+        """Return the scene with values set.
+
+        Raises:
+            SceneError: the scene is invalid; the error has every fault that was found.
+        """
+        return from_document(self.document, self.file, overrides, self.text)
 
 
 def from_document(
