@@ -1,6 +1,6 @@
 """The rows of the benchmarks: engines, pictures and commands, followed by those of games."""
 
-from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers
+from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers, sweeps
 from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.row import Bench
@@ -308,6 +308,38 @@ BENCHES = (
         lambda: connected.planks("oriented"),
         lambda: connected.planks("circles"),
         same=agreement.planks,
+    ),
+    *(
+        Bench(
+            f"sweep-{milliseconds}ms",
+            f"{runs} runs of 100 balls, about {milliseconds} ms each, as a stored sweep on 2 workers / in a bare "
+            "multiprocessing pool over hand-written pymunk loops that record the same",
+            lambda milliseconds=milliseconds, runs=runs: sweeps.sweeping(milliseconds, runs),
+            lambda milliseconds=milliseconds, runs=runs: sweeps.pooled(milliseconds, runs, sweeps.loop_ends),
+            target,
+            same=lambda milliseconds=milliseconds: sweeps.same_ends(milliseconds),
+        )
+        for milliseconds, runs, target in ((50, 80, 1 / 0.9), (5, 400, 1 / 0.7))
+    ),
+    *(
+        Bench(
+            f"sweep-{milliseconds}ms-pool",
+            f"the same sweep of runs of about {milliseconds} ms / sandbox.run of the same scenes in a bare pool",
+            lambda milliseconds=milliseconds, runs=runs: sweeps.sweeping(milliseconds, runs),
+            lambda milliseconds=milliseconds, runs=runs: sweeps.pooled(milliseconds, runs, sweeps.run_ends),
+        )
+        for milliseconds, runs in ((50, 80), (5, 400))
+    ),
+    Bench(
+        "sweep-store",
+        "200 runs of 5 ms in this process, planned and stored as summaries / as jobs in a loop, not stored",
+        lambda: sweeps.storing(5, 200),
+        lambda: sweeps.not_storing(5, 200),
+    ),
+    Bench(
+        "sweep-resume",
+        "resuming a sweep whose 10,000 runs are all stored / reading the rows of its store",
+        *sweeps.resumed(10_000),
     ),
     Bench(
         "turn",

@@ -94,7 +94,7 @@ def fixed_shapes(
 
 def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0) -> Iterator[tuple[int, pymunk.Shape]]:
     """Yield the shapes of a body, each with its index among all shapes; single discs are enlarged by `skin`."""
-    if bodies.round.all():
+    if bodies.all_round:
         yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
         return
     shapes = bodies.shapes

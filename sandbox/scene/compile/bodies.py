@@ -232,6 +232,11 @@ class Bodies:
         return np.asarray([isinstance(e, Disc) for e in self.elements], dtype=np.bool_)[self.element]
 
     @cached_property
+    def all_round(self) -> bool:
+        """Whether all bodies are single discs about their centres of mass."""
+        return bool(self.round.all())
+
+    @cached_property
     def shapes(self) -> Shapes:
         """Convex pieces of the bodies."""
         return shapes_of(self.element, self.elements)
