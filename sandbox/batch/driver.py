@@ -10,7 +10,7 @@ import statistics
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sandbox.batch.executors import (
     Executor,
@@ -28,6 +28,7 @@ from sandbox.batch.job import (
     RunRecord,
     failed_run,
     fetch,
+    identify,
     is_sufficient,
     store_run,
     with_earlier_audit,
@@ -218,6 +219,7 @@ class Driver:
                 self._report_stored(index, RunRecord(planned.label, planned.values, found, file, repeated=True))
                 return None
         job = planned.job()
+        job = replace(job, run_id=identify(job)[1])
         record = fetch(job, store, self._options)
         if isinstance(record, RunRecord):
             self._report_stored(index, record)
