@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         Throttle,
         Toggle,
     )
-    from sandbox.batch.run_table import run_table
+    from sandbox.batch.query import StoredRuns, open_store
     from sandbox.batch.store import Store
     from sandbox.engines.contract import Divergence, Refusal
     from sandbox.engines.exact.tabletop.shots import Table
@@ -94,6 +94,7 @@ __all__ = [
     "Spawn",
     "Spread",
     "Store",
+    "StoredRuns",
     "Strike",
     "Stroke",
     "Switch",
@@ -112,9 +113,9 @@ __all__ = [
     "load",
     "loads",
     "odds",
+    "open_store",
     "play_out",
     "run",
-    "run_table",
     "sensitivity",
     "start",
     "tradeoff",
@@ -172,10 +173,11 @@ _HOMES = {
     "integrate": "sandbox.engines.reference.integrate",
     "load": "sandbox.scene.files.load",
     "loads": "sandbox.scene.files.load",
+    "open_store": "sandbox.batch.query",
+    "StoredRuns": "sandbox.batch.query",
     "odds": "sandbox.games.billiards.shots",
     "play_out": "sandbox.measure.run.sessions",
     "run": "sandbox.measure.run.runner",
-    "run_table": "sandbox.batch.run_table",
     "sensitivity": "sandbox.games.billiards.shots",
     "start": "sandbox.engines.switching",
     "tradeoff": "sandbox.measure.tradeoff",

@@ -13,7 +13,7 @@ from python_tables import model_fields
 from scene_tables import cell, scene_overview, scene_tables, top_keys
 
 import sandbox
-from sandbox.batch.store import StoredRun
+from sandbox.batch.stored_run import StoredRun
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import ENGINES

@@ -132,6 +132,10 @@ def _runs(_ctx: click.Context, incomplete: str) -> Iterable[str]:
     return _files(incomplete, RUN_ENDINGS)
 
 
+def _folders(_ctx: click.Context, incomplete: str) -> Iterable[str]:
+    return _files(incomplete, ())
+
+
 def _keys(ctx: click.Context, incomplete: str) -> Iterable[str]:
     """Return the keys of `--set`, completed part by part: `ball.`, `ball.cue.`, `ball.cue.velocity=`."""
     from sandbox.scene.files.document import keys_of, list_tables, model_at
@@ -197,6 +201,7 @@ _WORDS: dict[str, Words] = {
     "scene": _scenes,
     "scenes": _scenes,
     "run": _runs,
+    "folder": _folders,
     "engine": _engines,
     "engines": _several_engines,
     "overrides": _keys,

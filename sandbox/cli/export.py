@@ -102,31 +102,24 @@ def _print_files(run: str, files: list[dict[str, Any]], faults: list[Fault], as_
 
 def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
     """Write a table of all runs of a folder, and return the exit status."""
-    from sandbox.batch.run_table import run_table
-    from sandbox.batch.store import DATABASE, Store, StoreError
-    from sandbox.report.table_export import write_rows
+    from sandbox.batch.query import open_store
+    from sandbox.batch.store import StoreError
 
-    if not (Path(folder) / DATABASE).is_file():
-        message = "is no folder of stored runs; `sandbox run SCENE --out DIR` makes one"
-        faults.append(Fault(folder, None, "", message))
     if faults:
         return exit_with_errors(faults, as_json, run=folder, files=[])
     files: list[dict[str, Any]] = []
-    try:
-        with Store(folder, notice=lambda message: click.echo(message, err=True)) as store:
-            rows = run_table(store)
-    except StoreError as error:
-        rows = []
-        faults.append(Fault(folder, None, "", str(error).removeprefix(f"{folder}: ")))
-    if not rows and not faults:
-        faults.append(Fault(folder, None, "", "contains no run"))
-    for target in options.targets if rows else ():
-        try:
-            count = write_rows(rows, Path(target))
-        except OSError as error:
-            faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
-        else:
-            files.append({"path": target, "format": Path(target).suffix.lower()[1:], "rows": count})
+    with collect_errors(faults, folder, (StoreError,)), open_store(folder) as runs:
+        if not len(runs):
+            faults.append(Fault(folder, None, "", "contains no run"))
+        for target in options.targets if len(runs) else ():
+            is_csv = Path(target).suffix.lower() == ".csv"
+            try:
+                count = runs.to_csv(target) if is_csv else runs.to_parquet(target)
+            except OSError as error:
+                faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
+            else:
+                files.append({"path": target, "format": Path(target).suffix.lower()[1:], "rows": count})
+    faults = [replace(fault, message=fault.message.removeprefix(f"{folder}: ")) for fault in faults]
     for fault in faults:
         click.echo(str(fault), err=True)
     _print_files(folder, files, faults, as_json, quiet)

@@ -11,6 +11,7 @@ DOCUMENTS = {
     "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
     "match": "sandbox.cli.games:MatchDocument",
     "run": "sandbox.cli.run_tables:RunsDocument",
+    "runs": "sandbox.cli.runs:StoredRunsDocument",
     "shots": "sandbox.games.billiards.shots.study:StudyDocument",
     "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
 }

@@ -23,6 +23,7 @@ os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 COMMANDS = {
     "run": ("run:run_command", "run scenes without a window and print the results"),
+    "runs": ("runs:runs_command", "list, filter, group and plot the stored runs of a folder"),
     "play": ("window:play_command", "open the window: play a scene, or pick one"),
     "compare": ("compare:compare_command", "run a scene on several engines and measure the error of each"),
     "tradeoff": (

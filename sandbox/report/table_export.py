@@ -5,7 +5,7 @@ besides the run itself.
 """
 
 import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -66,48 +66,6 @@ def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Pat
         ValueError: another suffix.
     """
     return _write(CONTACTS, _contacts(trajectory, fixed_names), path)
-
-
-def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> int:
-    """Write rows that all have the same keys, the columns, and return their number. None is an empty cell.
-
-    Args:
-        rows: values are texts, numbers, booleans or None.
-        path: path of the file, ending in `.csv` or `.parquet`.
-
-    Raises:
-        OSError: the file cannot be written.
-        MissingExtraError: parquet without its extra.
-        ValueError: another suffix, or no row.
-    """
-    if not rows:
-        raise ValueError("there are no rows to write")
-    match path.suffix.lower():
-        case ".csv":
-            with atomic_write(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
-                writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
-                writer.writeheader()
-                writer.writerows(rows)
-        case ".parquet":
-            if not can_write_parquet():
-                raise MissingExtraError(NEEDS_PARQUET)
-            import pyarrow as pa
-            from pyarrow import parquet
-
-            columns = {key: _same_type([row[key] for row in rows]) for key in rows[0]}
-            with atomic_write(path) as temporary, temporary.open("xb") as stream:
-                parquet.write_table(pa.table(columns), stream)
-        case suffix:
-            raise ValueError(f"a table ends in .csv or .parquet, not {suffix!r}")
-    return len(rows)
-
-
-def _same_type(values: list[Any]) -> list[Any]:
-    """Return values of one type, as a column of a typed table needs: numbers, booleans, or else texts."""
-    kinds = {type(value) for value in values if value is not None}
-    if len(kinds) <= 1 or kinds <= {int, float}:
-        return values if kinds != {int, float} else [None if value is None else float(value) for value in values]
-    return [None if value is None else str(value) for value in values]
 
 
 def _states(run: Trajectory) -> Iterator[list[Column]]:

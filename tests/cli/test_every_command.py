@@ -42,6 +42,7 @@ radius = 1.0
 
 EXAMPLES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": (("drop.toml", "--engine", "pymunk"), ("runs",)),
+    "runs": (("runs",), ("count", "statuses", "runs")),
     "compare": (("drop.toml", "--engines", "pymunk,reference"), ("truth", "engines")),
     "tradeoff": (
         ("drop.toml", "--engine", "pymunk", "--points", "2", "--repeats", "1", "--tolerance", "1"),

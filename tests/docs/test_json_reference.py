@@ -31,6 +31,8 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "run landing --seeds 2 --player none --set world.duration=0.2",
         "run session.json",
     ),
+    "sandbox run --dry-run": ("run tunnel.toml --sweep solver.dt=0.01,0.005 --dry-run",),
+    "sandbox runs": ("runs store", "runs store --by engine --of contacts"),
     "sandbox check": ("check bounce", "check bullet", "check landing --no-trial", "check bad.toml"),
     "sandbox compare": (
         "compare tunnel.toml --engines pymunk,exact --why",

@@ -1,0 +1,143 @@
+"""`sandbox runs`: lists, filters, groups, tables and plots of stored runs."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from sandbox.cli.json_schemas import document_schema
+from sandbox.cli.main import call
+from tests.cli.calling import DROP, SPARKS, json_of, lines_of, write_scene
+from tests.cli.json_validation import violations
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A store of 24 runs: two engines, two heights, two steps, three seeds."""
+    folder = tmp_path_factory.mktemp("study")
+    scene = write_scene(folder, DROP + SPARKS)
+    words = ["--sweep", "ball.a.restitution=0.2,0.8", "--sweep", "solver.dt=0.01,0.005", "--seeds", "3"]
+    more = ["--engines", "pymunk,reference", "--keep", "summary", "--quiet", "--out", str(folder / "runs")]
+    assert call(["run", scene, *words, *more]) == 0
+    return str(folder / "runs")
+
+
+def test_list_has_the_columns_in_which_runs_differ(study: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "runs", study)
+    assert (status, err) == (0, [])
+    assert out[0].split()[:5] == ["id", "engine", "ball.a.restitution", "solver.dt", "seed"]
+    assert "title" not in out[0]
+    assert len(out) == 26
+    assert out[-1] == "24 runs: 24 ok"
+    status, out, _ = lines_of(capfd, "runs", study, "--limit", "3")
+    assert (len(out), out[-1]) == (5, "24 runs: 24 ok; the last 3 are listed (--limit 0 lists all)")
+
+
+def test_filters_are_joined_by_and(study: str, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ("--where", "solver.dt < 0.01", "--where", "engine = 'pymunk' or seed = 1 -- either")
+    _, document, _ = json_of(capfd, "runs", study, *words)
+    assert document["count"] == len(document["runs"]) == 8
+    assert all(run["solver.dt"] == 0.005 for run in document["runs"])
+    assert lines_of(capfd, "runs", study, "--where", "seed > 99")[1] == ["no runs"]
+
+
+def test_rows_are_sorted_and_columns_chosen(study: str, capfd: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = lines_of(capfd, "runs", study, "--columns", "solver.dt,seed", "--sort", "-seed,solver.dt", "--csv")
+    rows = list(csv.reader(out))
+    assert rows[0] == ["solver.dt", "seed"]
+    assert rows[1:] == sorted(rows[1:], key=lambda row: (-int(row[1]), float(row[0])))
+    assert len(rows) == 25
+
+
+@pytest.mark.parametrize("words", [(), ("--by", "engine,solver.dt", "--success", "contacts > 0")])
+def test_json_document_fits_its_schema(words: tuple[str, ...], study: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "runs", study, *words)
+    assert status == 0
+    schema = document_schema("runs")
+    assert list(violations(document, schema, schema)) == []
+    assert (document["count"], document["statuses"]) == (24, {"ok": 24})
+    assert ("groups" in document, "runs" in document) == (bool(words), not words)
+
+
+def test_groups_have_statistics_and_success_rates(study: str, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ("runs", study, "--by", "engine,solver.dt", "--of", "contacts", "--success", "ball.a.restitution = 0.8")
+    _, document, _ = json_of(capfd, *words)
+    assert [group["keys"] for group in document["groups"]] == [
+        {"engine": engine, "solver.dt": dt} for engine in ("pymunk", "reference") for dt in (0.005, 0.01)
+    ]
+    for group in document["groups"]:
+        assert (group["runs"], group["success_rate"]) == (6, 0.5)
+        assert group["success_low"] < 0.5 < group["success_high"]
+        assert set(group["quantities"]["contacts"]) == {"count", "mean", "deviation", "quantiles"}
+    _, out, _ = lines_of(capfd, *words)
+    assert out[0].split() == ["engine", "solver.dt", "runs", "success", "contacts"]
+    assert out[1].split()[:5] == ["pymunk", "0.005", "6", "50", "%"]
+    _, out, _ = lines_of(capfd, *words, "--csv")
+    rows = list(csv.DictReader(out))
+    assert float(rows[0]["contacts mean"]) == document["groups"][0]["quantities"]["contacts"]["mean"]
+    assert list(rows[0])[-3:] == ["contacts q0.1", "contacts q0.5", "contacts q0.9"]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("energy_end", "solver.dt"),
+        ("contacts", "engine"),
+        ("contacts", "solver.dt,ball.a.restitution"),
+        ("seconds", "engine,seed"),
+    ],
+)
+def test_plot_is_drawn(
+    words: tuple[str, str],
+    study: str,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    quantity, by = words
+    name = f"{quantity}-by-{by.replace(',', '-')}.png"
+    assert lines_of(capfd, "runs", study, "--plot", quantity, "--by", by) == (0, [f"drawn: {name}"], [])
+    with Image.open(tmp_path / name) as picture:
+        assert min(picture.size) > 400
+        assert len(picture.convert("RGB").getcolors(10**6) or []) > 20
+    target = tmp_path / "x.svg"
+    assert lines_of(capfd, "runs", study, "--plot", quantity, "--by", by, "--to", str(target), "--quiet") == (0, [], [])
+    assert target.read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--where", "foo = 1"), "--where: no column is named 'foo'"),
+        (("--where", "solver.d = 1"), "did you mean 'solver.dt'?"),
+        (("--success", "status ="), "--success: "),
+        (("--by", "engin"), "--by: no column is named 'engin'; did you mean 'engine'?"),
+        (("--by", "engine", "--of", "status"), "status has no numbers"),
+        (("--of", "contacts"), "--of: works only together with --by KEY"),
+        (("--by", "engine", "--columns", "id"), "--columns: is for lists"),
+        (("--sort", "-x"), "--sort: no column is named 'x'"),
+        (("--plot", "contacts"), "--plot: draws over one or two keys"),
+        (("--plot", "score", "--by", "engine"), "--plot: no run that is ok has a value of score"),
+        (("--plot", "contacts", "--by", "engine", "--to", "a.gif"), "--to: a.gif: the name must end in .png"),
+        (("--to", "a.png"), "--to: names the file of --plot"),
+        (("--csv", "--json"), "--csv: is given with --json too"),
+    ],
+)
+def test_wrong_command_line_is_reported(
+    words: tuple[str, ...], message: str, study: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    status, _, err = lines_of(capfd, "runs", study, *words)
+    assert status == 2
+    assert any(message in line for line in err), err
+    assert not any("Traceback" in line for line in err)
+
+
+def test_folder_without_runs_is_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, _, err = lines_of(capfd, "runs", str(tmp_path))
+    assert (status, err) == (2, [f"{tmp_path}: no stored runs; `sandbox run SCENE --out {tmp_path}` stores runs"])
+    status, out, _ = lines_of(capfd, "runs", str(tmp_path), "--json")
+    assert (status, json.loads(out[0])["faults"][0]["file"]) == (2, str(tmp_path))
