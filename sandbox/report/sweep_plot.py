@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -67,7 +68,7 @@ def plot_lines(
         colour = colour_of(each.name) if each.name else COLOURS[k % len(COLOURS)]
         if categories:
             spread = np.stack([each.median - each.low, each.high - each.median])
-            style = {"fmt": "o", "ms": 6.0, "capsize": 5.0, "elinewidth": 1.6}
+            style: dict[str, Any] = {"fmt": "o", "ms": 6.0, "capsize": 5.0, "elinewidth": 1.6}
             shift = SHIFT * (k - (len(series) - 1) / 2.0)
             panel.errorbar(each.values + shift, each.median, spread, color=colour, label=each.name, **style)
             continue
