@@ -56,7 +56,7 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         # commands and names
         ("rum bounce", 2, "unknown command 'rum'; did you mean 'run'?"),
         ("bounce", 2, "is a scene, not a command; use `sandbox run bounce` or `sandbox play bounce`"),
-        ("xyzzy", 2, "commands: run, play, "),
+        ("xyzzy", 2, "commands: run, runs, play, "),
         ("match bounce", 2, "is not a billiard table"),
         ("run bounce --plot x.png --body bal", 2, "no body is named 'bal'; did you mean 'ball'?"),
         ("compare tutorial", 2, "is a folder; name one of its scenes: tutorial/ball, "),

@@ -336,6 +336,26 @@ BENCHES = (
         lambda: sweeps.storing(5, 200),
         lambda: sweeps.not_storing(5, 200),
     ),
+    *(
+        Bench(
+            f"ensemble-{engine}-pool",
+            f"seconds a run of 10,000 runs of ten balls for 1,000 steps, in an ensemble on {engine}, two threads / of "
+            "single runs in a bare pool of two processes",
+            lambda engine=engine: sweeps.ensemble_run(engine, 10_000),
+            lambda engine=engine: sweeps.pooled_runs(balls_on_plane(10, 1000), engine, 400),
+            1 / 20,
+            same=lambda engine=engine: sweeps.same_members(engine),
+        )
+        for engine in ("exact", "reference")
+    ),
+    Bench(
+        "shots-pool",
+        "seconds a shot of 10,000 billiard shots with errors of the stroke, two threads / of single runs of the shot "
+        "in a bare pool of two processes",
+        lambda: sweeps.shot_run(10_000),
+        lambda: sweeps.pooled_runs(scene("9-ball"), "exact", 200),
+        1 / 20,
+    ),
     Bench(
         "sweep-resume",
         "resuming a sweep whose 10,000 runs are all stored / reading the rows of its store",

@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +23,13 @@ from sandbox.batch.job import Job, RunOptions, run_job
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.store import Store
+from sandbox.games.billiards.shots import odds
+from sandbox.measure.run.ensemble import ensemble
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, load
-from tools.benchmarks import peers
+from sandbox.scene.files.shipped_scenes import find
+from tools.benchmarks import agreement, peers
 from tools.benchmarks.workloads import Timed, balls_on_plane, timed
 
 WORKERS = 2
@@ -95,6 +99,48 @@ def same_ends(milliseconds: int) -> None:
     for seeded in _seeded(hundred_balls(milliseconds), 3):
         # The same calls of the same solver; rounding of constants, 1e-16, grows in the contacts of balls that rest.
         assert np.allclose(run_ends(seeded), loop_ends(seeded)[:, :2], rtol=0.0, atol=1e-6)
+
+
+def ensemble_run(engine: str, runs: int) -> Timed:
+    """Return a workload of an ensemble of ten balls for 1,000 steps, on `WORKERS` threads; seconds a run."""
+    scene = balls_on_plane(10, 1000)
+
+    def compute() -> None:
+        found = ensemble(scene, runs, vary={"ball.*.velocity": 0.01}, engine=engine, threads=WORKERS)
+        assert found.compiled.all()
+
+    return lambda: timed(compute) / runs
+
+
+def pooled_runs(scene: Scene, engine: str, runs: int) -> Timed:
+    """Return a workload of single runs of a scene in a bare pool, which return their last positions; seconds a run."""
+
+    def work() -> float:
+        times: list[float] = []
+        with multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
+            ends = pool.imap_unordered(partial(end_on, engine), [scene] * runs, chunksize=5)
+            times.extend(time.perf_counter() for _ in ends)
+        return _latest(times) / (runs * MEASURED)
+
+    return work
+
+
+def end_on(engine: str, scene: Scene) -> FloatArray:
+    """Run a scene, recording its ends only, and return the last positions, (N, 2) m."""
+    steps = round(scene.world.duration / scene.solver.dt)
+    return run(scene, engine, audit=False, record_every=steps).position[-1]
+
+
+def shot_run(shots: int) -> Timed:
+    """Return a workload of billiard shots with errors of the stroke, on `WORKERS` threads; seconds a shot."""
+    scene = load(find("9-ball"))
+    return lambda: timed(lambda: odds(scene, count=shots, threads=WORKERS)) / shots
+
+
+def same_members(engine: str) -> None:
+    """Check that runs of an ensemble end as single runs of the same starts do, bit for bit."""
+    scene = balls_on_plane(10, 1000)
+    agreement.members(scene, engine)
 
 
 def storing(milliseconds: int, runs: int) -> Timed:
