@@ -2,7 +2,9 @@
 
 import json
 import os
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -173,6 +175,62 @@ def long(scene):
         assert driver.returncode == 1
         assert err.splitlines() == [f"{scene}: failed: stopped at the time limit of 2 s"]
     assert len(stored(folder)) == 300
+
+
+SSHD = """
+Port {port}
+ListenAddress 127.0.0.1
+HostKey {folder}/host
+AuthorizedKeysFile {folder}/user.pub
+StrictModes no
+PasswordAuthentication no
+UsePAM no
+PermitRootLogin yes
+PidFile none
+"""
+
+
+@pytest.mark.skipif(shutil.which("sshd") is None, reason="needs an SSH server")
+def test_cluster_that_was_started_by_ssh_runs_a_sweep(scene: str, tmp_path: Path) -> None:
+    """`dask ssh` starts the scheduler and two workers through an SSH server on loopback."""
+    folder, ports = tmp_path / "ssh", free_ports(2)
+    folder.mkdir()
+    for name, kind in (("host", "ed25519"), ("user", "rsa")):
+        key = ["ssh-keygen", "-q", "-t", kind, "-m", "PEM", "-N", "", "-f", str(folder / name)]
+        subprocess.run(key, check=True)
+    (folder / "config").write_text(SSHD.format(port=ports[0], folder=folder))
+    if os.getuid() == 0:
+        Path("/run/sshd").mkdir(exist_ok=True)  # the server changes its root to it
+    with ExitStack() as stack, (folder / "log").open("wb") as log:
+
+        def start(*command: str) -> None:
+            started = subprocess.Popen(
+                command, stdout=log, stderr=log, cwd=folder, env=with_root_on_path(), start_new_session=True
+            )
+            stack.callback(end, started)
+
+        server = shutil.which("sshd")
+        assert server is not None
+        start(server, "-D", "-e", "-f", str(folder / "config"))
+        wait_until(lambda: "Server listening" in (folder / "log").read_text(errors="replace"))
+        options = ["--ssh-port", str(ports[0]), "--ssh-private-key", str(folder / "user"), "--nworkers", "2"]
+        options += ["--nthreads", "1", "--scheduler-port", str(ports[1]), "--remote-python", sys.executable]
+        options += ["--local-directory", str(folder)]
+        start(sys.executable, "-W", "ignore", "-m", "dask", "ssh", *options, "127.0.0.1")
+        wait_until(lambda: (folder / "log").read_text(errors="replace").count("Registered to:") >= 2)
+        words = ["run", scene, "--seeds", "20", "--quiet"]
+        assert call([*words, "--out", str(tmp_path / "there"), "--on", f"tcp://127.0.0.1:{ports[1]}"]) == 0
+        assert call([*words, "--out", str(tmp_path / "here")]) == 0
+    assert_equal_stores(tmp_path / "here", tmp_path / "there")
+
+
+def free_ports(count: int) -> list[int]:
+    """Return ports of loopback that no server listens on."""
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [int(each.getsockname()[1]) for each in sockets]
 
 
 def test_worker_with_other_versions_is_refused(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

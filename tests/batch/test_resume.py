@@ -21,6 +21,7 @@ from sandbox.batch.store import Store
 from sandbox.cli.main import call
 from sandbox.trajectory import Trajectory
 from tests.environment import with_root_on_path
+from tests.interruptible import worker_processes
 
 pytestmark = pytest.mark.slow
 
@@ -130,7 +131,7 @@ def test_worker_killed_by_pid_loses_and_doubles_no_run(scene: str, tmp_path: Pat
         for count in (20, 60, 120):
             while len(stored(folder)) < count:
                 assert process.poll() is None
-            for pid in children(process.pid)[:1]:
+            for pid in worker_processes(process.pid)[:1]:
                 os.kill(pid, signal.SIGKILL)
                 killed += 1
         _, err = process.communicate()
@@ -139,20 +140,6 @@ def test_worker_killed_by_pid_loses_and_doubles_no_run(scene: str, tmp_path: Pat
     seeds = seeds_of(log)
     assert set(seeds) == set(range(1, 201))
     assert len(seeds) <= 200 + killed  # only the runs that the killed workers were making are made again
-
-
-def children(pid: int) -> list[int]:
-    """Return the worker processes of a process."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-            words = (folder / "cmdline").read_text()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if parent == pid and "spawn_main" in words:
-            found.append(int(folder.name))
-    return found
 
 
 def test_two_drivers_on_one_folder_store_each_run_once(scene: str, tmp_path: Path) -> None:

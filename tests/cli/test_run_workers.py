@@ -20,7 +20,7 @@ from sandbox.batch.store import Store, StoreError
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
-from tests.interruptible import interrupted, interruptible
+from tests.interruptible import interrupted, interruptible, worker_processes
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -197,20 +197,6 @@ def end_at_once(_: object) -> NoReturn:
     os._exit(3)
 
 
-def children(pid: int) -> list[int]:
-    """Return the worker processes that a process has started, without the resource tracker of multiprocessing."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-            words = (folder / "cmdline").read_text()
-        except (FileNotFoundError, ProcessLookupError):
-            continue
-        if parent == pid and "spawn_main" in words:
-            found.append(int(folder.name))
-    return found
-
-
 def is_alive(pid: int) -> bool:
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -228,8 +214,8 @@ def running_workers(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", l
     with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as command:
         pids: list[int] = []
         try:
-            wait_until(lambda: len(children(command.pid)) == 3)
-            pids = children(command.pid)
+            wait_until(lambda: len(worker_processes(command.pid)) == 3)
+            pids = worker_processes(command.pid)
             # A worker that serves is the leader of its own session.
             wait_until(lambda: all(os.getsid(pid) == pid for pid in pids))
             yield command, pids
