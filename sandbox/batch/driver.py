@@ -81,7 +81,8 @@ class _Attempt:
 
     index: int
     job: Job
-    damaged: str | None
+    options: RunOptions
+    damaged: str | None = None
     """fault of the stored run that it replaces"""
     deaths: int = 0
     """of workers that ran it"""
@@ -157,27 +158,24 @@ class Driver:
                 break
             for each in group:
                 self._started(each.job)
-            task = RunTask(tuple(each.job for each in group), self._options_of(group[0]), dict(versions()))
+            task = RunTask(tuple(each.job for each in group), group[0].options, dict(versions()))
             try:
                 self._pending[self._executor.submit(task)] = group
             except (SceneError, StoreError, TooLargeError) as error:
                 raise JobError(group[0].job.label, error) from error
         return len(self._pending) > before
 
-    def _options_of(self, attempt: _Attempt) -> RunOptions:
-        return with_earlier_audit(attempt.job, self._store, self._options) if attempt.damaged else self._options
-
     def _next_group(self) -> list[_Attempt]:
-        """Return the jobs of the next task; empty if there are none left."""
+        """Return the jobs of the next task, which are run with the same options; empty if there are none left."""
         group: list[_Attempt] = []
         for attempt in self._next_attempts():
-            if group and (attempt.is_suspect or attempt.damaged is not None):
+            if group and (attempt.is_suspect or attempt.options != group[0].options):
                 self._again.appendleft(attempt)
                 break
             group.append(attempt)
             bodies = sum(len(each.job.scene.bodies) for each in group)
             is_full = len(group) >= self._group_size() or bodies > MAX_GROUP_BODIES
-            if attempt.is_suspect or attempt.damaged is not None or is_full:
+            if attempt.is_suspect or is_full:
                 break
         return group
 
@@ -211,7 +209,7 @@ class Driver:
         """Return the job of a planned run, or report its stored run and return None."""
         store = self._store
         if store is None:
-            return _Attempt(index, planned.job(), None)
+            return _Attempt(index, planned.job(), self._options)
         if planned.plan_key is not None:
             found = store.find_planned(planned.plan_key)
             if found is not None and is_sufficient(found, self._options) and store.fault_of_file(found) is None:
@@ -224,7 +222,7 @@ class Driver:
         if isinstance(record, RunRecord):
             self._report_stored(index, record)
             return None
-        return _Attempt(index, job, record)
+        return _Attempt(index, job, with_earlier_audit(job, store, self._options), record)
 
     def _report_stored(self, index: int, record: RunRecord) -> None:
         self._done(Result(index, record.row(self._options.final, self._options.ledger), record))

@@ -187,8 +187,8 @@ def run_job(
     bout = None if job.player is None else job.player.start_game(job.scene, job.label)
 
     def report(state: Progress) -> None:
-        if progress is not None:
-            progress(state.fraction or 0.0)
+        assert progress is not None
+        progress(state.fraction or 0.0)
 
     limit = options.time_limit
     until = None if limit is None else clock_without_compilation() + limit
@@ -204,7 +204,7 @@ def run_job(
             actions=job.actions,
             audit=options.audit,
             account=options.ledger,
-            on_progress=report,
+            on_progress=None if progress is None else report,
             bout=bout,
             on_work=None if until is None else check_time,
         )
@@ -329,7 +329,7 @@ def with_earlier_audit(job: Job, store: Store | None, options: RunOptions) -> Ru
     """Return the options with an audit if the stored run that is replaced has one, so that no figure is lost."""
     if store is None or options.audit:
         return options
-    found = store.find(identify(job)[1])
+    found = store.find(job.run_id or identify(job)[1])
     return replace(options, audit=found is not None and is_audited(found))
 
 

@@ -230,3 +230,13 @@ def test_scene_with_faults_that_was_not_checked_is_reported_and_left_out(tmp_pat
     Driver(unchecked, 3, ScriptedExecutor(quick), RunOptions(), None, results.append, faulty=faults.append).run()
     assert sorted(result.index for result in results) == [0, 2]
     assert "is -1" in str(faults[0])
+
+
+def test_audit_of_a_stored_run_is_kept_when_the_run_is_replaced(plan: Callable[[int], Plan], tmp_path: Path) -> None:
+    without = RunOptions(audit=False)
+    with Store(tmp_path / "runs") as store:
+        driven(plan(2), ScriptedExecutor(run_task), store)
+        results = driven(plan(4), ScriptedExecutor(run_task), store, RunOptions(audit=False, ledger=True))
+        assert [result.row.repeated for result in results] == [False] * 4
+        assert [result.row.missed_contacts for result in results] == [0, 0, None, None]
+        assert all(result.row.repeated for result in driven(plan(4), ScriptedExecutor(run_task), store, without))
