@@ -52,6 +52,12 @@ PICTURES = (
         plots.plot("tradeoff", "pendulum_90", "--tolerance", "0.01", "--effort", "5"),
     ),
     Picture("bounce-plot.png", "position, velocity and energy of a ball that bounces", plots.plot("run", "bounce")),
+    Picture("sweep-lines.png", "contacts over the restitution", plots.sweep("contacts", "scatter.drop.restitution")),
+    Picture(
+        "sweep-map.png",
+        "contacts over the restitution and the step",
+        plots.sweep("contacts", "scatter.drop.restitution,solver.dt"),
+    ),
     *(
         Picture(f"scenes/{scene.replace('/', '-')}.png", f"thumbnail of {scene}", _thumbnail(scene))
         for scene in thumbnails.MOMENTS

@@ -29,8 +29,41 @@ def plot(*arguments: str) -> Callable[[Path], None]:
     return make
 
 
-def save_narrowed(drawn: Path, path: Path) -> None:
+RAIN = """
+title = "Rain"
+world = { gravity = [0.0, -9.81], duration = 1.0 }
+plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0] }]
+[[scatter]]
+name = "drop"
+count = 10
+lower = [-1.0, 1.0]
+upper = [1.0, 3.0]
+radius = 0.05
+restitution = 0.5
+"""
+"""Scene of the page about sweeps"""
+
+
+def sweep(quantity: str, keys: str) -> Callable[[Path], None]:
+    """Return a function that plots a quantity of a sweep of rain over some keys."""
+
+    def make(path: Path) -> None:
+        with TemporaryDirectory() as folder:
+            scene, store, drawn = (Path(folder) / name for name in ("rain.toml", "runs", "plot.png"))
+            scene.write_text(RAIN)
+            sweeps = ["--sweep", "scatter.drop.restitution=0:0.9:10", "--sweep", "solver.dt=0.001:0.016:5:log"]
+            more = ["--seeds", "20", "--workers", "2", "--keep", "summary", "--out", str(store), "--quiet"]
+            if call(["run", str(scene), *sweeps, *more]) or call(
+                ["runs", str(store), "--plot", quantity, "--by", keys, "--to", str(drawn), "--quiet"]
+            ):
+                sys.exit("the sweep failed")
+            save_narrowed(drawn, path, 256)
+
+    return make
+
+
+def save_narrowed(drawn: Path, path: Path, colours: int = COLOURS) -> None:
     """Save a plot scaled to the page width."""
     image = Image.open(drawn).convert("RGB")
     height = round(image.height * WIDTH / image.width)
-    save_png(image.resize((WIDTH, height), Image.Resampling.LANCZOS), path, COLOURS)
+    save_png(image.resize((WIDTH, height), Image.Resampling.LANCZOS), path, colours)
