@@ -158,9 +158,12 @@ class Plan:
             raise AddressError(f"{factors} to {short_count(count)} runs; {RUNS.remedy(count)}")
 
     def __len__(self) -> int:
-        """Return the number of runs; an upper bound in a large plan, in which seeds may turn out to give one run."""
-        known = sum(self._seed_count - seeds for seeds in self._seeds_of.values()) if self._is_small else 0
-        return (len(self.scenes) * self._points * self._seed_count - known) * len(self.engines or (1,))
+        """Return the number of runs; an upper bound where seeds of points that were not checked may give one run."""
+        total = 0
+        for label, _ in self.scenes:
+            known = [seeds for (name, _), seeds in self._seeds_of.items() if name == label]
+            total += sum(known) + (self._points - len(known)) * self._seed_count
+        return total * len(self.engines or (1,))
 
     def alike_points(self, label: str) -> tuple[int, int]:
         """Return the number of checked points of a scene at which all seeds give one run, and that of all of them."""

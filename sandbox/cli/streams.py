@@ -60,7 +60,7 @@ class JsonSpool:
     def __init__(self) -> None:
         from tempfile import TemporaryFile
 
-        self._file = TemporaryFile()  # noqa: SIM115, open until the process ends
+        self._file = TemporaryFile()  # noqa: SIM115, closed by `print`
         self._places: dict[int, tuple[int, int]] = {}
         """offset and size of each element, bytes"""
 
@@ -73,7 +73,7 @@ class JsonSpool:
         self._file.write(text)
 
     def print(self, key: str, others: dict[str, Any]) -> None:
-        """Print an object with the array under a key, followed by other keys."""
+        """Print an object with the array under a key, followed by other keys, and remove the temporary file."""
         import json
 
         click.echo(f"{{{json.dumps(key)}: [", nl=False)
@@ -83,6 +83,7 @@ class JsonSpool:
             click.echo((", " if k else "") + self._file.read(size).decode("utf-8"), nl=False)
         rest = json.dumps(others, ensure_ascii=not can_write_unicode(), allow_nan=False)
         click.echo(f"]{', ' if others else ''}{rest[1:]}")
+        self._file.close()
 
 
 class _Output(io.FileIO):

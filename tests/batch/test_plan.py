@@ -71,6 +71,7 @@ def test_a_million_equal_seeds_are_one_run(scene: tuple[str, str]) -> None:
     large.check()
     (run,) = large
     assert run.job().seeds == 1_000_000  # nothing is random
+    assert len(large) == 1
 
 
 def test_ten_million_runs_take_no_memory(scene: tuple[str, str]) -> None:
