@@ -159,10 +159,7 @@ class Driver:
             for each in group:
                 self._started(each.job)
             task = RunTask(tuple(each.job for each in group), group[0].options, dict(versions()))
-            try:
-                self._pending[self._executor.submit(task)] = group
-            except (SceneError, StoreError, TooLargeError) as error:
-                raise JobError(group[0].job.label, error) from error
+            self._pending[self._executor.submit(task)] = group
         return len(self._pending) > before
 
     def _next_group(self) -> list[_Attempt]:

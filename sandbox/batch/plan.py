@@ -278,10 +278,10 @@ class Plan:
         return replace(source, scene=from_session(document, path, overrides))
 
     def _keep(self, variant: _Variant) -> None:
-        """KeptParts the scene of a variant until it runs, if that fits into the memory of plans."""
-        size = _bytes_of(variant.session.scene)
-        if not self._kept or self._kept_bytes + size <= PLAN_MEMORY.value:
-            self._kept[variant.path, repr(variant.where)] = variant.session
+        """Keep the scene of a variant until it runs, if that fits into the memory of plans."""
+        key, size = (variant.path, repr(variant.where)), _bytes_of(variant.session.scene)
+        if key not in self._kept and (not self._kept or self._kept_bytes + size <= PLAN_MEMORY.value):
+            self._kept[key] = variant.session
             self._kept_bytes += size
 
     @cached_property
