@@ -4,7 +4,6 @@ A task is a few jobs, so that each takes long enough to be worth a message. `sub
 `concurrent.futures` with the outcome of each job; outcomes do not depend on the executor, bit for bit.
 """
 
-import os
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future
@@ -206,8 +205,3 @@ def hang_time(limit: float) -> float:
 
 COMPILING = 60.0
 """s, more than the compilation of all kernels takes, which does not count towards the time limit"""
-
-
-def core_count() -> int:
-    """Return the number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -25,7 +25,6 @@ from sandbox.resource_limits import TooLargeError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
-from sandbox.signals import defer_interrupt, reraise_interrupt
 from sandbox.trajectory import Trajectory
 
 Values = tuple[tuple[str, Any], ...]
@@ -283,46 +282,6 @@ def store_run(store: Store, job: Job, completed: CompletedRun, damaged: str | No
     """
     row = store.add(completed.stored, completed.arrays, values=dict(job.point), replace_run=True)
     return RunRecord.of(job, row, store.file(row), repeated=False, damaged=damaged, computed=completed.trajectory)
-
-
-@reraise_interrupt()
-def run_or_fetch(
-    job: Job,
-    store: Store | None = None,
-    options: RunOptions = RunOptions(),
-    progress: Callable[[float], None] | None = None,
-    done: Callable[[RunRecord], None] | None = None,
-) -> RunRecord:
-    """Fetch the stored run of a job, or run the job and store the run.
-
-    A stored run that is damaged, or does not belong to its id, is run again and replaced.
-
-    Args:
-        job: what to run.
-        store: where the run is looked up and stored.
-        options: how to run it.
-        progress: called with the fraction of the run that is done.
-        done: called with the record; no interrupt comes between storing the run and this call.
-
-    Raises:
-        TooLargeError: the frames would not fit into memory, or those of the stored run do not.
-        StoreError: the store cannot be used, or the file of this run cannot be opened.
-        SceneError: the game of the scene cannot be played by the player.
-    """
-    found = None if store is None else fetch(job, store, options)
-    if isinstance(found, RunRecord):
-        if done is not None:
-            done(found)
-        return found
-    completed = run_job(job, with_earlier_audit(job, store, options), progress)
-    with defer_interrupt():
-        if store is None:
-            record = RunRecord.of(job, completed.stored, None, repeated=False, computed=completed.trajectory)
-        else:
-            record = store_run(store, job, completed, found)
-        if done is not None:
-            done(record)
-    return record
 
 
 def with_earlier_audit(job: Job, store: Store | None, options: RunOptions) -> RunOptions:

@@ -20,6 +20,7 @@ from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.run_row import RunRow
+from sandbox.batch.sampling import Sampling
 from sandbox.batch.store import DATABASE, Store, StoreError
 from sandbox.batch.study import MAX_SEEDS, Study, is_study, key_of
 from sandbox.batch.sweep import repeated_keys
@@ -231,6 +232,7 @@ def run_command(**given: Any) -> int:
             return exit_with_errors(faults, options.as_json, runs=[])
         if not options.quiet:
             _report_equal_seeds(batch.plan)
+            _report_unbalanced_sample(study)
         if options.dry_run:
             return print_estimate(batch.plan, batch.count, _run_options(batch, options), store, options)
         _run_all(batch, options, store)
@@ -601,6 +603,16 @@ def _report_equal_seeds(plan: Plan) -> None:
             )
         elif plan.has_useless_seeds(label):
             click.echo(f"{label}: nothing is random, so all seeds give the same run", err=True)
+
+
+def _report_unbalanced_sample(study: Study | None) -> None:
+    """Report a number of Sobol points that do not fill the ranges evenly."""
+    if study is None or study.sample is None or (sampling := Sampling.parse(study.sample)).is_balanced:
+        return
+    lower = 1 << (sampling.count.bit_length() - 1)
+    click.echo(
+        f"--sample: Sobol points fill the ranges evenly for powers of two, such as {lower} or {2 * lower}", err=True
+    )
 
 
 def _memory_fault(job: Job) -> Fault | None:

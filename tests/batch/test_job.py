@@ -13,7 +13,7 @@ import pytest
 from sandbox import run_file
 from sandbox.action import Force, Remove, Spawn
 from sandbox.batch import store as store_module
-from sandbox.batch.job import Job, RunOptions, run_or_fetch
+from sandbox.batch.job import Job, RunOptions
 from sandbox.batch.store import Store, StoreError
 from sandbox.batch.stored_run import COLUMNS
 from sandbox.engines.registry import UnknownEngineError
@@ -22,6 +22,7 @@ from sandbox.resource_limits import TooLargeError
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from tests.batch.fetching import run_or_fetch
 from tests.batch.test_store import files
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long

@@ -40,6 +40,14 @@ def test_sweep_without_a_count_needs_a_sample(scene: str, capfd: pytest.CaptureF
     assert (status, err[0].startswith("--sample: needs a range")) == (2, True)
 
 
+def test_uneven_number_of_sobol_points_is_reported(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ("run", scene, "--sweep", "ball.a.restitution=0:1", "--sample")
+    status, _, err = lines_of(capfd, *words, "5:sobol")
+    assert (status, len(err)) == (0, 1)
+    assert err[0].endswith("for powers of two, such as 4 or 8")
+    assert lines_of(capfd, *words, "5")[2] == lines_of(capfd, *words, "8:sobol")[2] == []
+
+
 def test_dry_run_estimates_and_runs_nothing(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     words = ("run", scene, "--sweep", "solver.dt=0.005:0.02:100000", "--seeds", "100", "--out", str(tmp_path / "runs"))
     status, out, err = lines_of(capfd, *words, "--dry-run")

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.batch.job import run_or_fetch
 from sandbox.batch.plan import Job
 from sandbox.engines.common.energy_balance import energy_of
 from sandbox.measure.metrics.energy import energies
@@ -16,6 +15,7 @@ from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame, Trajectory
+from tests.batch.fetching import run_or_fetch
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
