@@ -222,7 +222,7 @@ def run_command(**given: Any) -> int:
     plan = None if study is None else _plan(study, options, faults)
     store, batch = None, None
     try:
-        if options.out is not None and not faults and (options.out / DATABASE).is_file():
+        if options.out is not None and not faults and _has_store(options.out):
             store = _open_store(options.out, faults)
         if plan is not None and study is not None:
             batch = _checked_batch(plan, study, options, store, faults)
@@ -242,6 +242,14 @@ def run_command(**given: Any) -> int:
     status = _report_problems(batch)
     _print_results(batch, options, status)
     return _draw(batch, options, status)
+
+
+def _has_store(out: Path) -> bool:
+    """Tell whether a folder has a store; opening reports a path that cannot be used."""
+    try:
+        return (out / DATABASE).is_file()
+    except OSError:  # a name that is too long
+        return False
 
 
 def _open_store(out: Path, faults: list[Fault]) -> Store | None:

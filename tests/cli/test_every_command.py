@@ -80,7 +80,7 @@ def test_example_of_a_command_succeeds(
     monkeypatch.chdir(tmp_path)
     for name, text in (("drop.toml", DROP), ("putt.toml", PUTT), ("shell.toml", SHELL)):
         write_scene(tmp_path, text, name)
-    if command == "export":
+    if command in ("export", "runs"):
         assert call(["run", "drop.toml", "--out", "runs", "--quiet"]) == 0
     arguments, keys = EXAMPLES[command]
     status, document, _ = json_of(capfd, command, *arguments)
