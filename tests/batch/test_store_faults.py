@@ -219,8 +219,12 @@ def test_locked_store_raises_after_a_wait_with_one_notice(locked: Path) -> None:
 
 def test_interrupt_ends_the_wait_for_a_lock_even_if_deferred(locked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "WAIT", 600.0)
-    with pytest.raises(KeyboardInterrupt), defer_interrupt():
-        Store(locked, lambda _: os.kill(os.getpid(), signal.SIGINT))
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell may start the tests with SIGINT ignored
+    try:
+        with pytest.raises(KeyboardInterrupt), defer_interrupt():
+            Store(locked, lambda _: os.kill(os.getpid(), signal.SIGINT))
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_store_opens_if_its_lock_is_released_in_time(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
