@@ -123,6 +123,12 @@ class Driver:
         self._again: deque[_Attempt] = deque()
         self._pending: dict[Future[tuple[JobOutcome, ...]], list[_Attempt]] = {}
         self._times: deque[float] = deque(maxlen=MAX_TIMED)
+        self._running: set[str] = set()
+        """ids of the runs that were begun and are not stored yet"""
+        self._equal: dict[str, list[tuple[int, PlannedRun]]] = {}
+        """further planned runs with these ids, which are looked up again once the run is stored"""
+        self._due: deque[tuple[int, PlannedRun]] = deque()
+        """planned runs whose equal run has been stored"""
 
     def run(self) -> None:
         """Run all jobs.
@@ -188,8 +194,8 @@ class Driver:
         """Yield jobs that must be run; those that are stored are reported."""
         while self._again:
             yield self._again.popleft()
-        for index, planned in self._runs:
-            self._unseen = max(self._unseen - 1, 0)
+        while (item := self._next_planned()) is not None:
+            index, planned = item
             try:
                 attempt = self._looked_up(index, planned)
             except SceneError as error:
@@ -201,6 +207,13 @@ class Driver:
                 raise JobError(planned.label, error) from error
             if attempt is not None:
                 yield attempt
+
+    def _next_planned(self) -> tuple[int, PlannedRun] | None:
+        """Return the next planned run and its index; None if there are none left for now."""
+        if self._due:
+            return self._due.popleft()
+        self._unseen = max(self._unseen - 1, 0)
+        return next(self._runs, None)
 
     def _looked_up(self, index: int, planned: PlannedRun) -> _Attempt | None:
         """Return the job of a planned run, or report its stored run and return None."""
@@ -214,11 +227,16 @@ class Driver:
                 self._report_stored(index, RunRecord(planned.label, planned.values, found, file, repeated=True))
                 return None
         job = planned.job()
-        job = replace(job, run_id=identify(job)[1])
+        run_id = identify(job)[1]
+        if run_id in self._running:
+            self._equal.setdefault(run_id, []).append((index, planned))
+            return None
+        job = replace(job, run_id=run_id)
         record = fetch(job, store, self._options)
         if isinstance(record, RunRecord):
             self._report_stored(index, record)
             return None
+        self._running.add(run_id)
         return _Attempt(index, job, with_earlier_audit(job, store, self._options), record)
 
     def _report_stored(self, index: int, record: RunRecord) -> None:
@@ -285,5 +303,8 @@ class Driver:
                     record = store_run(self._store, attempt.job, completed, attempt.damaged)
                 except StoreError as error:
                     raise JobError(attempt.job.label, error) from error
+            if attempt.job.run_id is not None:
+                self._running.discard(attempt.job.run_id)
+                self._due.extend(self._equal.pop(attempt.job.run_id, ()))
             row = record.row(self._options.final, self._options.ledger)
             self._done(Result(attempt.index, row, record if completed.trajectory is not None else None))

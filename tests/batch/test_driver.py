@@ -240,3 +240,19 @@ def test_audit_of_a_stored_run_is_kept_when_the_run_is_replaced(plan: Callable[[
         assert [result.row.repeated for result in results] == [False] * 4
         assert [result.row.missed_contacts for result in results] == [0, 0, None, None]
         assert all(result.row.repeated for result in driven(plan(4), ScriptedExecutor(run_task), store, without))
+
+
+def test_equal_runs_of_a_plan_are_made_once(tmp_path: Path) -> None:
+    """Also if the second one comes while the first one is running."""
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE)
+    scenes = [("one", str(path)), ("other", str(path)), ("third", str(path))]
+    planned = Plan(scenes, ["pymunk"], (), [SweepAxis.of(*parse_sweep("ball.a.mass=1,2"))])
+    planned.check()
+    executor = ScriptedExecutor(run_task, slots=8)
+    with Store(tmp_path / "runs") as store:
+        results = driven(planned, executor, store)
+        assert [result.row.scene for result in results] == ["one", "one", "other", "other", "third", "third"]
+        assert [result.row.repeated for result in results] == [False, False, True, True, True, True]
+        assert len({result.row.id for result in results}) == len(store.rows()) == 2
+    assert sum(len(task.jobs) for task in executor.tasks) == 2
