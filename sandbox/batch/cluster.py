@@ -14,7 +14,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from sandbox.batch.executors import ExecutorError, JobOutcome, RunTask, TaskLostError, hang_time, run_task
+from sandbox.batch.executors import AnyTask, ExecutorError, JobOutcome, TaskLostError, hang_time, run_task
 from sandbox.batch.job import timeout_reason
 from sandbox.echo import MAX_NAMED
 
@@ -69,7 +69,7 @@ class ClusterExecutor:
         self._pool = self._client.get_executor(pure=False, retries=RETRIES)
         self._killed_worker: type[Exception] = distributed.scheduler.KilledWorker
         self._run, self._count = uuid.uuid4().hex[:8], 0
-        self._pending: dict[str, tuple[Future[tuple[JobOutcome, ...]], Any, RunTask]] = {}
+        self._pending: dict[str, tuple[Future[tuple[JobOutcome, ...]], Any, AnyTask]] = {}
         """our future, that of Dask, and the task, by key"""
         self._since: dict[str, float] = {}
         """when a task was first seen on a worker, by key"""
@@ -84,7 +84,7 @@ class ClusterExecutor:
         """Number of threads of all workers; they may come and go."""
         return max(self._slots, 1)
 
-    def submit(self, task: RunTask) -> "Future[tuple[JobOutcome, ...]]":
+    def submit(self, task: AnyTask) -> "Future[tuple[JobOutcome, ...]]":
         """Queue a task on the scheduler."""
         self._count += 1
         key = f"sandbox-{self._run}-{self._count}"
@@ -138,7 +138,7 @@ class ClusterExecutor:
                 ours, theirs, task = self._pending[key]
                 since = self._since.setdefault(key, now)
                 limit = task.options.time_limit
-                if limit is not None and now - since > hang_time(limit) * len(task.jobs):
+                if limit is not None and now - since > hang_time(limit) * task.runs:
                     hanging.append(worker)
                     del self._pending[key]
                     theirs.cancel()

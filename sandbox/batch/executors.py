@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from sandbox.batch.job import CompletedRun, Job, RunOptions, run_job
+from sandbox.batch.member_runs import MemberTask
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.errors import SceneError
@@ -64,6 +65,16 @@ class RunTask:
     versions: Mapping[str, str]
     """of the process that submits the task"""
 
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return len(self.jobs)
+
+    def outcomes(self) -> "Iterator[JobOutcome]":
+        """Run the jobs, and yield the outcome of each."""
+        for job in self.jobs:
+            yield _outcome(job, self.options)
+
 
 @dataclass(frozen=True)
 class JobFailure:
@@ -74,7 +85,9 @@ class JobFailure:
     """faults of the job: no attempt can succeed"""
 
 
-JobOutcome = CompletedRun | JobFailure
+JobOutcome = CompletedRun | JobFailure | None
+"""None for a member of a task that must be run as a job of its own."""
+AnyTask = RunTask | MemberTask
 
 
 class Executor(Protocol):
@@ -90,7 +103,7 @@ class Executor(Protocol):
         """Whether tasks run elsewhere, so that it pays to group jobs and to queue tasks ahead."""
         ...
 
-    def submit(self, task: RunTask) -> "Future[tuple[JobOutcome, ...]]":
+    def submit(self, task: AnyTask) -> "Future[tuple[JobOutcome, ...]]":
         """Queue a task.
 
         Returns:
@@ -124,10 +137,13 @@ class InProcessExecutor:
     def __init__(self, progress: Callable[[float], None] | None = None) -> None:
         self._progress = progress
 
-    def submit(self, task: RunTask) -> "Future[tuple[JobOutcome, ...]]":
+    def submit(self, task: AnyTask) -> "Future[tuple[JobOutcome, ...]]":
         """Run a task."""
         future: Future[tuple[JobOutcome, ...]] = Future()
-        future.set_result(tuple(self._run(job, task.options) for job in task.jobs))
+        if isinstance(task, MemberTask):
+            future.set_result(tuple(task.outcomes()))
+        else:
+            future.set_result(tuple(self._run(job, task.options) for job in task.jobs))
         return future
 
     def _run(self, job: Job, options: RunOptions) -> JobOutcome:
@@ -145,7 +161,7 @@ class InProcessExecutor:
         """Do nothing: no task is running."""
 
 
-def run_task(task: RunTask) -> tuple[JobOutcome, ...]:
+def run_task(task: AnyTask) -> tuple[JobOutcome, ...]:
     """Run a task in a worker, and return its outcomes.
 
     Raises:
@@ -154,8 +170,8 @@ def run_task(task: RunTask) -> tuple[JobOutcome, ...]:
     return tuple(outcomes_of(task))
 
 
-def outcomes_of(task: RunTask) -> Iterator[JobOutcome]:
-    """Yield the outcome of each job of a task in a worker.
+def outcomes_of(task: AnyTask) -> Iterator[JobOutcome]:
+    """Yield the outcome of each run of a task in a worker.
 
     Raises:
         VersionMismatchError: this worker has other versions.
@@ -163,8 +179,7 @@ def outcomes_of(task: RunTask) -> Iterator[JobOutcome]:
     differences = _version_differences(task.versions)
     if differences:
         raise VersionMismatchError(differences)
-    for job in task.jobs:
-        yield _outcome(job, task.options)
+    yield from task.outcomes()
 
 
 def _outcome(job: Job, options: RunOptions) -> JobOutcome:

@@ -29,9 +29,9 @@ from sandbox.trajectory import Trajectory
 
 Values = tuple[tuple[str, Any], ...]
 """Keys of a scene and the values that they are set to."""
-KeptParts = Literal["all", "summary"]
-"""What is stored of a run: its arrays too, or its row only."""
-KEEP: tuple[KeptParts, ...] = ("all", "summary")
+KeptParts = Literal["all", "summary", "end"]
+"""What is stored of a run: its arrays too, its row only, or of the row only what follows from the start and the end."""
+KEEP: tuple[KeptParts, ...] = ("all", "summary", "end")
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,8 @@ class RunOptions:
     final: bool = True
     """rows contain the final state"""
     keep: KeptParts = "all"
-    """`summary` stores rows without arrays; a stored run without arrays is run again where they are wanted"""
+    """`summary` stores rows without arrays, `end` also without contacts and work; a stored run that has less than is
+    wanted is run again"""
     time_limit: float | None = None
     """s, computing time of a run, after which it is stopped and recorded as failed"""
     force: bool = False
@@ -129,6 +130,18 @@ class RunRecord:
     def id(self) -> str:
         """Id of the run."""
         return self.stored.id
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the run is ok, and neither a replay, nor a game, nor in the place of a damaged one."""
+        is_usual = self.stored.status == "ok" and self.damaged is None and self.replay is None
+        has_no_game = '"game": {' not in (self.stored.details or "")
+        return is_usual and has_no_game
+
+    @property
+    def has_trajectory(self) -> bool:
+        """Whether the frames of the run are known: it was computed in this process, or its arrays are stored."""
+        return self.computed is not None or self.path is not None
 
     @property
     def trajectory(self) -> Trajectory:
@@ -210,9 +223,11 @@ def run_job(
     except RunTimeoutError:
         assert limit is not None
         return failed_run(job, timeout_reason(limit))
-    number = job.run_id or identify(job)[1]
+    row = _stored(job, job.run_id or identify(job)[1], trajectory)
+    if options.keep == "end":
+        row = replace(row, contacts=None, first_contact=None, missed_contacts=None, work=None)
     arrays = trajectory.to_bytes() if options.keep == "all" else None
-    return CompletedRun(_stored(job, number, trajectory), arrays, perf_counter() - began, trajectory)
+    return CompletedRun(row, arrays, perf_counter() - began, trajectory)
 
 
 def failed_run(job: Job, reason: str) -> CompletedRun:
@@ -266,7 +281,8 @@ def is_sufficient(stored: StoredRun, options: RunOptions) -> bool:
     if stored.status == "refused":
         return True
     has_ledger = not options.ledger or json.loads(stored.details or "{}").get("ledger") is not None
-    return has_ledger and (stored.path is not None or options.keep != "all")
+    has_contacts = stored.contacts is not None or options.keep == "end"
+    return has_ledger and has_contacts and (stored.path is not None or options.keep != "all")
 
 
 def is_audited(stored: StoredRun) -> bool:
@@ -293,11 +309,8 @@ def with_earlier_audit(job: Job, store: Store | None, options: RunOptions) -> Ru
 
 
 def identify(job: Job) -> tuple[Settings, str]:
-    """Return the settings of a job, resolved if its engine can run it, and the id of its run."""
-    engine = engine_named(job.engine)
-    settings = job.scene.solver
-    if not engine.missing(job.scene, settings):
-        settings = engine.resolve(job.scene, settings)
+    """Return the resolved settings of a job, and the id of its run."""
+    settings = engine_named(job.engine).resolve(job.scene, job.scene.solver)
     game = None if job.player is None else job.player.to_dict(job.scene)
     return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
 

@@ -13,7 +13,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sandbox.batch.job import Job, Values
+from sandbox.batch.job import Job, RunOptions, Values
+from sandbox.batch.member_runs import Member, MemberTask
+from sandbox.batch.start_states import is_start_key
 from sandbox.batch.stored_run import hash_of
 from sandbox.batch.sweep import SweepAxis, relabelled
 from sandbox.echo import short_count
@@ -27,6 +29,7 @@ from sandbox.provenance import versions
 from sandbox.recording import Recording
 from sandbox.resource_limits import PLAN_MEMORY, RUNS
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.game_tables import has_preset
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import Override, SceneText, from_session
@@ -36,6 +39,8 @@ MAX_FAILED = 100
 """Runs with faults after which planning stops and reports them: further ones would repeat the same faults."""
 MAX_CHECKED = 10_000
 """Scenes that are checked before the first run, 0.5 ms each. In a larger plan, only those of one axis at a time are."""
+MAX_FAMILY_CHECKED = 100
+"""Likewise where runs may be members of one task, which takes a fraction of that time each"""
 MAX_AXIS_CHECKED = 1_000
 """Values of an axis that are then checked, the first ones."""
 _BYTES_A_SCENE, _BYTES_AN_ELEMENT, _BYTES_A_BODY = 16_000, 4_000, 500
@@ -55,6 +60,8 @@ class PlannedRun:
     """hash of the scene file, the engine, the values and the versions; None if they do not determine the run"""
     _variant: "_Variant"
     _seeds: int
+    family: str | None = None
+    """runs of one family differ in start values only, so that they may be members of one task; None for others"""
 
     def job(self) -> Job:
         """Return the job.
@@ -79,6 +86,11 @@ class PlannedRun:
             self._seeds,
             self.plan_key,
         )
+
+    def member(self) -> Member:
+        """Return the run as a member of a task."""
+        assert self.plan_key is not None
+        return Member(self._variant.where, self.values, self.plan_key)
 
 
 @dataclass
@@ -122,6 +134,7 @@ class Plan:
         axes: swept and sampled keys.
         seeds: run the seeds 1 to this; None for the seed of each scene.
         player: player of scenes whose game has rules; default: random, or the player of the session.
+        keeps_ends: only the ends of runs are kept, so that many of them may be computed in one call.
 
     Raises:
         AddressError: there would be too many runs.
@@ -135,9 +148,10 @@ class Plan:
         axes: Sequence[SweepAxis] = (),
         seeds: int | None = None,
         player: PlayerSpec | None = None,
+        keeps_ends: bool = False,
     ) -> None:
         self.scenes, self.engines, self.overrides, self.axes = tuple(scenes), engines, tuple(overrides), tuple(axes)
-        self.seeds, self.player = seeds, player
+        self.seeds, self.player, self.keeps_ends = seeds, player, keeps_ends
         self.chosen: dict[str, str] = {}
         """engine by the label of a scene, where the default cannot run it"""
         self.has_player = False
@@ -303,7 +317,8 @@ class Plan:
     @property
     def _is_small(self) -> bool:
         """Whether all scenes are checked before the first run."""
-        return self._points * self._seed_count <= MAX_CHECKED
+        has_families = self.keeps_ends and bool(self._start_keys)
+        return self._points * self._seed_count <= (MAX_FAMILY_CHECKED if has_families else MAX_CHECKED)
 
     @property
     def _seed_count(self) -> int:
@@ -372,7 +387,32 @@ class Plan:
     def _runs(self, variant: _Variant, seeds: int) -> Iterator[PlannedRun]:
         for engine in self._engines_of(variant.label, variant.path):
             values = (*self._set_values, *variant.where)
-            yield PlannedRun(variant.label, engine, values, self._plan_key(variant, engine, values), variant, seeds)
+            key = self._plan_key(variant, engine, values)
+            family = self._family(variant, engine) if key is not None and self.keeps_ends else None
+            yield PlannedRun(variant.label, engine, values, key, variant, seeds, family)
+
+    def member_task(self, runs: Sequence[PlannedRun], options: RunOptions) -> MemberTask:
+        """Return the task of runs of one family."""
+        label, engine = runs[0].label, runs[0].engine
+        source, _ = self._source(next(path for name, path in self.scenes if name == label))
+        assert isinstance(source, SceneText)
+        members = tuple(run.member() for run in runs)
+        return MemberTask(label, source, engine, self.overrides, self._start_keys, members, options, dict(versions()))
+
+    @cached_property
+    def _start_keys(self) -> tuple[str, ...]:
+        """Varied keys that are start values."""
+        return tuple(filter(is_start_key, [*self._swept, *(["world.seed"] if self.seeds else [])]))
+
+    def _family(self, variant: _Variant, engine: str) -> str | None:
+        """Return the family of a run; None if it has to be an ordinary one."""
+        source, _ = self._source(variant.path)
+        paths = [key for key, _ in (*self._set_values, *variant.where)]
+        is_suitable = isinstance(source, SceneText) and not has_preset(source.document, paths)
+        if not (self._start_keys and is_suitable) or any(path.endswith("name") for path in paths):
+            return None
+        shared = [(key, value) for key, value in variant.where if key not in self._start_keys]
+        return repr((variant.label, engine, shared))
 
     def _engines_of(self, label: str, path: str) -> Sequence[str]:
         if self.engines is not None:

@@ -19,7 +19,7 @@ from multiprocessing.context import SpawnProcess
 from queue import SimpleQueue
 from typing import Any, Literal
 
-from sandbox.batch.executors import ExecutorError, JobOutcome, RunTask, TaskLostError, hang_time, outcomes_of
+from sandbox.batch.executors import AnyTask, ExecutorError, JobOutcome, TaskLostError, hang_time, outcomes_of
 from sandbox.batch.job import timeout_reason
 
 MAX_STARTS = 3
@@ -30,7 +30,7 @@ EXIT_TIME = 5.0
 WorkerMessage = tuple[Literal["ready", "outcome", "end", "error"], Any]
 """Message of a worker, by kind: it is ready; the outcome of a job; the task is done; an exception that ended it."""
 
-_Queue = SimpleQueue["tuple[RunTask, Future[tuple[JobOutcome, ...]]] | None"]
+_Queue = SimpleQueue["tuple[AnyTask, Future[tuple[JobOutcome, ...]]] | None"]
 
 
 class ProcessExecutor:
@@ -58,7 +58,7 @@ class ProcessExecutor:
         """Number of worker processes; fewer than asked for where no more could be started."""
         return self._size
 
-    def submit(self, task: RunTask) -> "Future[tuple[JobOutcome, ...]]":
+    def submit(self, task: AnyTask) -> "Future[tuple[JobOutcome, ...]]":
         """Queue a task; a worker is started for it while there are fewer than `slots`."""
         future: Future[tuple[JobOutcome, ...]] = Future()
         self._queue.put((task, future))
@@ -136,7 +136,7 @@ class ProcessExecutor:
         future.set_exception(TaskLostError("the executor was shut down"))
         return None
 
-    def _resubmit(self, task: RunTask, future: "Future[tuple[JobOutcome, ...]]") -> None:
+    def _resubmit(self, task: AnyTask, future: "Future[tuple[JobOutcome, ...]]") -> None:
         """Let another worker run a task, with the same future."""
         again: Future[tuple[JobOutcome, ...]] = Future()
 
@@ -176,7 +176,7 @@ class _Worker:
             self.is_ready = self._pipe.recv()[0] == "ready"
         return self.is_ready
 
-    def run(self, task: RunTask) -> tuple[JobOutcome, ...]:
+    def run(self, task: AnyTask) -> tuple[JobOutcome, ...]:
         """Run a task and return its outcomes.
 
         Raises:
@@ -239,7 +239,7 @@ def serve(pipe: Connection) -> None:
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         pipe.send(("ready", None))
         while True:
-            task: RunTask = pipe.recv()
+            task: AnyTask = pipe.recv()
             try:
                 for outcome in outcomes_of(task):
                     pipe.send(("outcome", outcome))

@@ -6,12 +6,13 @@ the same. What has no column is in `details`, a JSON object: see `details_of`.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.batch.stored_run import StoredRun
 from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
@@ -101,10 +102,10 @@ class RunRow:
     joint_error: float | None
     """largest in any recorded frame, relative or in rad; None without joints"""
     broken_joints: int
-    contacts: int
-    """contacts with an impulse; one that lasts counts once"""
+    contacts: int | None
+    """contacts with an impulse; one that lasts counts once; None if they were not counted"""
     first_contact: float | None
-    """s"""
+    """s; None without contacts, or if they were not counted"""
     missed_contacts: int | None
     """None if they were not counted"""
     retired: Mapping[str, float]
@@ -226,17 +227,20 @@ def _final_states(run: Trajectory) -> dict[str, dict[str, Any]]:
     """Return the last state of each body by name; empty if nothing was recorded."""
     if not len(run.time):
         return {}
-    columns = {
-        "position": run.position[-1].tolist(),
-        "velocity": run.velocity[-1].tolist(),
-        "angle": run.angle[-1].tolist(),
-        "angular_velocity": run.angular_velocity[-1].tolist(),
-    }
-    if len(run.spin):
-        columns["spin"] = run.spin[-1].tolist()
-    names, states = run.names.tolist(), zip(*columns.values(), strict=True)
+    names = ["position", "velocity", "angle", "angular_velocity", *(["spin"] if len(run.spin) else [])]
+    return state_documents(run.names.tolist(), {name: getattr(run, name)[-1] for name in names})
+
+
+def state_documents(names: Sequence[str], columns: Mapping[str, FloatArray]) -> dict[str, dict[str, Any]]:
+    """Return the state of each body by name, as JSON holds it.
+
+    Args:
+        names: of the N bodies.
+        columns: (N, …) each quantity, by its name.
+    """
+    states = zip(*(column.tolist() for column in columns.values()), strict=True)
     rows = {name: dict(zip(columns, state, strict=True)) for name, state in zip(names, states, strict=True)}
-    is_finite = all(np.isfinite(getattr(run, column)[-1]).all() for column in columns)
+    is_finite = all(np.isfinite(column).all() for column in columns.values())
     return rows if is_finite else to_json(rows)  # JSON has no nan
 
 

@@ -16,7 +16,7 @@ import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -46,7 +46,7 @@ from sandbox.signals import deliver_deferred_interrupt
 from sandbox.trajectory import Trajectory
 
 DATABASE = "runs.sqlite"
-VERSION = 3
+VERSION = 4
 """Version of the table. A store of an earlier version is migrated, one of a later version is refused."""
 WAIT = 60.0
 """s, for another process to finish its write, which takes milliseconds, because files are written before the lock."""
@@ -60,16 +60,8 @@ MAX_VALUE_COLUMNS = 1_900
 DIGEST_BLOCK = 2**20
 """bytes that are hashed at a time"""
 
-MIGRATIONS = {
-    2: ("ALTER TABLE runs ADD COLUMN score REAL",),
-    3: (
-        "ALTER TABLE runs RENAME TO runs_before",
-        TABLE,
-        "INSERT INTO runs ({0}) SELECT {0} FROM runs_before".format(", ".join(COLUMNS[:18])),
-        "DROP TABLE runs_before",
-    ),
-}
-"""Migrations: the statements that make the table of a version from that of the version before."""
+COLUMNS_OF = {1: 17, 2: 18, 3: len(COLUMNS)}
+"""Number of columns of earlier versions, which are the first ones; those of set values follow."""
 INDEX = "CREATE INDEX IF NOT EXISTS runs_by_plan_key ON runs (plan_key)"
 
 
@@ -99,12 +91,22 @@ def run_id(
     `settings` are the resolved settings; the scene's own `[solver]` is ignored. `[play]` is ignored unless a game is
     played; `game` then has the game and its player.
     """
-    document = to_document(scene)
-    document.pop("solver", None)
-    if game is None:
-        document.pop("play", None)
+    return id_of_document(to_document(scene), engine, settings, seed, versions, actions, game)
+
+
+def id_of_document(
+    document: Mapping[str, Any],
+    engine: str,
+    settings: Settings,
+    seed: int,
+    versions: Mapping[str, str],
+    actions: tuple[Action, ...] = (),
+    game: Mapping[str, object] | None = None,
+) -> str:
+    """Return the id of a run as `run_id` does, from the document of its scene."""
+    left_out = ("solver",) if game is not None else ("solver", "play")
     decides = {
-        "scene": document,
+        "scene": {key: value for key, value in document.items() if key not in left_out},
         "engine": engine,
         "settings": settings.model_dump(mode="json"),
         "seed": seed,
@@ -239,6 +241,16 @@ class Store:
             staged.write_bytes(arrays)
             return self._insert(row, values or {}, replace_run, staged)
 
+    def add_rows(self, rows: Sequence[tuple[StoredRun, Mapping[str, Any]]]) -> None:
+        """Store runs without arrays, each with its set values, in one transaction; runs with their ids are replaced.
+
+        Raises:
+            StoreError: the folder cannot be written to.
+        """
+        with self._writing():
+            for row, values in rows:
+                self._write_row(row, values)
+
     def add_run(self, run: Trajectory, run_id: str, replace_run: bool = False) -> StoredRun:
         """Store a run under an id, with its arrays, and return its row; see `add`."""
         return self.add(StoredRun.of(run, run_id), run.to_bytes(), replace_run=replace_run)
@@ -284,11 +296,15 @@ class Store:
             if staged is not None:
                 assert row.path is not None
                 staged.replace(self.directory / row.path)
-            cells = dict(zip(COLUMNS, astuple(row), strict=True)) | self._value_cells(row, values)
-            names, marks = ", ".join(map(quoted_column, cells)), ", ".join("?" for _ in cells)
-            self._execute(f"INSERT OR REPLACE INTO runs ({names}) VALUES ({marks})", tuple(cells.values()))
-        self._count += 1
+            self._write_row(row, values)
         return row
+
+    def _write_row(self, row: StoredRun, values: Mapping[str, Any]) -> None:
+        """Insert a row, or replace that of its id."""
+        cells = {column: getattr(row, column) for column in COLUMNS} | self._value_cells(row, values)
+        names, marks = ", ".join(map(quoted_column, cells)), ", ".join("?" for _ in cells)
+        self._execute(f"INSERT OR REPLACE INTO runs ({names}) VALUES ({marks})", tuple(cells.values()))
+        self._count += 1
 
     def _value_cells(self, row: StoredRun, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return the cells of set values by column; columns that are new are added to the table.
@@ -356,9 +372,8 @@ class Store:
             raise StoreError(f"{self._database}: not a database of runs; name another folder")
         if version == 0:
             self._execute(TABLE)
-        for later in range(version + 1, VERSION + 1) if version > 0 else ():
-            for statement in MIGRATIONS[later]:
-                self._execute(statement)
+        if version in COLUMNS_OF:
+            self._migrate(COLUMNS_OF[version])
         columns, others = _layout(self._connection)
         wanted, _ = _layout_of_table()
         if version < 0 or columns[: len(wanted)] != wanted or others or not _are_values(columns[len(wanted) :]):
@@ -371,6 +386,17 @@ class Store:
             self._execute(f"PRAGMA user_version = {VERSION}")
         self._columns = set(value_columns(self._connection))
         self._count = int(self._execute("SELECT count(*) FROM runs")[0][0])
+
+    def _migrate(self, count: int) -> None:
+        """Create the table of this version, with the rows of that of an earlier one, which has so many columns."""
+        others = value_columns(self._connection, count)
+        self._execute("ALTER TABLE runs RENAME TO runs_before")
+        self._execute(TABLE)
+        for column in others:
+            self._execute(f"ALTER TABLE runs ADD COLUMN {quoted_column(column)}")
+        names = ", ".join(map(quoted_column, (*COLUMNS[:count], *others)))
+        self._execute(f"INSERT INTO runs ({names}) SELECT {names} FROM runs_before")
+        self._execute("DROP TABLE runs_before")
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
@@ -425,9 +451,9 @@ class Store:
             raise StoreError(f"{self._database}: {error}; {_REMOVE}") from None
 
 
-def value_columns(connection: sqlite3.Connection) -> list[str]:
-    """Return the columns of set values, in the order in which they were added."""
-    return [str(column[1]) for column in connection.execute("PRAGMA table_xinfo(runs)").fetchall()[len(COLUMNS) :]]
+def value_columns(connection: sqlite3.Connection, count: int = len(COLUMNS)) -> list[str]:
+    """Return the columns of set values, in the order in which they were added; they follow `count` other columns."""
+    return [str(column[1]) for column in connection.execute("PRAGMA table_xinfo(runs)").fetchall()[count:]]
 
 
 def _layout(connection: sqlite3.Connection) -> tuple[list[Any], list[Any]]:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
+from functools import lru_cache
 from typing import Any, Self, get_type_hints
 
 from sandbox.measure.metrics.contacts import collisions, first_collision
@@ -41,7 +42,7 @@ CREATE TABLE runs (
     seconds REAL,
     energy_start REAL,
     energy_end REAL,
-    contacts INTEGER NOT NULL,
+    contacts INTEGER,
     missed_contacts INTEGER,
     path TEXT,
     score REAL,
@@ -92,8 +93,8 @@ class StoredRun:
     """J, energy at the start; null if it is not finite"""
     energy_end: float | None
     """J, energy at the end; null if it is not finite"""
-    contacts: int
-    """number of contacts with an impulse"""
+    contacts: int | None
+    """number of contacts with an impulse; null if they were not counted (`--keep end`)"""
     missed_contacts: int | None
     """number of contacts that the engine missed; null if the run was not audited"""
     path: str | None
@@ -105,7 +106,7 @@ class StoredRun:
     set_values: str | None = None
     """JSON object: values that the command set, swept or sampled, by path; each has a column of its own too"""
     first_contact: float | None = None
-    """s, start of the first contact; null without contacts"""
+    """s, start of the first contact; null without contacts, or if they were not counted"""
     joint_error: float | None = None
     """largest error of a joint in any recorded frame, relative or in rad; null without joints"""
     broken_joints: int | None = None
@@ -166,14 +167,14 @@ class StoredRun:
             path=None,
             score=_known((info.get("game") or {}).get("score")),
             scene=scene,
-            set_values=json.dumps(dict(values or {}), ensure_ascii=False),
+            set_values=dump_json(dict(values or {})),
             first_contact=first_collision(run),
             joint_error=_known(info.get("joint_error")),
             broken_joints=info.get("broken", 0),
             state_hash=info.get("state_hash"),
             work=canonical_json(info.get("work", {})),
             plan_key=plan_key,
-            details=None if details is None else json.dumps(details, ensure_ascii=False, allow_nan=False),
+            details=None if details is None else dump_json(details),
         )
 
     @property
@@ -226,6 +227,7 @@ def is_setting(column: str) -> bool:
     return column.startswith(SOLVER)
 
 
+@lru_cache(maxsize=4096)
 def quoted_column(name: str) -> str:
     """Return the name of a column as SQL text."""
     escaped = name.replace('"', '""')
@@ -242,6 +244,15 @@ def sql_value(value: Any) -> Any:
 def hash_of(document: object) -> str:
     """Return 20 hex digits: a hash of a JSON document."""
     return hashlib.sha256(canonical_json(document).encode("ascii")).hexdigest()[:20]
+
+
+def dump_json(document: object) -> str:
+    """Return JSON as a column has it.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return json.dumps(document, ensure_ascii=False, allow_nan=False)
 
 
 def canonical_json(document: object) -> str:

@@ -136,8 +136,11 @@ class _Batch:
 
     def add(self, result: Result, is_engine_chosen: bool) -> None:
         """Add a completed run."""
-        index, row = result.index, result.row
-        self.statuses[row.status] += 1
+        index, record = result.index, result.record
+        self.statuses[record.stored.status] += 1
+        if self.is_large and self.spool is None and record.is_plain:
+            return
+        row = result.row
         problem = _problem(row, self, is_engine_chosen)
         if problem and len(self.problems) < MAX_PROBLEMS:
             self.problems[index] = problem
@@ -147,8 +150,8 @@ class _Batch:
             self.spool.add(index, to_json(row))
         if self.is_large and self.study.seeds is not None and row.game is not None:
             self.games[index] = replace(row, final=None, settings={}, work={})
-        if self.count == 1:
-            self.record = result.record
+        if self.count == 1 and record.has_trajectory:
+            self.record = record
 
     @property
     def ordered_rows(self) -> list[RunRow]:
@@ -188,7 +191,8 @@ class _Batch:
 @click.option(
     "--keep",
     type=click.Choice(KEEP),
-    help="what is stored of a run: all, or a summary (figures and final states) without arrays; default: all",
+    help="what is stored of a run: all; a summary (figures and final states) without arrays; or only what follows from "
+    "its end, without contacts, which lets engines compute many runs in one call; default: all",
 )
 @click.option("--force", is_flag=True, help="run again, and replace, what is stored already")
 @time_limit_option("stop a run after S seconds of computing, and record it as failed")
@@ -298,13 +302,16 @@ def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
         [f"{key_of(each)}=0" for each in study.sweeps],
         study.seeds,
     )
+    if study.keep == "end" and study.audit:
+        faults.append(Fault("--audit", None, "", "counts contacts, which --keep end leaves out; leave out one of them"))
     player: PlayerSpec | None = None
     with collect_errors(faults):
         player = None if study.player is None else PlayerSpec.parse(study.player)
     if options.cluster is not None and options.workers is not None:
         faults.append(Fault("--workers", None, "", "is given with --on too; leave out one of them"))
     with collect_errors(faults, "--sweep", (AddressError,)):
-        return Plan(found, names, study.overrides, axes, study.seeds, player)
+        keeps_ends = study.keep == "end" and study.time_limit is None and not study.ledger and not study.audit
+        return Plan(found, names, study.overrides, axes, study.seeds, player, keeps_ends)
     return None
 
 
@@ -345,7 +352,7 @@ def _checked_batch(
 def _run_options(batch: _Batch, options: _Options) -> RunOptions:
     study = batch.study
     return RunOptions(
-        audit=study.audit is not False,
+        audit=study.audit is not False and study.keep != "end",
         ledger=study.ledger is True,
         final=options.as_json or batch.count <= MAX_TIMED,
         keep=study.keep or "all",
@@ -360,14 +367,15 @@ def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
     if batch.is_large and options.as_json:
         batch.spool = JsonSpool()
     is_chosen = options.engines is not None
+    compiled: set[tuple[str, str]] = set()
     try:
         with RunMonitor(batch.count, options.is_silent) as monitor:
 
             def done(result: Result) -> None:
-                row = result.row
+                record, stored = result.record, result.record.stored
                 batch.add(result, is_chosen)
-                name = _name(row.scene, row.engine, row.set)
-                monitor.add(name, seconds=row.seconds, is_ok=row.status == "ok", is_stored=row.repeated)
+                name = _name(record.label, stored.engine, dict(record.values))
+                monitor.add(name, seconds=stored.seconds, is_ok=stored.status == "ok", is_stored=record.repeated)
 
             executor = _executor(batch, options, monitor)
             driver = Driver(
@@ -377,8 +385,9 @@ def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
                 _run_options(batch, options),
                 store,
                 done,
-                lambda job: monitor.start(job.label),
+                monitor.start,
                 lambda error: batch.faults.extend(error.faults),
+                lambda label, engine: _report_members(label, engine, compiled, options),
             )
             driver.run()
     except KeyboardInterrupt:
@@ -391,6 +400,13 @@ def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
         batch.status = 1
         option = "--on" if options.cluster is not None else "--workers"
         click.echo(f"{option}: {error}; {batch.done} {kept}", err=True)
+
+
+def _report_members(label: str, engine: str, reported: set[tuple[str, str]], options: _Options) -> None:
+    """Report, once, that many runs of a scene are computed in one call."""
+    if (label, engine) not in reported and not options.is_silent:
+        click.echo(f"{label}: {engine} computes many runs in one compiled call (--keep end)", err=True)
+    reported.add((label, engine))
 
 
 def _executor(batch: _Batch, options: _Options, monitor: RunMonitor) -> Executor:

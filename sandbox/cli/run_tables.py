@@ -128,7 +128,7 @@ class _Columns(NamedTuple):
     swept: list[str]
     """keys of the scene with different values"""
     differing: list[str]
-    """settings of the solver with different values"""
+    """settings of the solver that differ between runs of one scene on one engine"""
     substeps: bool
     seeds: bool
     joint_errors: bool
@@ -189,7 +189,7 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     if show.positions:
         yield _final_position(row) or "–"
     is_refused, missed = row.status == "refused", row.missed_contacts
-    yield "–" if is_refused else f"{row.contacts:,}"
+    yield "–" if is_refused or row.contacts is None else f"{row.contacts:,}"
     yield "–" if is_refused else "?" if missed is None else f"{missed:,}"
     if show.games:
         yield _number(row.score)
@@ -235,12 +235,12 @@ def _game_end(row: RunRow) -> str:
     return "–" if row.game is None or row.game.score is None else row.game.over or "in progress"
 
 
-def _differs(rows: Sequence[RunRow], key: str) -> bool:
-    """Return whether a setting differs between runs of one scene; between scenes, defaults of engines differ anyway."""
-    values: dict[str, set[str]] = {}
+def _differs(rows: Sequence[RunRow], setting: str) -> bool:
+    """Tell whether a setting differs between runs of one scene on one engine; defaults differ between them anyway."""
+    values: dict[tuple[str, str], set[str]] = {}
     for row in rows:
-        values.setdefault(row.scene, set()).add(str(row.settings[key]))
-    return any(len(each) > 1 for each in values.values())
+        values.setdefault((row.scene, row.engine), set()).add(str(row.settings[setting]))
+    return any(len(found) > 1 for found in values.values())
 
 
 def _percent_error(value: float | None) -> str:

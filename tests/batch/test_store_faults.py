@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -165,6 +166,28 @@ def test_store_of_an_earlier_version_is_migrated(filled: Path, version: int, dro
         store.add_run(sample_run(), OTHER)
     with Store(filled) as store:
         assert len(store.rows()) == 2
+
+
+def test_set_values_of_format_3_are_migrated(filled: Path) -> None:
+    table = TABLE.replace("contacts INTEGER,", "contacts INTEGER NOT NULL,", 1)
+    columns = ", ".join(COLUMNS)
+    change(
+        filled,
+        "DROP INDEX runs_by_plan_key",
+        "ALTER TABLE runs RENAME TO newer",
+        table,
+        'ALTER TABLE runs ADD COLUMN "ball.""8 ball"".mass"',
+        f'INSERT INTO runs ({columns}, "ball.""8 ball"".mass") SELECT {columns}, 0.25 FROM newer',
+        "DROP TABLE newer",
+        "PRAGMA user_version = 3",
+    )
+    with Store(filled) as store:
+        found = store.find(ID)
+        assert found is not None
+        store.add(replace(found, id=OTHER, contacts=None))
+    with closing(sqlite3.connect(filled / DATABASE)) as database:
+        rows = database.execute('SELECT contacts IS NULL, "ball.""8 ball"".mass" FROM runs ORDER BY rowid').fetchall()
+    assert rows == [(0, 0.25), (1, None)]
 
 
 def test_any_damage_of_the_database_raises_store_error(filled: Path) -> None:

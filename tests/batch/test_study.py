@@ -83,7 +83,7 @@ def test_fault_of_a_sweep_or_sample_is_found(sweeps: tuple[Any, ...], sample: st
         ('[study]\nscenes = ["a"]\nseed = 3\n', 3, "study.seed", "unknown key; known keys: scenes, "),
         ('[study]\nscenes = ["a"]\nseeds = 0\n', 3, "study.seeds", "greater than or equal to 1"),
         ('[study]\nscenes = ["a"]\nseeds = 1.5\n', 3, "study.seeds", "must be a valid integer"),
-        ('[study]\nscenes = ["a"]\nkeep = "most"\n', 3, "study.keep", "must be 'all' or 'summary'"),
+        ('[study]\nscenes = ["a"]\nkeep = "most"\n', 3, "study.keep", "must be 'all', 'summary' or 'end'"),
         ('[study]\nscenes = ["a"]\ntime_limit = 0\n', 3, "study.time_limit", "greater than 0"),
         ("study = 3\n[world]\nx = 1\n", 2, "world", "unknown table"),
         ("study = 3\n", 1, "study", "must be a table"),

@@ -152,3 +152,24 @@ def test_fault_of_a_scene_beyond_the_checked_ones_is_reported(
 def test_cluster_and_workers_exclude_each_other(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = lines_of(capfd, "run", scene, "--on", "tcp://127.0.0.1:1", "--workers", "2")
     assert (status, err) == (2, ["--workers: is given with --on too; leave out one of them"])
+
+
+def test_ends_of_many_runs_are_computed_in_one_call(
+    tmp_path: Path, scene: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = write_scene(tmp_path, DROP, "balls.toml")
+    sweep = ("run", scene, "--engine", "exact", "--sweep", "ball.a.velocity=[0,0],[1,0],[0,2]")
+    status, document, err = json_of(capfd, *sweep, "--keep", "end")
+    assert status == 0
+    assert err == []  # nothing beside the document
+    status, _, err = lines_of(capfd, *sweep, "--keep", "end", "--out", str(tmp_path / "runs"))
+    assert (status, err) == (0, [f"{scene}: exact computes many runs in one compiled call (--keep end)"])
+    for row, ordinary in zip(document["runs"], json_of(capfd, *sweep)[1]["runs"], strict=True):
+        assert (row["contacts"], row["missed_contacts"], row["first_contact"], row["work"]) == (None, None, None, {})
+        same = ("id", "seed", "set", "status", "steps", "energy_start", "energy_end", "final", "state_hash")
+        assert {key: row[key] for key in same} == {key: ordinary[key] for key in same}
+    status, _, err = lines_of(capfd, *sweep, "--keep", "end", "--audit")
+    assert (status, err[0].startswith("--audit: counts contacts")) == (2, True)
+    status, out, _ = lines_of(capfd, *sweep, "--keep", "end", "--dry-run")
+    assert (status, out[0]) == (0, "3 runs: 1 scene; 3 × ball.a.velocity")
+    assert out[2].endswith("measured on 2 runs, not stored")

@@ -348,6 +348,18 @@ BENCHES = (
         )
         for engine in ("exact", "reference")
     ),
+    *(
+        Bench(
+            f"sweep-members-{engine}",
+            f"seconds a run of a sweep of {runs:,} seeds of ten balls for 1,000 steps on {engine}, two workers, with "
+            "--keep end / with --keep summary, whose runs are single ones",
+            lambda engine=engine, runs=runs: sweeps.seed_sweep(engine, runs, keeps_ends=True),
+            lambda engine=engine: sweeps.seed_sweep(engine, 1000, keeps_ends=False),
+            1 / 20,
+            same=lambda engine=engine: sweeps.same_members(engine),
+        )
+        for engine, runs in (("exact", 20_000), ("reference", 6_000))
+    ),
     Bench(
         "shots-pool",
         "seconds a shot of 10,000 billiard shots with errors of the stroke, two threads / of single runs of the shot "

@@ -38,6 +38,7 @@ MEASURED = 0.75
 STEPS = {50: 550, 5: 50}
 """Steps of a hundred balls on a plane that take a pymunk loop with its records about so many milliseconds"""
 SUMMARY = RunOptions(audit=False, keep="summary", final=False)
+ENDS = RunOptions(audit=False, keep="end", final=False)
 
 
 def hundred_balls(milliseconds: int) -> Scene:
@@ -46,12 +47,12 @@ def hundred_balls(milliseconds: int) -> Scene:
 
 
 @contextmanager
-def _planned(scene: Scene, seeds: int) -> Iterator[tuple[Plan, Path]]:
+def _planned(scene: Scene, seeds: int, engine: str = "pymunk", keeps_ends: bool = False) -> Iterator[tuple[Plan, Path]]:
     """Yield the plan of a scene with many seeds, checked, and a folder for its store."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_text(dumps(scene), encoding="utf-8")
-        plan = Plan([("scene", str(path))], ["pymunk"], seeds=seeds)
+        plan = Plan([("scene", str(path))], [engine], seeds=seeds, keeps_ends=keeps_ends)
         plan.check()
         yield plan, Path(folder) / "runs"
 
@@ -110,6 +111,23 @@ def ensemble_run(engine: str, runs: int) -> Timed:
         assert found.compiled.all()
 
     return lambda: timed(compute) / runs
+
+
+def seed_sweep(engine: str, runs: int, *, keeps_ends: bool) -> Timed:
+    """Return a workload of a sweep of ten balls for 1,000 steps in worker processes, stored; seconds a run.
+
+    The scenes of ordinary runs are read before, as by `sandbox run`; those of members are not.
+    """
+    scene, options = balls_on_plane(10, 1000), ENDS if keeps_ends else SUMMARY
+
+    def work() -> float:
+        times: list[float] = []
+        with _planned(scene, runs, engine, keeps_ends) as (plan, folder), Store(folder) as store:
+            note = lambda _result: times.append(time.perf_counter())  # noqa: E731
+            Driver(plan, runs, ProcessExecutor(WORKERS), options, store, note).run()
+        return _latest(times) / (runs * MEASURED)
+
+    return work
 
 
 def pooled_runs(scene: Scene, engine: str, runs: int) -> Timed:

@@ -89,7 +89,8 @@ def energies(
             squared = np.einsum("tnk,tnk->tn", velocity, velocity)
             turning = _sum(np.square(spin), counts, moment)
             kinetic[rows] = 0.5 * (_sum(squared, counts, mass) + turning)
-            potential[rows] = -_sum(position @ gravity, counts, mass)
+            height = position[..., 0] * gravity[0] + position[..., 1] * gravity[1]
+            potential[rows] = -_sum(height, counts, mass)
             if stored:
                 state = trajectory.position[rows], trajectory.angle[rows], present
                 potential[rows] += stored.at(trajectory.time[rows], *state)
@@ -112,7 +113,11 @@ def _added(position: FloatArray, added_before: BoolArray) -> BoolArray:
 
 
 def _sum(values: FloatArray, counts: BoolArray, weights: FloatArray) -> FloatArray:
-    return np.asarray(np.where(counts, values, 0.0) @ weights)
+    """Return the weighted sum of the values that count, (T,).
+
+    Unlike a matrix product, its rounding does not depend on T.
+    """
+    return np.asarray((np.where(counts, values, 0.0) * weights).sum(axis=1))
 
 
 MIN_SCALE_FRACTION = 1e-6

@@ -246,6 +246,45 @@ def _check_memory(setup: Setup, settings: Settings, n: int, keep: Keep) -> None:
         raise TooLargeError(f"{n:,} runs take {size / 1e9:.3g} GB, but only {free / 1e9:.3g} GB are available")
 
 
+def run_members(
+    setup: Setup,
+    engine: str,
+    settings: Settings,
+    members: Members,
+    threads: int = 1,
+    report: Callable[[int], None] = lambda _: None,
+) -> BoolArray:
+    """Run a scene from many starts in compiled code, and write the end states in their place.
+
+    Args:
+        setup: start of the scene; `members` replace the state of its bodies.
+        engine: name of the engine.
+        settings: settings of the runs.
+        members: (M, …) start states; replaced by those at the end.
+        threads: number of threads.
+        report: called with the number of runs that were computed since the last call, by several threads.
+
+    Returns:
+        (M,) whether each was computed. The others need an ordinary run: their states are the start states.
+    """
+    is_done = np.zeros(len(members.position), np.bool_)
+    try:
+        simulation = start_engine(setup, engine, settings)
+    except Refusal:  # of the scene's own start; each varied one is tried
+        return is_done
+    if isinstance(simulation, MemberRunner):
+        runner, duration = simulation, sum(frame_count(setup.scene, simulation.settings))
+
+        def compute(begin: int, end: int, stop: Event) -> None:
+            rows = slice(begin, end)
+            is_done[rows] = runner.run_members(Members(*(array[rows] for array in members)), duration, stop.is_set)
+            report(int(is_done[rows].sum()))
+
+        _in_threads(compute, len(is_done), threads)
+    simulation.close()
+    return is_done
+
+
 class _Runs:
     """The runs of an ensemble, while they are computed."""
 
@@ -270,21 +309,10 @@ class _Runs:
 
     def compute_compiled(self) -> None:
         """Compute those runs that the engine has compiled code for."""
-        try:
-            simulation = start_engine(self._setup, self._engine, self._settings)
-        except Refusal:  # of the scene's own start; each varied one is tried
-            return
-        if isinstance(simulation, MemberRunner) and not self._setup.time:
-            runner, duration = simulation, sum(frame_count(self._setup.scene, simulation.settings))
-
-            def compute(begin: int, end: int, stop: Event) -> None:
-                rows = slice(begin, end)
-                members = Members(*(array[rows] for array in self._ends))
-                self._compiled[rows] = runner.run_members(members, duration, stop.is_set)
-                self._report(int(self._compiled[rows].sum()))
-
-            _in_threads(compute, len(self._compiled), self._threads)
-        simulation.close()
+        if not self._setup.time:
+            self._compiled = run_members(
+                self._setup, self._engine, self._settings, self._ends, self._threads, self._report
+            )
 
     def compute_rest(self, keep: Keep) -> None:
         """Compute the other runs one by one."""

@@ -147,9 +147,11 @@ def count_overlaps(
     Args:
         position: (N, 2) m.
         radius: (N,) m.
-        max_count: counting stops beyond this number.
+        max_count: counting stops beyond this number. If there are not as many pairs, the result is 0.
         owner: (N,) index of the body of each disc; two discs of one body are no pair.
     """
+    if len(radius) * (len(radius) - 1) // 2 <= max_count < math.inf:
+        return 0
     owner = np.arange(len(radius)) if owner is None else owner
     position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
     octave = np.floor(np.log2(radius))
