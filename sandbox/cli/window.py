@@ -96,7 +96,11 @@ class WindowOptions:
 
 
 def run_window(
-    app_state: "AppState", begin: Callable[[], object], options: WindowOptions, has_scene_list: bool = False
+    app_state: "AppState",
+    begin: Callable[[], object],
+    options: WindowOptions,
+    has_scene_list: bool = False,
+    edits: bool = False,
 ) -> int:
     """Open the window, run it until it is closed, and return the exit status.
 
@@ -105,6 +109,7 @@ def run_window(
         begin: called after the window has opened, to open the first scene.
         options: the options of the window.
         has_scene_list: start with the list of scenes.
+        edits: start with the editor.
     """
     from sandbox.window.app import App
     from sandbox.window.display import NoDisplayError
@@ -132,6 +137,8 @@ def run_window(
         window.context.gui.overlays |= set(options.overlays)
         if options.ghost:
             app_state.toggle_ghost()
+        if edits:
+            window.start_editing()
         if has_scene_list:
             window.context.gui.open_scene_browser(None)
         status = window.run()
@@ -163,8 +170,9 @@ def _saved(app_state: "AppState", record: Path) -> bool:
 @click.argument("scene", required=False)
 @click.option("--engine", metavar="NAME", help="engine to start with; default: exact for billiards, otherwise pymunk")
 @set_option()
+@click.option("--edit", "edits", is_flag=True, help="start with the editor; without SCENE, with a new scene")
 @window_options
-def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ...], **window: Any) -> int:
+def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ...], edits: bool, **window: Any) -> int:
     """Play a scene in a window.
 
     SCENE is a file or the name of a shipped scene. Without it, the window opens with a list of scenes.
@@ -194,7 +202,8 @@ def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ..
     from sandbox.window.app_state import AppState
 
     app_state = AppState(engine, overrides)
-    return run_window(app_state, lambda: path is None or app_state.open(path), WindowOptions(**window), path is None)
+    has_list = path is None and not edits
+    return run_window(app_state, lambda: path is None or app_state.open(path), WindowOptions(**window), has_list, edits)
 
 
 @click.command(name="replay")

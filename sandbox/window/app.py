@@ -13,14 +13,21 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.scene.editing.draft import NEW_SCENE, SceneDraft
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import dumps
 from sandbox.window.app_state import AppState
 from sandbox.window.commands import CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
+from sandbox.window.editor.edit_view import HELP_ROWS, EditView
 from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.gamepad import Gamepads
 from sandbox.window.input.keymap import Command, Keyboard
 from sandbox.window.mouse import MouseController
+from sandbox.window.playback.live import LiveView
+from sandbox.window.render.palette import ORANGE
+from sandbox.window.ui.hud import draw_notice
 from sandbox.window.worker import Wait, Worker, compute_here
 
 MAX_FRAME_RATE = 60
@@ -41,6 +48,11 @@ MODIFIER_KEYS = frozenset(
     }
 )
 """keys that have no command of their own"""
+
+TOOLBAR_ZOOM = 0.9
+"""zoom factor at which a fitted scene leaves room for the toolbar of the editor"""
+EMPTY_VIEW = (-6.0, -1.5), (6.0, 5.0)
+"""m, part of the world that is shown while a scene without bodies is edited"""
 
 INPUT_EVENTS = frozenset(
     {
@@ -99,6 +111,11 @@ class App:
         self._gamepads.start()
         self.mouse = MouseController(self.context)
         self.commands = CommandDispatcher(self.context, self.mouse)
+        self.editing: EditView | None = None
+        """the editor, while the scene is edited"""
+        self._edited: EditView | None = None
+        """the editor of the open scene, which was left to run it"""
+        self.commands.on_edit = self.start_editing
         self._clock = pygame.time.Clock()
         app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
@@ -122,7 +139,8 @@ class App:
         self.commands.flush()
         if self.context.exit_status is not None:
             return
-        self.app_state.covered = self.context.gui.covers_scene or self.app_state.question is not None
+        has_cover = self.context.gui.covers_scene or self.app_state.question is not None
+        self.app_state.covered = has_cover or self.editing is not None
         compiled = COMPILE_CLOCK.seconds
         self.app_state.update(elapsed)
         if COMPILE_CLOCK.seconds > compiled:
@@ -139,6 +157,9 @@ class App:
         context = self.context
         context.gui.has_gamepad = self._gamepads.is_connected
         context.gui.update(self.app_state, self._clock.get_fps(), context.capture.status)
+        if self.editing is not None and context.gui.scene_browser is None:
+            self._draw_editing(self.editing)
+            return
         context.refit_if_covered()
         context.gui.bodies_out_of_view = context.is_out_of_view
         context.gui.draw(context.surface, context.camera, self.app_state)
@@ -200,6 +221,9 @@ class App:
         command = self._keyboard.command(event, app_state.key_bindings.pressed.keys())
         self._cancel_confirmation(event, command)
         self._release_keys(event)
+        if self.editing is not None and not gui.covers_scene:
+            self._edit(self.editing, event)
+            return
         if gui.handle_event(event, app_state):
             return
         if command is not None:
@@ -208,6 +232,70 @@ class App:
             self._press_key(event)
         else:
             self.mouse.handle_event(event)
+
+    def start_editing(self) -> None:
+        """Edit the open scene, or go on editing it; without a scene, a new one with a ground."""
+        app_state, is_new = self.app_state, self.app_state.view is None
+        if is_new and not app_state.play_draft(SceneDraft().scene, None):
+            return
+        if not isinstance(app_state.view, LiveView) or app_state.file is None:
+            app_state.messages.add("a stored run cannot be edited; open its scene with `sandbox play`", "warning")
+            return
+        editing = self._edited
+        if editing is None:
+            try:
+                path = app_state.path
+                text = NEW_SCENE if is_new else dumps(app_state.file)
+                draft = SceneDraft(text) if path is None else SceneDraft.read(path)
+            except SceneError as error:
+                app_state.messages.add(str(error), "error")
+                return
+            editing = EditView(self.context, draft, self.stop_editing, self.commands.run)
+        self.mouse.release_all()
+        self.context.following = None
+        if not editing.draft.scene.bodies.names:
+            self.context.show_box(EMPTY_VIEW)
+        elif self.context.is_fitted:  # leaves room for the toolbar at the left
+            area = self.context.gui.area
+            self.context.camera = self.context.camera.zoomed(TOOLBAR_ZOOM, (area.right, area.centery))
+        self.context.is_fitted = False  # the view stays when the scene runs
+        self.editing = self._edited = editing
+
+    def stop_editing(self) -> None:
+        """Run the edited scene from the start."""
+        editing = self.editing
+        if editing is None:
+            return
+        editing.panel.commit()
+        editing.editor.cancel() if editing.editor.gesture is not None else None
+        self.app_state.paused = False
+        self.editing = None
+        if not self.app_state.play_draft(editing.draft.scene, editing.draft.path):
+            self.editing = editing  # no engine can run it, which a message says
+        self._edited = editing
+
+    def _edit(self, editing: EditView, event: pygame.event.Event) -> None:
+        """Pass an event to the editor; zoom, panning and Esc are those of the window."""
+        if editing.handle_event(event):
+            return
+        if event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
+            self.commands.run(Command.QUIT)
+        elif (
+            event.type in (pygame.MOUSEWHEEL, pygame.WINDOWFOCUSLOST)
+            or getattr(event, "button", 0) in (2, 3)
+            or (event.type == pygame.MOUSEMOTION and self.mouse.is_panning)
+        ):
+            self.mouse.handle_event(event)
+
+    def _draw_editing(self, editing: EditView) -> None:
+        """Draw the scene that is edited, and what covers it."""
+        context = self.context
+        editing.draw(context.surface)
+        if context.gui.help.open:
+            context.gui.help.draw(context.surface, context.gui.ui_scale, HELP_ROWS)
+        if self.app_state.question is not None:
+            size = 16 * context.gui.ui_scale
+            draw_notice(context.surface, self.app_state.question, context.gui.area, size, ORANGE)
 
     def _press_key(self, event: pygame.event.Event) -> None:
         """Run the handler that the scene or its game binds to a key."""
@@ -253,6 +341,9 @@ class App:
 
     def _on_scene_changed(self, same: bool) -> None:
         self._release_handlers.clear()  # they act on the former session
+        if not same:
+            self.editing = self._edited = None
+            self.app_state.has_unsaved_draft = False
         self.context.on_scene_changed(same)
 
     def _resize(self) -> None:

@@ -223,6 +223,8 @@ class AppState:
         """runner of jobs that may compile kernels; the window uses a worker thread"""
         self.question: str | None = None
         """question asked before manual changes are lost"""
+        self.has_unsaved_draft = False
+        """whether the scene was edited and is not saved"""
         self.saves_at_end = False
         """whether the session is saved when the window closes"""
         self._lost: Recording | None = None  # restored by Ctrl+Z
@@ -329,6 +331,12 @@ class AppState:
         if live is not None:
             self.show(live, path, file, same)
         return live is not None
+
+    def play_draft(self, scene: Scene, path: Path | None) -> bool:
+        """Start a scene that was edited; return whether an engine can run it. The camera stays."""
+        self._preferences.parameters.clear()
+        preferred = self.view.engine if self.view is not None else self._preferences.engine
+        return self._start(scene, path, scene, preferred or usual(scene), None, same=self.view is not None)
 
     def restart(self) -> None:
         """Restart the scene at time 0 with the same engine and the parameters set by the user."""

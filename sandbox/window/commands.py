@@ -20,6 +20,7 @@ BUTTONS = {
     "save": Command.SAVE,
     "picker": Command.PICKER,
     "help": Command.HELP,
+    "edit": Command.EDIT,
 }
 """Commands by the name of the panel button."""
 
@@ -29,8 +30,13 @@ CONFIRMATIONS = {
     Command.NEXT: "press ] again to open the other scene",
     Command.RELOAD: "press Ctrl+L again to reload",
     Command.QUIT: "press Esc again to quit",
+    Command.EDIT: "press Ctrl+E again to edit the scene",
 }
 """Confirmation hints of the commands that end a session with unsaved manual changes."""
+
+
+LOSE_DRAFT = (Command.PREVIOUS, Command.NEXT, Command.RELOAD, Command.QUIT)
+"""Commands that lose the unsaved changes of an edited scene."""
 
 
 class CommandDispatcher:
@@ -41,6 +47,8 @@ class CommandDispatcher:
         self._changed: dict[str, ParameterValue] = {}  # parameter changes since the last `flush`, latest last
         self.pending: Command | None = None
         """command waiting for confirmation"""
+        self.on_edit: Callable[[], None] = lambda: None
+        """callback that starts the editing of the scene"""
         app_state, gui = context.app_state, context.gui
         self._handlers: dict[Command, Callable[[], object]] = {
             Command.PAUSE: app_state.toggle_pause,
@@ -68,6 +76,7 @@ class CommandDispatcher:
             Command.ADD_BALL: lambda: self._add_body(box=False),
             Command.ADD_BOX: lambda: self._add_body(box=True),
             Command.QUIT: self._quit,
+            Command.EDIT: lambda: self.on_edit(),
             Command.UNDO: app_state.restore_session,
             Command.FOLLOW: context.toggle_follow,
             Command.FULL_SCREEN: context.toggle_full_screen,
@@ -92,10 +101,14 @@ class CommandDispatcher:
         self.cancel_confirmation()
         if command not in CONFIRMATIONS or confirmed or (command is Command.QUIT and app_state.saves_at_end):
             return False
-        count = app_state.count_unsaved(restart=command is Command.RESTART)
-        if not count:
-            return False
-        self.pending, app_state.question = command, describe_loss(count, CONFIRMATIONS[command])
+        if app_state.has_unsaved_draft and command in LOSE_DRAFT:
+            question = f"the edited scene is not saved: {CONFIRMATIONS[command]}, Ctrl+E and Ctrl+S save it"
+        else:
+            count = app_state.count_unsaved(restart=command is Command.RESTART)
+            if not count:
+                return False
+            question = describe_loss(count, CONFIRMATIONS[command])
+        self.pending, app_state.question = command, question
         return True
 
     def cancel_confirmation(self) -> None:

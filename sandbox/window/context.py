@@ -191,6 +191,11 @@ class WindowContext:
             self._fit(_enlarge_box(box, show.bodies.radius[: len(is_valid)][is_valid]))
             self.is_fitted = False
 
+    def show_box(self, box: ViewBox) -> None:
+        """Show a box of the world, m."""
+        self._fit(box)
+        self.is_fitted = False
+
     def _fit(self, box: ViewBox) -> None:
         """Fit the camera to a box, m."""
         self.camera = self._fitted_camera(box)

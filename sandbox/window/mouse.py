@@ -34,6 +34,11 @@ class MouseController:
         self.position: tuple[int, int] | None = None
         """px; None before the first mouse event"""
 
+    @property
+    def is_panning(self) -> bool:
+        """Whether the view is being dragged."""
+        return self._panning
+
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event."""
         context = self._context

@@ -29,7 +29,7 @@ from sandbox.scene.files.load import from_document
 MAX_COST_RATIO = 0.9
 """Largest cost of a simplification relative to the setting that it replaces: a smaller saving is within the noise."""
 
-Change = Callable[[dict[str, Any]], None]
+SettingChange = Callable[[dict[str, Any]], None]
 
 
 class ModelChange(NamedTuple):
@@ -39,7 +39,7 @@ class ModelChange(NamedTuple):
     """short description of the simpler model"""
     advice: str
     """the same as a clause"""
-    change: Change
+    change: SettingChange
     """removes it from the document of a scene"""
 
 
@@ -161,7 +161,7 @@ def _simplification(
     return Simplification(what, engine, error, after.least, ratio, sentence)
 
 
-def _changed(scene: Scene, change: Change) -> Scene | None:
+def _changed(scene: Scene, change: SettingChange) -> Scene | None:
     """Return a changed scene; None if it is invalid or its bodies have other positions."""
     document = to_document(scene)
     change(document)
@@ -208,7 +208,7 @@ def _contact_pairs(contexts: Sequence[EvaluationContext]) -> IntArray | None:
     return np.concatenate(found)
 
 
-def _set_collides(scene: Scene, value: str) -> Change:
+def _set_collides(scene: Scene, value: str) -> SettingChange:
     def change(document: dict[str, Any]) -> None:
         for heading in scene.kinds:
             for element in document.get(heading, ()):

@@ -10,6 +10,7 @@ import re
 import shutil
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -66,6 +67,7 @@ def _statement(text: str, first: int, equals: int, last: int, end: int) -> State
     return Statement(_keys(text[slice(*head)] + "=0"), False, begin, head, (blank.end(), last), end)
 
 
+@lru_cache(maxsize=10_000)
 def _keys(text: str) -> tuple[str, ...]:
     keys: list[str] = []
     value: Any = tomllib.loads(text)

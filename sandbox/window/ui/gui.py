@@ -449,6 +449,7 @@ class Gui:
             "camera",
             "stop" if recording else "record",
             "save",
+            "edit",
             "picker",
             "help",
         )

@@ -199,14 +199,14 @@ def draw_hud(
     plates["picked"] = _draw_picked(surface, status.picked, area, [rows.rect, plates["rate"], *taken], size)
     others = [rows.rect, plates["rate"], plates["picked"], *taken]
     message_area = _message_area(area, scale, field, size)
-    for k, rect in enumerate(_draw_messages(surface, status.messages, message_area, others, size)):
+    for k, rect in enumerate(draw_messages(surface, status.messages, message_area, others, size)):
         plates[f"message {k}"] = rect
     if status.question is not None:
-        _draw_notice(surface, status.question, area, size, WARNING)
+        draw_notice(surface, status.question, area, size, WARNING)
     elif status.waits_for_start:
-        _draw_notice(surface, "Press Space to start", area, 1.5 * size, SKY)
+        draw_notice(surface, "Press Space to start", area, 1.5 * size, SKY)
     elif status.out_of_sight is not None:
-        _draw_notice(surface, status.out_of_sight, area, size, SKY)
+        draw_notice(surface, status.out_of_sight, area, size, SKY)
     return nothing
 
 
@@ -259,7 +259,7 @@ def draw_mark(
             pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
 
 
-def _draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: RgbColour) -> None:
+def draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: RgbColour) -> None:
     """Draw a notice in the centre of the area."""
     lines = wrap_text(text, size, area.width - 2 * size, 3, bold=True)
     line_height = round(1.4 * size)
@@ -328,7 +328,7 @@ def _message_area(area: pygame.Rect, scale: pygame.Rect | None, field: pygame.Re
     return pygame.Rect(left, area.top, right - left, area.height)
 
 
-def _draw_messages(
+def draw_messages(
     surface: pygame.Surface,
     messages: tuple[tuple[str, str], ...],
     area: pygame.Rect,

@@ -7,7 +7,7 @@ import pygame
 
 from sandbox.window.render.palette import RgbColour
 
-ICON_NAMES = ("play", "pause", "step", "back", "restart", "camera", "record", "stop", "save", "help", "picker")
+ICON_NAMES = ("play", "pause", "step", "back", "restart", "camera", "record", "stop", "save", "help", "picker", "edit")
 _OVERSAMPLING = 4
 _GRID = 24
 """side of the grid on which icons are drawn"""
@@ -61,6 +61,10 @@ class _Pen:
             self._box(4, 18.4, 16, 2.8, 1)
         elif name == "help":
             self._help()
+        elif name == "edit":
+            self._polygon((4, 20), (5.4, 14.6), (9.4, 18.6))
+            self._polygon((6.6, 13.4), (14.4, 5.6), (18.4, 9.6), (10.6, 17.4))
+            self._polygon((15.6, 4.4), (17, 3), (21, 7), (19.6, 8.4))
         else:
             for x in (3.5, 13.0):
                 for y in (3.5, 13.0):

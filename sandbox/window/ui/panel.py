@@ -128,6 +128,7 @@ _BUTTONS = {
     "save": ("Save the session", Command.SAVE),
     "help": ("Help", Command.HELP),
     "picker": ("Open a scene", Command.PICKER),
+    "edit": ("Edit the scene", Command.EDIT),
 }
 _LABELS = {"trust": "horizon", "antialias": "antialiasing"}
 """labels that differ from the name"""

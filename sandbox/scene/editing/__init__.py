@@ -1,0 +1,1 @@
+"""Editing of scene files: elements, transformations, fields, and drafts with undo."""

@@ -1,0 +1,227 @@
+"""Elements of a scene as an editor addresses them: by table and index, and how they refer to each other by name."""
+
+from bisect import bisect_right
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from sandbox.scene.compile.bodies import Bodies, centre_of
+from sandbox.scene.compile.derived import derived_once
+from sandbox.scene.compile.generators import count_of
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySpec, Part
+from sandbox.scene.description.forces import Attraction, Thrust
+from sandbox.scene.description.joints import Joined
+from sandbox.scene.description.scene import SceneDescription, default_name
+from sandbox.scene.files.toml_changes import Change, RemoveElement, SetValue
+
+FIELD_OF = {str(field.alias): name for name, field in Scene.model_fields.items() if field.alias is not None}
+"""Attribute of a scene, by the heading of its list of tables"""
+STATIC_TABLES = ("plane", "wall", "post", "zone", "pocket")
+
+
+@dataclass(frozen=True, order=True)
+class ElementKey:
+    """Address of an element in a scene file."""
+
+    table: str
+    """heading of its list of tables, such as `ball`"""
+    index: int
+    """index in that list, from 0"""
+
+    @property
+    def location(self) -> tuple[str | int, ...]:
+        """Location of its table in the document."""
+        return self.table, self.index
+
+
+def element_at(scene: SceneDescription, key: ElementKey) -> Part:
+    """Return an element.
+
+    Raises:
+        IndexError: there is no such element.
+    """
+    found: Part = getattr(scene, FIELD_OF[key.table])[key.index]
+    return found
+
+
+def elements_of_table(scene: SceneDescription, table: str) -> Sequence[Part]:
+    """Return the elements of a list of tables."""
+    found: Sequence[Part] = getattr(scene, FIELD_OF[table])
+    return found
+
+
+def all_elements(scene: SceneDescription) -> Iterator[tuple[ElementKey, Part]]:
+    """Yield all elements with their addresses, table by table."""
+    for table in FIELD_OF:
+        for index, element in enumerate(elements_of_table(scene, table)):
+            yield ElementKey(table, index), element
+
+
+def exists(scene: SceneDescription, key: ElementKey) -> bool:
+    """Tell whether a scene has an element."""
+    return 0 <= key.index < len(elements_of_table(scene, key.table))
+
+
+def with_elements(scene: Scene, replaced: Mapping[ElementKey, Part]) -> Scene:
+    """Return a scene with some elements replaced, without validation; for previews."""
+    tables: dict[str, list[Part]] = {}
+    for key, element in replaced.items():
+        tables.setdefault(key.table, list(elements_of_table(scene, key.table)))[key.index] = element
+    return scene.model_copy(update={FIELD_OF[table]: tuple(parts) for table, parts in tables.items()})
+
+
+def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> Scene:
+    """Return a scene with bodies at other places and angles, without compiling the others again; for previews.
+
+    Args:
+        scene: the scene.
+        replaced: the moved bodies; only their position and angle may differ.
+    """
+    before, preview = scene.bodies, with_elements(scene, replaced)
+    position, angle = before.position.copy(), before.angle.copy()
+    for key, body in replaced.items():
+        (index,) = bodies_of(scene, key)
+        position[index], angle[index] = centre_of(body), body.angle
+    moved = replace(before, position=position, angle=angle, elements=preview.elements)
+    for name in ("round", "all_round", "shapes", "number_of"):  # they depend on shapes and names only
+        vars(moved)[name] = getattr(before, name)
+    vars(preview)["bodies"] = moved
+    return preview
+
+
+def name_of(scene: SceneDescription, key: ElementKey) -> str:
+    """Return the name of an element; its default name if it has none."""
+    name = getattr(element_at(scene, key), "name", None)
+    return default_name(key.table, key.index) if name is None else str(name)
+
+
+class BodyRanges(NamedTuple):
+    """Which bodies belong to which element."""
+
+    of: Mapping[ElementKey, range]
+    """indices of the bodies of each element that has bodies"""
+    keys: tuple[ElementKey, ...]
+    """these elements, in the order of their bodies"""
+    ends: tuple[int, ...]
+    """index after the last body of each"""
+
+
+@derived_once
+def body_ranges(setup: Setup) -> BodyRanges:
+    """Return which bodies belong to which element, at the start of a scene."""
+    of: dict[ElementKey, range] = {}
+    begin = 0
+    for table, sources in setup.scene.kinds.items():
+        for index, source in enumerate(sources):
+            end = begin + count_of(source)
+            of[ElementKey(table, index)] = range(begin, end)
+            begin = end
+    return BodyRanges(of, tuple(of), tuple(bodies.stop for bodies in of.values()))
+
+
+def bodies_of(scene: Scene, key: ElementKey) -> range:
+    """Return the indices of the bodies of an element; empty if it has none."""
+    return body_ranges(scene).of.get(key, range(0))
+
+
+def element_of_body(scene: Scene, body: int) -> ElementKey:
+    """Return the element that a body belongs to.
+
+    Raises:
+        IndexError: there is no such body.
+    """
+    ranges = body_ranges(scene)
+    return ranges.keys[bisect_right(ranges.ends, body)]
+
+
+def body_names(scene: Scene, key: ElementKey) -> set[str]:
+    """Return the names of the bodies of an element."""
+    bodies: Bodies = scene.bodies
+    return {bodies.names[k] for k in bodies_of(scene, key)}
+
+
+def all_names(scene: Scene) -> set[str]:
+    """Return the names of all bodies, static elements, materials, joints and other elements."""
+    found = set(scene.bodies.names) | set(scene.fixed_names)
+    return found | {name_of(scene, key) for key, element in all_elements(scene) if hasattr(element, "name")}
+
+
+def unique_name(stem: str, taken: Collection[str]) -> str:
+    """Return a name that is not taken: the stem itself, or with the first free number, such as `a 2`."""
+    if stem and stem not in taken:
+        return stem
+    base, _, number = stem.rpartition(" ")
+    base = base if base and number.isdecimal() else stem
+    k = 2
+    while f"{base} {k}" in taken:
+        k += 1
+    return f"{base} {k}"
+
+
+def bodies_referred_to(element: Part) -> tuple[str, ...]:
+    """Return the names of the bodies that an element refers to."""
+    if isinstance(element, Joined):
+        return element.between
+    if isinstance(element, Attraction):
+        return (element.toward,) if isinstance(element.toward, str) else ()
+    body = getattr(element, "body", None) or getattr(element, "ball", None)
+    if isinstance(body, str):
+        return (body,)
+    tie = getattr(element, "tie", None)
+    return () if tie is None else tuple(name for name in (tie.start, tie.end) if name is not None)
+
+
+def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
+    """Return the changes that remove elements, and with their bodies all elements that refer to them."""
+    gone = set(keys)
+    names = {name for key in keys for name in body_names(scene, key)}
+    while True:
+        more = {
+            key for key, element in all_elements(scene) if key not in gone and names & set(bodies_referred_to(element))
+        }
+        if not more:
+            break
+        gone |= more
+        names |= {name for key in more for name in body_names(scene, key)}
+    return [RemoveElement(key.table, key.index) for key in sorted(gone)]
+
+
+def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
+    """Return the changes that rename an element, and the references to it."""
+    before = name_of(scene, key)
+    changes: list[Change] = [SetValue((*key.location, "name"), name)]
+    for other, element in all_elements(scene):
+        changes += [SetValue((*other.location, *path), name) for path in _reference_paths(element, before, key.table)]
+    return changes
+
+
+def _reference_paths(element: Part, name: str, table: str) -> Iterator[tuple[str | int, ...]]:
+    """Yield the paths within an element at which it names an element of a table."""
+    if table == "material":
+        if getattr(element, "material", None) == name:
+            yield ("material",)
+        between = getattr(element, "between", ()) if not isinstance(element, Joined) else ()
+        yield from (("between", k) for k, each in enumerate(between) if each == name)
+        return
+    if isinstance(element, Joined):
+        yield from (("between", k) for k, each in enumerate(element.between) if each == name)
+    if isinstance(element, Attraction) and element.toward == name:
+        yield ("toward",)
+    for attribute in ("body", "ball"):
+        if isinstance(getattr(element, attribute, None), str) and getattr(element, attribute) == name:
+            yield (attribute,)
+    tie = getattr(element, "tie", None)
+    if tie is not None:
+        yield from (("tie", end) for end in ("start", "end") if getattr(tie, end) == name)
+
+
+def table_values(element: Part) -> dict[str, Any]:
+    """Return the values of an element's table, without defaults."""
+    return element.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+
+def is_joint(element: Part) -> bool:
+    """Tell whether an element is a joint, a force or a drive: it is attached to bodies and has no place of its own."""
+    return isinstance(element, Joined | Thrust)

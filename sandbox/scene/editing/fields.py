@@ -1,0 +1,373 @@
+"""Fields of the tables of a scene file, derived from their models: kind, range, unit, description, and text of values.
+
+Text typed by a user may be an expression, such as `2*pi`, `1/60` or `45 deg`; it is evaluated without `eval`.
+"""
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from types import NoneType
+from typing import Any, Literal, get_args
+
+from pydantic import BaseModel, StringConstraints
+
+from sandbox.scene.description.base import Colour, Name
+from sandbox.scene.files.json_schema import described
+
+FieldKind = Literal["number", "integer", "text", "choice", "flag", "numbers", "name", "other"]
+
+MAX_TYPED = 200
+"""Largest length of the text of a number or of each component; also limits the depth of expressions."""
+MAX_DECIMALS, MAX_DENOMINATOR = 12, 1000
+"""A number with a longer decimal form is written as a fraction with the numerator 1, if it is one."""
+
+
+@dataclass(frozen=True)
+class FieldSpec:
+    """A key of a table of a scene file."""
+
+    key: str
+    """key in the file"""
+    kind: FieldKind
+    """`numbers`: array of a fixed length; `name`: name of an element, material or layer; `other`: no kind of text"""
+    length: int
+    """number of components of `numbers`; 0 for others"""
+    choices: tuple[str, ...]
+    """values of a `choice`"""
+    is_optional: bool
+    """whether the model allows None, that is no value"""
+    default: Any
+    """value without the key; None if the key is required, or if there is no value without it"""
+    is_required: bool
+    low: float | None
+    """smallest value of each number; None without a limit"""
+    high: float | None
+    """largest value of each number; None without a limit"""
+    unit: str
+    """such as `m/s`; "" for a number without a dimension"""
+    description: str
+    is_low_excluded: bool = False
+    """whether `low` itself is outside the range"""
+    is_high_excluded: bool = False
+    """whether `high` itself is outside the range"""
+    pattern: str = ""
+    """regular expression of a text; "" without one"""
+    max_length: int | None = None
+    """largest number of characters of a text; None without a limit"""
+
+
+@cache
+def fields_of(model: type[BaseModel]) -> tuple[FieldSpec, ...]:
+    """Return the fields of a model of a table, in the order of the model."""
+    properties = model.model_json_schema(by_alias=True)["properties"]
+    descriptions = {name: " ".join(text.split()) for name, text in described(model).items()}
+    found = []
+    for name, field in model.model_fields.items():
+        key = field.alias or name
+        default = None if field.is_required() else field.get_default(call_default_factory=True)
+        is_optional = not field.is_required() and (default is None or NoneType in get_args(field.annotation))
+        found.append(_spec(key, properties[key], default, descriptions.get(name, ""), is_optional, field.is_required()))
+    return tuple(found)
+
+
+def _spec(
+    key: str, schema: dict[str, Any], default: Any, description: str, is_optional: bool, is_required: bool
+) -> FieldSpec:
+    alternatives = [each for each in schema.get("anyOf", [schema]) if each.get("type") != "null"]
+    value = alternatives[0] if len(alternatives) == 1 else {}
+    components = value.get("prefixItems", ())
+    kind, choices = _kind(value)
+    number = components[0] if kind == "numbers" else value if kind in ("number", "integer") else {}
+    return FieldSpec(
+        key,
+        kind,
+        len(components) if kind == "numbers" else 0,
+        choices,
+        is_optional,
+        default,
+        is_required,
+        number.get("minimum", number.get("exclusiveMinimum")),
+        number.get("maximum", number.get("exclusiveMaximum")),
+        unit_of(description) if number else "",
+        description,
+        "exclusiveMinimum" in number,
+        "exclusiveMaximum" in number,
+        value.get("pattern", "") if kind in ("text", "name") else "",
+        value.get("maxLength") if kind in ("text", "name") else None,
+    )
+
+
+def _pattern_of(annotated: Any) -> str | None:
+    """Return the pattern of an annotated type of text."""
+    constraints = get_args(annotated)[1]
+    assert isinstance(constraints, StringConstraints)
+    return str(constraints.pattern)
+
+
+_NAME_PATTERN, _COLOUR_PATTERN = _pattern_of(Name), _pattern_of(Colour)
+
+
+def _kind(schema: dict[str, Any]) -> tuple[FieldKind, tuple[str, ...]]:
+    """Return the kind of a value with a JSON schema, and its choices."""
+    match schema:
+        case {"enum": [*choices]} if all(isinstance(each, str) for each in choices):
+            return "choice", tuple(choices)
+        case {"const": str(choice)}:
+            return "choice", (choice,)
+        case {"type": "number"}:
+            return "number", ()
+        case {"type": "integer"}:
+            return "integer", ()
+        case {"type": "boolean"}:
+            return "flag", ()
+        case {"type": "string"}:
+            return ("name" if schema.get("pattern") == _NAME_PATTERN else "text"), ()
+        case {"type": "array", "prefixItems": [first, *others], "minItems": int(least), "maxItems": int(most)}:
+            if first.get("type") == "number" and all(each == first for each in others) and least == most:
+                return "numbers", ()
+    return "other", ()
+
+
+_BASE_UNIT = r"(?:(?:kg|m|s|N|J|W|rad|Hz|Pa)[²³⁴]?)"
+_UNIT = re.compile(
+    rf"(?:^|, )((?:1|{_BASE_UNIT}(?:·{_BASE_UNIT})*)/{_BASE_UNIT}(?:·{_BASE_UNIT})*|{_BASE_UNIT}(?:·{_BASE_UNIT})*)"
+    r"(?=$|[,;:.]| \(| from )"
+)
+
+
+def unit_of(description: str) -> str:
+    """Return the unit in the description of a number, such as `m/s²` in "gravity, m/s²"; "" without one.
+
+    It stands at the start or after a comma, and before a punctuation mark, a bracket or "from".
+    """
+    found = _UNIT.search(description)
+    return "" if found is None else found[1]
+
+
+def parse(spec: FieldSpec, text: str) -> Any:
+    """Return the value for the file of a text typed by the user; None if the key is to be left out.
+
+    Empty text leaves out a key that is not required. Numbers may be expressions of + - * / ** and brackets, with `pi`,
+    `tau`, `deg` (π/180), `sqrt`, `sin` and `cos`. Arrays may be in square brackets. Numbers in a `number` or `numbers`
+    are floats, arrays are lists.
+
+    Raises:
+        ValueError: the text is no valid value; the message says what would be right. Values of kind `other` have no
+            text.
+    """
+    if spec.kind == "other":
+        raise ValueError("cannot be edited as text")
+    typed = text.strip()
+    if not typed:
+        if spec.is_required:
+            raise ValueError("must have a value")
+        return None
+    match spec.kind:
+        case "number" | "integer":
+            return _parse_number(spec, typed)
+        case "numbers":
+            return _parse_numbers(spec, typed)
+        case "choice":
+            if typed not in spec.choices:
+                raise ValueError(f"must be {' or '.join(spec.choices)}, is {_shortened(typed)}")
+            return typed
+        case "flag":
+            if typed not in ("true", "false"):
+                raise ValueError(f"must be true or false, is {_shortened(typed)}")
+            return typed == "true"
+    return _parse_text(spec, typed)
+
+
+def _parse_text(spec: FieldSpec, typed: str) -> str:
+    if spec.max_length is not None and len(typed) > spec.max_length:
+        raise ValueError(f"must have at most {spec.max_length} characters, has {len(typed)}")
+    if spec.pattern and re.search(spec.pattern, typed) is None:
+        right = "be a colour such as #ff8000" if spec.pattern == _COLOUR_PATTERN else "have no control characters"
+        raise ValueError(f"must {right}")
+    return typed
+
+
+def _parse_numbers(spec: FieldSpec, typed: str) -> list[float]:
+    if typed.startswith("[") and typed.endswith("]"):
+        typed = typed[1:-1]
+    parts = [part.strip() for part in typed.split(",")]
+    if len(parts) != spec.length or not all(parts):
+        given = sum(bool(part) for part in parts)
+        raise ValueError(f"must be {spec.length} numbers with commas between them, has {given}")
+    return [_parse_number(spec, part) for part in parts]
+
+
+def _parse_number(spec: FieldSpec, typed: str) -> float:
+    """Return a number in the range of a field; an int for an `integer`."""
+    value = evaluated(typed)
+    if spec.kind == "integer":
+        if value != math.floor(value):
+            raise ValueError(f"must be a whole number, is {format_number(value)}")
+        value = int(value)
+    else:
+        value = float(value)
+    too_low = spec.low is not None and (value < spec.low or (spec.is_low_excluded and value == spec.low))
+    too_high = spec.high is not None and (value > spec.high or (spec.is_high_excluded and value == spec.high))
+    if too_low or too_high:
+        raise ValueError(f"must be {_range(spec)}, is {format_number(value)}")
+    return value
+
+
+def _range(spec: FieldSpec) -> str:
+    low = "" if spec.low is None else format_number(spec.low)
+    high = "" if spec.high is None else format_number(spec.high)
+    if low and high and not spec.is_low_excluded and not spec.is_high_excluded:
+        return f"between {low} and {high}"
+    least = f"{'greater than' if spec.is_low_excluded else 'at least'} {low}" if low else ""
+    most = f"{'less than' if spec.is_high_excluded else 'at most'} {high}" if high else ""
+    return " and ".join(filter(None, (least, most)))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= 20 else f"{text[:19]}…"
+
+
+_NO_NUMBER = "must be a number, such as 0.5, 1e-3, 1/60 or 2*pi"
+_CONSTANTS = {"pi": math.pi, "π": math.pi, "tau": math.tau, "deg": math.pi / 180.0}
+_FUNCTIONS: dict[str, Callable[[float], float]] = {
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "deg": math.radians,
+}
+_OPERATORS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+_FACTOR = re.compile(r"(?<=[0-9.)])\s*(?=(?:pi|π|tau|deg)\b)")
+"""place of an omitted multiplication sign, as in `45 deg`"""
+_EXPRESSION = re.compile(r"(?:(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w.])|[a-zπ]+|[-+*/()\s])*", re.ASCII)
+_LEADING_ZEROS = re.compile(r"(?<![\d.])0+(?=\d)")
+"""not allowed by the syntax of Python"""
+
+
+def evaluated(text: str) -> float:
+    """Return the value of a number or an expression; an int if it consists of whole numbers without a division.
+
+    Raises:
+        ValueError: it is no expression of numbers, or has no finite real value.
+    """
+    if len(text) > MAX_TYPED:
+        raise ValueError(f"must have at most {MAX_TYPED} characters, has {len(text)}")
+    source = _FACTOR.sub("*", text.replace("−", "-").replace("·", "*").replace("°", " deg").replace("^", "**"))
+    if _EXPRESSION.fullmatch(source) is None:
+        raise ValueError(_NO_NUMBER)
+    try:
+        value = _value(ast.parse(_LEADING_ZEROS.sub("", source.strip()), mode="eval").body)
+        is_finite = math.isfinite(value)
+    except (SyntaxError, TypeError, KeyError, MemoryError, RecursionError):
+        raise ValueError(_NO_NUMBER) from None
+    except ZeroDivisionError:
+        raise ValueError("must not divide by 0") from None
+    except OverflowError:
+        is_finite = False
+    except ValueError:  # such as the square root of a negative number
+        raise ValueError("must have a real value") from None
+    if not is_finite:
+        raise ValueError("must be a finite number")
+    return value
+
+
+def _value(node: ast.expr) -> float:
+    """Return the value of an expression.
+
+    Raises:
+        TypeError: a part of it is no number and no operation on numbers.
+        KeyError: an unknown constant, function or operation.
+        ArithmeticError, ValueError: an operation has no value.
+    """
+    match node:
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return number
+        case ast.Name(id=name):
+            return _CONSTANTS[name]
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            value = _value(operand)
+            return -value if value else -0.0
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return _value(operand)
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            return _power(_value(left), _value(right))
+        case ast.BinOp(left=left, op=operation, right=right):
+            return _OPERATORS[type(operation)](_value(left), _value(right))
+        case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]):
+            return _FUNCTIONS[name](_value(argument))
+    raise TypeError(node)
+
+
+def _power(base: float, exponent: float) -> float:
+    """Return a power; as an int only if it is small, as large ones take long."""
+    if isinstance(base, int) and isinstance(exponent, int) and 0 <= exponent * base.bit_length() <= 128:
+        return int(base**exponent)
+    return math.pow(base, exponent)
+
+
+def format_value(spec: FieldSpec, value: Any) -> str:
+    """Return the shortest text that `parse` reads as the value; "" for None. Kind `other` has a summary instead."""
+    if value is None:
+        return ""
+    match spec.kind:
+        case "number" | "integer":
+            return format_number(value)
+        case "numbers":
+            return ", ".join(map(format_number, value))
+        case "flag":
+            return "true" if value else "false"
+        case "other":
+            return summary(value)
+    return str(value)
+
+
+def format_number(value: float) -> str:
+    """Return the shortest text that `evaluated` reads as the value: a decimal number or, if far shorter, `1/60`.
+
+    An exponent is used only where it saves many digits.
+    """
+    if isinstance(value, int):
+        return str(value)
+    text = repr(value)
+    if len(text) > MAX_DECIMALS and 1 / MAX_DENOMINATOR <= abs(value) < 1:
+        denominator = round(1 / abs(value))
+        if 1 / denominator == abs(value):
+            return f"{'-' if value < 0 else ''}1/{denominator}"
+    mantissa, _, exponent = text.partition("e")
+    mantissa = mantissa.removesuffix(".0")
+    if exponent:
+        return f"{mantissa}e{int(exponent)}"
+    digits = mantissa.rstrip("0")
+    zeros = len(mantissa) - len(digits)
+    return f"{digits}e{zeros}" if "." not in mantissa and zeros >= 6 else mantissa
+
+
+def summary(value: Any) -> str:
+    """Return a short text of a value that has no text of its own, such as `5 points`; "" if it is empty."""
+    if value is None:
+        return ""
+    match value:
+        case () | []:
+            return ""
+        case str():
+            return value
+        case BaseModel():
+            return summary(value.model_dump(exclude_defaults=True))
+        case dict():
+            return ", ".join(map(str, value))
+        case list() | tuple():
+            if all(isinstance(each, str) for each in value):
+                return ", ".join(value)
+            if all(isinstance(each, int | float) for each in value):
+                return ", ".join(map(format_number, value))
+            is_table = isinstance(value[0], dict | BaseModel)
+            return f"{len(value)} {'table' if is_table else 'point'}{'s' if len(value) != 1 else ''}"
+    return str(value)

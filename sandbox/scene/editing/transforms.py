@@ -1,0 +1,208 @@
+"""Transformations of elements: translation, rotation, scaling and mirroring, as new values of their keys.
+
+A similarity x → R(θ)·F·(s·(x − c)) + c + d, with the mirror F, is applied to the places of an element (positions and
+corners in the world), to its angle, and to its lengths. Joints that name a point in the world move with their bodies.
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import BodySpec, Part, Point
+from sandbox.scene.description.bodies import Compound, Polygon
+from sandbox.scene.description.fixed import Plane, Zone
+from sandbox.scene.description.generators import Stack
+from sandbox.scene.description.joints import Anchored, Groove, Pivot, Pulley
+from sandbox.scene.editing.elements import ElementKey, all_elements, body_names, element_at
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Similarity of the plane: mirror, scale and rotate about a centre, then translate."""
+
+    centre: Point = (0.0, 0.0)
+    """m"""
+    angle: float = 0.0
+    """rad, counter-clockwise"""
+    scale: float = 1.0
+    """factor of all lengths, greater than 0"""
+    shift: Point = (0.0, 0.0)
+    """m"""
+    mirrored: bool = False
+    """reverse x before the rotation"""
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether nothing changes."""
+        return replace(self, centre=(0.0, 0.0)) == Similarity()
+
+    def point(self, point: Point) -> Point:
+        """Return the image of a point, m."""
+        x, y = self.vector((point[0] - self.centre[0], point[1] - self.centre[1]))
+        return x + self.centre[0] + self.shift[0], y + self.centre[1] + self.shift[1]
+
+    def vector(self, vector: Point) -> Point:
+        """Return the image of a difference of two points, m."""
+        x, y = self.direction(vector)
+        return self.scale * x, self.scale * y
+
+    def direction(self, vector: Point) -> Point:
+        """Return a vector mirrored and rotated; its length is kept."""
+        x, y = (-vector[0] if self.mirrored else vector[0]), vector[1]
+        if self.angle == 0.0:  # keeps the digits of the file
+            return x, y
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        return cos * x - sin * y, sin * x + cos * y
+
+    def angle_of(self, angle: float) -> float:
+        """Return the image of the angle of a body, rad."""
+        return (-angle if self.mirrored else angle) + self.angle
+
+
+LENGTHS = (
+    "radius", "length", "size", "spacing", "jitter", "gap", "thickness", "height", "softening", "rest_length"
+)  # fmt: skip
+"""Keys that scale with the size of an element"""
+PLACES = ("position", "point", "origin", "lower", "upper", "base", "start", "end", "corner", "at", "pivot")
+"""Keys that are a point in the world"""
+CANNOT_ROTATE = ("grid", "scatter", "emitter", "cloth", "ragdoll")
+"""Generators whose bodies are laid out along the axes: rotated or mirrored, only their place changes."""
+
+
+def transformed(element: Part, by: Similarity, *, is_whole: bool = True) -> dict[str, Any]:
+    """Return the keys of an element that a similarity changes, with their new values.
+
+    Args:
+        element: of a scene.
+        by: the similarity.
+        is_whole: transform also its shape and angle; otherwise only its place.
+    """
+    if by.is_identity:
+        return {}
+    values: dict[str, Any] = {}
+    for key in PLACES:
+        value = getattr(element, key, None)
+        if isinstance(value, tuple) and len(value) == 2 and not isinstance(value[0], tuple):
+            values[key] = by.point(value)
+    points = getattr(element, "points", None)
+    if points is not None and not isinstance(element, Polygon):
+        values["points"] = tuple(by.point(each) for each in points)
+    if isinstance(element, Plane):
+        values["normal"] = by.direction(element.normal)
+    if is_whole:
+        values |= _shape(element, by)
+    return {key: value for key, value in values.items() if not _equal(getattr(element, key, None), value)}
+
+
+def _shape(element: Part, by: Similarity) -> dict[str, Any]:
+    """Return the keys of angle, lengths and outline."""
+    values: dict[str, Any] = {}
+    if isinstance(element, BodySpec | Stack) and (by.angle or by.mirrored):
+        values["angle"] = _wrapped(by.angle_of(element.angle))
+    if isinstance(element, Polygon):
+        mirror = Similarity(mirrored=by.mirrored, scale=by.scale)
+        values["points"] = tuple(mirror.vector(each) for each in element.points)
+    if isinstance(element, Compound):
+        values |= _parts(element, Similarity(mirrored=by.mirrored, scale=by.scale))
+    if by.scale != 1.0:
+        for key in LENGTHS:
+            value = getattr(element, key, None)
+            if isinstance(value, tuple):
+                values[key] = tuple(by.scale * each for each in value)
+            elif isinstance(value, int | float) and not isinstance(value, bool):
+                values[key] = by.scale * value
+    return values
+
+
+def _parts(body: Compound, by: Similarity) -> dict[str, Any]:
+    """Return the parts of a compound body, scaled and mirrored in its frame."""
+    if by.is_identity:
+        return {}
+    found: dict[str, Any] = {}
+    for name in ("balls", "boxes", "capsules", "polygons"):
+        parts = getattr(body, name)
+        if parts:
+            alias = str(type(body).model_fields[name].alias)
+            found[alias] = [
+                each.model_dump(mode="json", by_alias=True, exclude_defaults=True) | _part(each, by) for each in parts
+            ]
+    return found
+
+
+def _part(part: Part, by: Similarity) -> dict[str, Any]:
+    values: dict[str, Any] = {"position": list(by.vector(getattr(part, "position")))}  # noqa: B009, of four types
+    if by.mirrored:
+        values["angle"] = -float(getattr(part, "angle"))  # noqa: B009
+    points = getattr(part, "points", None)
+    if points is not None:
+        values["points"] = [list(by.vector(each)) for each in points]
+    for key in ("radius", "length", "size"):
+        value = getattr(part, key, None)
+        if value is not None:
+            values[key] = [by.scale * each for each in value] if isinstance(value, tuple) else by.scale * value
+    return values
+
+
+def transformation(scene: Scene, keys: Collection[ElementKey], by: Similarity) -> Mapping[ElementKey, dict[str, Any]]:
+    """Return the new values of selected elements, and of the joints that hold only their bodies.
+
+    A joint names bodies; its point in the world moves with them if all of its bodies are among them.
+    """
+    moved = {name for key in keys for name in body_names(scene, key)}
+    found: dict[ElementKey, dict[str, Any]] = {}
+    for key in keys:
+        element = element_at(scene, key)
+        if key.table in ("joint", "drive"):
+            continue
+        found[key] = transformed(element, by, is_whole=key.table not in CANNOT_ROTATE or by.scale != 1.0)
+    for key, element in all_elements(scene):
+        if key.table == "drive" and getattr(element, "body", None) in moved:
+            found[key] = transformed(element, by, is_whole=False)
+        if key.table == "joint":
+            found[key] = _joint_values(element, moved, is_selected=key in keys, by=by)
+    return {key: values for key, values in found.items() if values}
+
+
+def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by: Similarity) -> dict[str, Any]:
+    """Return the new values of a joint whose bodies are moved, all or some of them."""
+    between = getattr(joint, "between", ())
+    are_all_moved = bool(between) and all(name in moved for name in between)
+    if isinstance(joint, Pivot) and joint.at is not None:
+        return {"at": by.point(joint.at)} if are_all_moved or (is_selected and not moved) else {}
+    is_to_world = len(between) == 1
+    if isinstance(joint, Pulley) and (is_selected or are_all_moved):
+        return {"wheels": tuple(by.point(each) for each in joint.wheels)} if is_selected else {}
+    if not (is_to_world and is_selected):
+        return {}
+    if isinstance(joint, Groove):
+        return {"groove": tuple(by.point(each) for each in joint.groove)}
+    if isinstance(joint, Anchored) or (isinstance(joint, Pivot) and joint.anchors is not None):
+        anchors = joint.anchors
+        assert anchors is not None
+        return {"anchors": (anchors[0], by.point(anchors[1]))}
+    return {}
+
+
+def place_of(element: Part) -> Point | None:
+    """Return a point that stands for the place of an element, m; None if it has none of its own."""
+    for key in PLACES:
+        value = getattr(element, key, None)
+        if isinstance(value, tuple) and len(value) == 2 and not isinstance(value[0], tuple):
+            return value[0], value[1]
+    points = getattr(element, "points", None)
+    if points and not isinstance(element, Zone | Polygon):
+        return points[0][0], points[0][1]
+    if points:
+        return points[0][0], points[0][1]
+    return None
+
+
+def _wrapped(angle: float) -> float:
+    """Return an angle within ±π if it is beyond ±2π, rad."""
+    return math.remainder(angle, math.tau) if abs(angle) > math.tau else angle
+
+
+def _equal(before: Any, after: Any) -> bool:
+    return bool(before == after)

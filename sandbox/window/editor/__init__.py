@@ -1,0 +1,1 @@
+"""Scene editor of the window."""

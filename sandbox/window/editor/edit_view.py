@@ -1,0 +1,396 @@
+"""Edit view: what the window shows and how it reacts while a scene is edited. Time stands at 0."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pygame
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Part
+from sandbox.scene.editing.draft import SceneDraft
+from sandbox.scene.editing.elements import ElementKey, element_at, name_of, table_values
+from sandbox.scene.editing.fields import fields_of
+from sandbox.scene.errors import SceneError
+from sandbox.window.context import WindowContext
+from sandbox.window.editor.editor import TOOLS, Editor, EditTool, ViewScale
+from sandbox.window.editor.gestures import OutlineGesture
+from sandbox.window.editor.overlay import draw_overlay
+from sandbox.window.editor.path_prompt import PathPrompt
+from sandbox.window.editor.picking import start_frame
+from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection
+from sandbox.window.editor.snapping import grid_step
+from sandbox.window.editor.toolbar import Toolbar
+from sandbox.window.input.keymap import Command
+from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.palette import FAINT, INK, ORANGE
+from sandbox.window.render.renderer import Renderer
+from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
+from sandbox.window.ui.hud import draw_messages
+
+ACTIONS = (
+    EditTool("play", "Space", "run the scene from the start"),
+    EditTool("undo", "Ctrl+Z", "undo"),
+    EditTool("redo", "Ctrl+Shift+Z", "redo"),
+    EditTool("save", "Ctrl+S", "save the scene file"),
+)
+ARROWS = {pygame.K_LEFT: (-1, 0), pygame.K_RIGHT: (1, 0), pygame.K_UP: (0, 1), pygame.K_DOWN: (0, -1)}
+TYPED = "0123456789.,-x "
+"""Characters that are typed into the dimensions of a gesture"""
+DELEGATED = {
+    pygame.K_HOME: Command.HOME,
+    pygame.K_TAB: Command.PANEL,
+    pygame.K_F1: Command.HELP,
+    pygame.K_h: Command.HELP,
+    pygame.K_F11: Command.FULL_SCREEN,
+}
+DELEGATED_WITH_CONTROL = {
+    pygame.K_p: Command.SCREENSHOT,
+    pygame.K_r: Command.RECORD,
+    pygame.K_o: Command.PICKER,
+}
+HELP_ROWS = (
+    *((tool.key.upper(), tool.about) for tool in TOOLS),
+    ("Shift+click", "add to the selection, or remove from it"),
+    ("Ctrl while dragging", "suspend snapping"),
+    ("digits while dragging", "type dimensions; Enter applies"),
+    ("Delete", "delete the selection"),
+    ("Arrows (Shift: × 10)", "move the selection by the grid"),
+    ("M or Shift+M", "mirror left and right, or up and down"),
+    ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
+    ("Ctrl+D or Ctrl+A", "duplicate; select all"),
+    ("Ctrl+Z or Ctrl+Shift+Z", "undo; redo"),
+    ("Ctrl+S or Ctrl+Shift+S", "save; save as"),
+    ("Ctrl+Shift+X", "take a preset apart"),
+    ("Space or Ctrl+E", "run the scene"),
+)
+"""Keys of edit mode, for the help page."""
+
+
+class EditView:
+    """Editing of a scene in the window.
+
+    Args:
+        context: the window.
+        draft: the draft of the scene.
+        leave: called to run the scene.
+        run_command: runs a command of the window.
+    """
+
+    def __init__(
+        self,
+        context: WindowContext,
+        draft: SceneDraft,
+        leave: Callable[[], None],
+        run_command: Callable[[Command], None],
+    ) -> None:
+        self._context, self._leave, self._run_command = context, leave, run_command
+        self.editor = Editor(draft, context.app_state.messages.add)
+        self.toolbar, self.actions = Toolbar(TOOLS), Toolbar(ACTIONS)
+        self.panel = PropertyPanel(context.surface.get_size(), context.gui.ui_scale)
+        self.panel.on_change = self._set_property
+        self.prompt: PathPrompt | None = None
+        self._renderer = Renderer()
+        self._shown: tuple[object, ...] = ()
+        self._button_held = False
+
+    @property
+    def draft(self) -> SceneDraft:
+        """The draft of the scene."""
+        return self.editor.draft
+
+    @property
+    def _view(self) -> ViewScale:
+        camera, gui = self._context.camera, self._context.gui
+        return ViewScale(camera.scale, gui.ui_scale, min(gui.area.size) / camera.scale)
+
+    # --- Events --------------------------------------------------------------------------------------------------
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Process an event; return whether it was consumed. Wheel, panning and window events are left to others."""
+        if self.prompt is not None and event.type in (pygame.KEYDOWN, pygame.TEXTINPUT, pygame.MOUSEBUTTONDOWN):
+            self._prompt(self.prompt, event)
+            return True
+        if self._context.gui.panel.visible and self.panel.handle_event(event):
+            return True
+        if event.type == pygame.KEYDOWN:
+            return self._press_key(event)
+        if event.type == pygame.TEXTINPUT:
+            return self._type(event.text)
+        if event.type in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION):
+            return self._mouse(event)
+        if event.type == pygame.WINDOWFOCUSLOST:
+            self._button_held = False
+            self.editor.cancel() if self.editor.gesture is not None else None
+        return False
+
+    def _mouse(self, event: pygame.event.Event) -> bool:
+        for bar, use in ((self.actions, self._use_action), (self.toolbar, self.editor.choose_tool)):
+            used, name = bar.handle_event(event)
+            if name is not None:
+                self.panel.commit()
+                use(name)
+            if used:
+                return True
+        point, view = self._context.camera.to_world(event.pos), self._view
+        modifiers = pygame.key.get_mods()
+        shift, control = bool(modifiers & pygame.KMOD_SHIFT), bool(modifiers & pygame.KMOD_CTRL)
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            self.panel.commit()
+            self._button_held = True
+            self.editor.press(point, view, shift=shift, control=control)
+            return True
+        if event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self._button_held:
+            self._button_held = False
+            self.editor.release(point, view, shift=shift, control=control)
+            return True
+        if event.type == pygame.MOUSEMOTION:
+            if self._button_held or self.editor.gesture is not None:
+                self.editor.move(point, view, control=control)
+            else:
+                self.editor.hover(point, view)
+        return False
+
+    def _press_key(self, event: pygame.event.Event) -> bool:
+        control, shift = bool(event.mod & pygame.KMOD_CTRL), bool(event.mod & pygame.KMOD_SHIFT)
+        if control:
+            self._press_control(event.key, shift)
+            return True
+        gesture = self.editor.gesture
+        if gesture is not None and self._press_in_gesture(event.key):
+            return True
+        if event.key == pygame.K_ESCAPE:
+            return self.editor.cancel()  # otherwise the window asks whether to quit
+        if event.key in DELEGATED:
+            self._run_command(DELEGATED[event.key])
+        elif event.key in (pygame.K_SPACE, pygame.K_p):
+            self._leave()
+        elif event.key in ARROWS:
+            step = grid_step(self._view.scale, self._view.ui_scale) * (10.0 if shift else 1.0)
+            x, y = ARROWS[event.key]
+            self.editor.nudge((x * step, y * step))
+        elif event.key in (pygame.K_DELETE, pygame.K_BACKSPACE):
+            self.editor.delete()
+        elif event.key == pygame.K_m:
+            self.editor.mirror(is_vertical=shift)
+        else:
+            name = next((tool.name for tool in TOOLS if pygame.key.name(event.key) == tool.key), None)
+            if name is not None:
+                self.editor.choose_tool(name)
+        return True
+
+    def _press_in_gesture(self, key: int) -> bool:
+        """Process a key while a gesture goes on; return whether it has a meaning there."""
+        gesture = self.editor.gesture
+        assert gesture is not None
+        if key in (pygame.K_RETURN, pygame.K_KP_ENTER):
+            if isinstance(gesture, OutlineGesture) and gesture.typed:
+                gesture.click(gesture.end)
+            else:
+                self.editor.finish()
+            return True
+        if key == pygame.K_BACKSPACE and gesture.typed:
+            self.editor.type_text(gesture.typed[:-1])
+            return True
+        if key == pygame.K_BACKSPACE and isinstance(gesture, OutlineGesture):
+            if not gesture.remove_corner():
+                self.editor.cancel()
+            return True
+        name = pygame.key.name(key)
+        return key == pygame.K_SPACE or (len(name) == 1 and name in TYPED)  # comes as text, too
+
+    def _type(self, text: str) -> bool:
+        gesture = self.editor.gesture
+        if gesture is not None and text and all(letter in TYPED for letter in text):
+            self.editor.type_text((gesture.typed + text).lstrip())
+        return True
+
+    def _press_control(self, key: int, shift: bool) -> None:
+        editor, view = self.editor, self._view
+        self.panel.commit()
+        if key == pygame.K_e:
+            self._leave()
+        elif key == pygame.K_s:
+            self.save(is_new=shift)
+        elif key == pygame.K_z:
+            (editor.redo if shift else editor.undo)()
+        elif key == pygame.K_y:
+            editor.redo()
+        elif key == pygame.K_x:
+            (editor.take_apart if shift else editor.cut)()
+        elif key == pygame.K_c:
+            editor.copy()
+        elif key == pygame.K_v:
+            editor.paste(view)
+        elif key == pygame.K_d:
+            editor.duplicate(view)
+        elif key == pygame.K_a:
+            editor.select_all()
+        elif key in DELEGATED_WITH_CONTROL:
+            self._run_command(DELEGATED_WITH_CONTROL[key])
+        self._note_unsaved()
+
+    def _use_action(self, name: str) -> None:
+        actions: dict[str, Callable[[], object]] = {
+            "play": self._leave,
+            "undo": self.editor.undo,
+            "redo": self.editor.redo,
+            "save": self.save,
+        }
+        actions[name]()
+
+    # --- Files ---------------------------------------------------------------------------------------------------
+
+    def save(self, is_new: bool = False) -> None:
+        """Save the draft to its file; ask for one if it has none or another is wanted."""
+        path = self.draft.path
+        if path is None or is_new:
+            self.prompt = PathPrompt(path or Path.cwd() / "scene.toml")
+            return
+        if self.draft.is_file_changed():
+            self.prompt = PathPrompt(path)
+            self.prompt.note = f"{path.name} was changed by another program; save it under another name, or replace it"
+            return
+        self._write(path)
+
+    def _prompt(self, prompt: PathPrompt, event: pygame.event.Event) -> None:
+        path = prompt.handle_event(event)
+        if prompt.is_closed or (path is not None and self._write(path)):
+            self.prompt = None
+
+    def _write(self, path: Path) -> bool:
+        """Write the draft to a file; return whether that succeeded."""
+        try:
+            self.draft.save(path)
+        except SceneError as error:
+            message = error.faults[0].message
+            if self.prompt is not None:
+                self.prompt.note = message
+            self._context.app_state.messages.add(f"{path.name}: {message}", "error")
+            return False
+        self._context.notify(f"saved: {path}")
+        self._note_unsaved()
+        return True
+
+    def _note_unsaved(self) -> None:
+        self._context.app_state.has_unsaved_draft = self.draft.is_changed
+
+    # --- Properties ----------------------------------------------------------------------------------------------
+
+    def _sections(self) -> list[PropertySection]:
+        editor, scene = self.editor, self.draft.scene
+        if editor.selection:
+            tables = dict.fromkeys(key.table for key in editor.selection)
+            return [_section_of(scene, table, self._selected_in(table)) for table in tables]
+        sections = [
+            PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about"))),
+            PropertySection("world", "world", _rows(type(scene.world), [scene.world])),
+            PropertySection("solver", "solver", _rows(type(scene.solver), [scene.solver])),
+        ]
+        for k, material in enumerate(scene.materials):
+            rows = _rows(type(material), [material])
+            sections.append(PropertySection(f"material {material.name}", f"material:{k}", rows, is_open=False))
+        return sections
+
+    def _selected_in(self, table: str) -> list[ElementKey]:
+        """Return the selected elements of a table."""
+        return [key for key in self.editor.selection if key.table == table]
+
+    def _set_property(self, section: str, field: str, value: Any) -> str | None:
+        kind, _, which = section.partition(":")
+        if kind == "selection":
+            found = self.editor.set_property(self._selected_in(which), field, value)
+        elif kind == "material":
+            found = self.editor.set_property([ElementKey("material", int(which))], field, value)
+        else:
+            found = self.editor.set_property("" if section == "scene" else section, field, value)
+        self._note_unsaved()
+        return found
+
+    # --- Drawing -------------------------------------------------------------------------------------------------
+
+    def draw(self, surface: pygame.Surface) -> None:
+        """Draw the scene, the overlay of the editor, its toolbar and the property panel."""
+        context, gui, editor = self._context, self._context.gui, self.editor
+        scene = editor.scene
+        overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
+        snapshot = Snapshot(scene, scene.bodies, start_frame(scene), overlays=frozenset(overlays))
+        self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
+        draw_overlay(surface, context.camera, editor, self._view)
+        area = gui.area
+        self.toolbar.layout(area, gui.ui_scale)
+        self.toolbar.draw(surface, editor.tool, gui.ui_scale)
+        self._draw_status(surface, area)
+        if gui.panel.visible:
+            self._show_panel(surface.get_size())
+            self.panel.draw(surface)
+        messages = context.app_state.messages.visible()
+        free = area.inflate(-round(24 * gui.ui_scale), -round(24 * gui.ui_scale))
+        free.left = self.toolbar.rect.right + round(10 * gui.ui_scale)
+        draw_messages(surface, messages, free, [], 13.0 * gui.ui_scale)
+        self.toolbar.draw_hint(surface, gui.ui_scale)
+        self.actions.draw_hint(surface, gui.ui_scale)
+        if self.prompt is not None:
+            self.prompt.draw(surface, gui.ui_scale)
+
+    def _show_panel(self, size: tuple[int, int]) -> None:
+        """Update the property panel if the selection or the draft has changed."""
+        gui, editor = self._context.gui, self.editor
+        state = (tuple(editor.selection), self.draft.text, size, gui.ui_scale)
+        if state == self._shown:
+            return
+        self._shown = state
+        if (self.panel.width, size) != (gui.panel.width, size):
+            self.panel.resize(size, gui.ui_scale)
+        note = ""
+        if editor.is_locked:
+            note = f"[{self.draft.preset}] makes this scene. Ctrl+Shift+X replaces it by its elements, to edit them."
+        self.panel.show(self._sections(), note)
+        self._note_unsaved()
+
+    def _draw_status(self, surface: pygame.Surface, area: pygame.Rect) -> None:
+        """Draw the plate with the file, its state and the buttons of actions."""
+        ui_scale = self._context.gui.ui_scale
+        size, pad = 13.0 * ui_scale, round(6 * ui_scale)
+        path = self.draft.path
+        name = ("new scene" if path is None else path.name) + (" ●" if self.draft.is_changed else "")
+        grid = grid_step(self._view.scale, ui_scale)
+        detail = f"grid {grid:g} m"
+        left, top = self.toolbar.rect.right + pad, self.toolbar.rect.top
+        self.actions.layout_row((left, top), ui_scale)
+        x = self.actions.rect.right + pad
+        width = area.right - x - 2 * pad
+        if width < 8 * size:
+            self.actions.draw(surface, "", ui_scale)
+            return
+        name = ellipsis(name, size, width - 9 * size, True)
+        wide = max(text_size(name, size, bold=True)[0], text_size(detail, 0.85 * size)[0])
+        badge = text_size("EDIT", size, bold=True)[0]
+        rect = pygame.Rect(x, top, wide + badge + 4 * pad, self.actions.rect.height)
+        draw_box(surface, rect, 7 * ui_scale)
+        draw_text(surface, "EDIT", (x + pad, rect.centery), size, ORANGE, "midleft", bold=True)
+        draw_text(surface, name, (x + badge + 3 * pad, rect.top + 0.32 * rect.height), size, INK, "midleft", bold=True)
+        at = x + badge + 3 * pad, rect.top + 0.74 * rect.height
+        draw_text(surface, detail, at, 0.85 * size, FAINT, "midleft", mono=True)
+        self.actions.draw(surface, "", ui_scale)
+
+
+def _section_of(scene: Scene, table: str, keys: Sequence[ElementKey]) -> PropertySection:
+    """Return the section of the selected elements of a table."""
+    title = f"{table} {name_of(scene, keys[0])}" if len(keys) == 1 else f"{len(keys)} × {table}"
+    elements = [element_at(scene, key) for key in keys]
+    return PropertySection(title, f"selection:{table}", _rows(type(elements[0]), elements))
+
+
+def _rows(model: type[Part], parts: Sequence[Part], only: tuple[str, ...] = ()) -> tuple[PropertyRow, ...]:
+    """Return the rows of the fields that all parts have."""
+    values = [table_values(part) for part in parts]
+    common = set.intersection(*({spec.key for spec in fields_of(type(part))} for part in parts))
+    rows = []
+    for spec in fields_of(model):
+        if spec.key not in common or (only and spec.key not in only):
+            continue
+        found = [each.get(spec.key) for each in values]
+        is_mixed = any(value != found[0] for value in found)
+        rows.append(PropertyRow(spec, None if is_mixed else found[0], is_mixed))
+    return tuple(rows)

@@ -1,0 +1,644 @@
+"""Editor: the draft of a scene, the selection and the tools, in world coordinates, m. No drawing and no events."""
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from sandbox.scene.compile.generators import GeneratorError
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Part, Point
+from sandbox.scene.description.bodies import Polygon
+from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
+from sandbox.scene.editing.draft import SceneDraft
+from sandbox.scene.editing.elements import (
+    FIELD_OF,
+    ElementKey,
+    all_elements,
+    all_names,
+    element_at,
+    exists,
+    name_of,
+    removal,
+    renaming,
+    unique_name,
+)
+from sandbox.scene.editing.transforms import Similarity, transformation
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.toml_changes import Change, RemoveValue, SetValue, TextEditError
+from sandbox.window.editor.gestures import (
+    BoxGesture,
+    CapsuleGesture,
+    DiscGesture,
+    DrawGesture,
+    Gesture,
+    MoveGesture,
+    OutlineGesture,
+    PlaneGesture,
+    RotateGesture,
+    ScaleGesture,
+    SelectGesture,
+    VertexGesture,
+    default_size,
+    preview_of,
+    set_values,
+)
+from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointError, JointGesture
+from sandbox.window.editor.picking import bounds_of, elements_at, pick_element
+from sandbox.window.editor.snapping import REACH, grid_step, snap_point, surface_shift
+
+MessageCallback = Callable[[str, str], None]
+"""Callback with a text and a level, `info`, `warning` or `error`."""
+HandleKind = Literal["scale", "rotate", "vertex"]
+ROTATE_DISTANCE = 26.0
+"""px at UI scale 1 of the handle for rotation above the selection"""
+HANDLE_REACH = 9.0
+"""px at UI scale 1 within which a handle is picked"""
+PICK_REACH = 6.0
+"""px at UI scale 1 beside an element within which it is picked"""
+DRAG_REACH = 4.0
+"""px at UI scale 1 that the pointer moves before a press becomes a drag"""
+MAX_VERTICES = 200
+"""Corners of an element that have handles"""
+
+
+@dataclass(frozen=True)
+class EditTool:
+    """Tool of the editor."""
+
+    name: str
+    key: str
+    """letter or digit that chooses it"""
+    about: str
+
+
+TOOLS = (
+    EditTool("select", "v", "select, move, rotate, scale"),
+    EditTool("ball", "b", "ball: drag from its centre"),
+    EditTool("box", "x", "box: drag from corner to corner"),
+    EditTool("capsule", "c", "capsule: drag from end to end"),
+    EditTool("polygon", "y", "polygon: click its corners"),
+    EditTool("plane", "l", "plane: drag along its surface; solid to the right"),
+    EditTool("wall", "w", "wall: click its corners; Enter ends it"),
+    EditTool("post", "t", "post: drag from its centre"),
+    EditTool("zone", "z", "zone: click its corners"),
+    EditTool("rod", "1", "rod: click two bodies, or a body and the world"),
+    EditTool("pivot", "2", "pivot: click one or two bodies"),
+    EditTool("rope", "3", "rope: click two bodies, or a body and the world"),
+    EditTool("spring", "4", "spring: click two bodies, or a body and the world"),
+    EditTool("motor", "5", "motor with its pivot: click one or two bodies"),
+    EditTool("eraser", "e", "eraser: click or drag over elements"),
+)
+"""All tools, in the order of the toolbar."""
+
+
+@dataclass(frozen=True)
+class EditHandle:
+    """Handle of the selection."""
+
+    kind: HandleKind
+    index: int
+    """of the corner"""
+    point: Point
+    """m"""
+
+
+class ViewScale(NamedTuple):
+    """What gestures need to know of the camera."""
+
+    scale: float
+    """px/m"""
+    ui_scale: float
+    size: float
+    """m, shorter side of the visible area"""
+
+    def metres(self, pixels: float) -> float:
+        """Return a length of pixels at UI scale 1, m."""
+        return pixels * self.ui_scale / self.scale
+
+
+class Editor:
+    """The draft of a scene, the selection, and the tool in use.
+
+    Args:
+        draft: the draft.
+        notify: callback with messages.
+    """
+
+    def __init__(self, draft: SceneDraft, notify: MessageCallback = lambda _text, _level: None) -> None:
+        self.draft = draft
+        self._notify = notify
+        self.selection: list[ElementKey] = []
+        self.tool = "select"
+        self.gesture: Gesture | None = None
+        self.hovered: ElementKey | None = None
+        """element under the pointer"""
+        self.is_dragging = False
+        """whether the pointer has moved far enough since the press"""
+        self.fault: tuple[list[ElementKey], str] | None = None
+        """elements and message of the last change that was refused"""
+        self._pressed: Point | None = None  # raw
+        self._pressed_key: ElementKey | None = None
+        self._was_selected = False  # whether only that element was selected before the press
+        self._clip: tuple[CopiedElement, ...] = ()
+        self._pastes = 0
+        self._preview: tuple[Gesture, Scene] | None = None  # until the gesture changes
+        self.snapped: tuple[Point, str] | None = None
+        """point and kind to which the pointer has snapped"""
+        self.pointer: Point | None = None
+
+    # --- State ---------------------------------------------------------------------------------------------------
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as drawn: that of the draft, with the effect of the present gesture."""
+        gesture = self.gesture
+        if gesture is None:
+            return self.draft.scene
+        if self._preview is None or self._preview[0] is not gesture:
+            self._preview = gesture, self._compiled(gesture)
+        return self._preview[1]
+
+    def _compiled(self, gesture: Gesture) -> Scene:
+        """Return the preview of a gesture; the scene of the draft if it cannot be compiled."""
+        try:
+            preview = gesture.preview()
+            preview.bodies  # noqa: B018, compiles it
+        except (ArithmeticError, ValueError, GeneratorError):  # such as an outline without an area
+            return self.draft.scene
+        return preview
+
+    def type_text(self, text: str) -> None:
+        """Replace the typed dimensions of the gesture."""
+        self._preview = None
+        if self.gesture is not None:
+            self.gesture.type_text(text)
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether the elements come from a preset, and cannot be edited before it is taken apart."""
+        return self.draft.preset is not None
+
+    def choose_tool(self, name: str) -> None:
+        """Choose a tool, and cancel a gesture."""
+        self.cancel()
+        self.tool = name
+
+    def selected(self) -> list[tuple[ElementKey, Part]]:
+        """Return the selected elements."""
+        return [(key, element_at(self.draft.scene, key)) for key in self.selection]
+
+    def selection_bounds(self, scene: Scene | None = None) -> tuple[Point, Point] | None:
+        """Return the corners of the box around the selection, m; None without bounded elements."""
+        scene = scene or self.scene
+        boxes = [bounds_of(scene, key) for key in self.selection if exists(scene, key)]
+        found = [box for box in boxes if box is not None]
+        if not found:
+            return None
+        return (
+            (min(low[0] for low, _ in found), min(low[1] for low, _ in found)),
+            (max(high[0] for _, high in found), max(high[1] for _, high in found)),
+        )
+
+    def handles(self, view: ViewScale) -> list[EditHandle]:
+        """Return the handles of the selection."""
+        scene = self.scene
+        if self.tool != "select" or not self.selection or isinstance(self.gesture, SelectGesture):
+            return []
+        found = self._vertex_handles(scene)
+        box = self.selection_bounds(scene)
+        if box is None or all(key.table in ("joint", "thrust", "attraction", "drive") for key in self.selection):
+            return found
+        (left, bottom), (right, top) = box
+        margin = view.metres(7.0)
+        left, bottom, right, top = left - margin, bottom - margin, right + margin, top + margin
+        corners = (left, bottom), (right, bottom), (right, top), (left, top)
+        found += [EditHandle("scale", k, corner) for k, corner in enumerate(corners)]
+        return [*found, EditHandle("rotate", 0, (0.5 * (left + right), top + view.metres(ROTATE_DISTANCE)))]
+
+    def _vertex_handles(self, scene: Scene) -> list[EditHandle]:
+        if len(self.selection) != 1 or not exists(scene, self.selection[0]):
+            return []
+        element = element_at(scene, self.selection[0])
+        points = getattr(element, "points", None)
+        if not points or len(points) > MAX_VERTICES:
+            return []
+        dx, dy = element.position if isinstance(element, Polygon) else (0.0, 0.0)
+        if isinstance(element, Polygon) and element.angle:
+            return []
+        return [EditHandle("vertex", k, (x + dx, y + dy)) for k, (x, y) in enumerate(points)]
+
+    # --- Mouse ---------------------------------------------------------------------------------------------------
+
+    def hover(self, point: Point, view: ViewScale) -> None:
+        """Note the element under the pointer."""
+        self.pointer = point
+        if self.gesture is None and not self.is_locked:
+            self.hovered = pick_element(self.draft.scene, point, view.metres(PICK_REACH))
+
+    def handle_at(self, point: Point, view: ViewScale) -> EditHandle | None:
+        """Return the handle at a point."""
+        reach = view.metres(HANDLE_REACH)
+        near = [handle for handle in self.handles(view) if math.dist(handle.point, point) <= reach]
+        return min(near, key=lambda handle: math.dist(handle.point, point), default=None)
+
+    def press(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
+        """Press the left button at a point."""
+        self.fault = self._preview = None
+        if self.is_locked:
+            self._notify(f"[{self.draft.preset}] makes this scene; Ctrl+Shift+X takes it apart", "warning")
+            return
+        if self.gesture is not None and self.gesture.is_multi_click:
+            self._click_again(point, view, control)
+            return
+        self.is_dragging, self._pressed = False, point
+        if self.tool == "select":
+            self._press_select(point, view, shift)
+        elif self.tool == "eraser":
+            self._erase(point, view)
+        else:
+            self.gesture = self._new_gesture(point, view, control)
+            if isinstance(self.gesture, JointGesture) and self.tool in ONE_CLICK:
+                self.finish()
+
+    def _press_select(self, point: Point, view: ViewScale, shift: bool) -> None:
+        scene, handle = self.draft.scene, self.handle_at(point, view)
+        self._pressed_key = None
+        if handle is not None:
+            self.gesture = self._handle_gesture(handle)
+            return
+        found = elements_at(scene, point, view.metres(PICK_REACH))
+        key = next((each for each in found if self.selection == [each]), found[0] if found else None)
+        self._pressed_key, self._was_selected = key, self.selection == [key]
+        if key is None:
+            self.gesture = SelectGesture(scene, point, self.selection if shift else ())
+            if not shift:
+                self.selection = []
+        elif shift:
+            self.selection = (
+                [each for each in self.selection if each != key]
+                if key in self.selection
+                else [
+                    *self.selection,
+                    key,
+                ]
+            )
+        elif key not in self.selection:
+            self.selection = [key]
+
+    def _handle_gesture(self, handle: EditHandle) -> Gesture:
+        scene, box = self.draft.scene, self.selection_bounds(self.draft.scene)
+        if handle.kind == "vertex":
+            element = element_at(scene, self.selection[0])
+            offset = element.position if isinstance(element, Polygon) else (0.0, 0.0)
+            return VertexGesture(scene, self.selection[0], handle.index, offset)
+        assert box is not None
+        (left, bottom), (right, top) = box
+        if handle.kind == "rotate":
+            return RotateGesture(scene, self.selection, (0.5 * (left + right), 0.5 * (bottom + top)), handle.point)
+        corners = (left, bottom), (right, bottom), (right, top), (left, top)
+        return ScaleGesture(scene, self.selection, corners[(handle.index + 2) % 4], corners[handle.index])
+
+    def _new_gesture(self, point: Point, view: ViewScale, control: bool) -> Gesture:
+        """Return the gesture that a press of a drawing tool begins."""
+        scene, tool = self.draft.scene, self.tool
+        tolerance = view.metres(PICK_REACH)
+        if tool in JOINT_KINDS:
+            end = JointEnd(point, self._snap(point, view, control))
+            return JointGesture(scene, tool, unique_name(tool, all_names(scene)), end, tolerance)
+        point = self._snap(point, view, control)
+        name, size = unique_name(tool, all_names(scene)), default_size(view.size)
+        kinds: dict[str, type[DrawGesture]] = {
+            "ball": DiscGesture,
+            "post": DiscGesture,
+            "box": BoxGesture,
+            "capsule": CapsuleGesture,
+            "plane": PlaneGesture,
+        }
+        if tool in kinds:
+            return kinds[tool](scene, tool, name, point, size)
+        thickness = 0.2 * size if tool == "wall" else 0.0
+        return OutlineGesture(scene, tool, name, point, size, view.metres(REACH), thickness)
+
+    def move(self, point: Point, view: ViewScale, *, control: bool = False) -> None:
+        """Move the pointer to a point while the button is down, or between clicks."""
+        self.pointer, self._preview = point, None
+        if self._pressed is not None and math.dist(point, self._pressed) > view.metres(DRAG_REACH):
+            if not self.is_dragging and self.gesture is None and self._pressed_key in self.selection:
+                self.gesture = MoveGesture(self.draft.scene, self.selection, self._pressed)
+            self.is_dragging = True
+        if self.tool == "eraser" and self._pressed is not None:
+            self._erase(point, view)
+        gesture = self.gesture
+        if gesture is None or gesture.typed or not (self.is_dragging or gesture.is_multi_click):
+            return
+        if isinstance(gesture, MoveGesture):
+            self._drag(gesture, point, view, control)
+        elif isinstance(gesture, RotateGesture):
+            gesture.is_snapped = not control
+            gesture.move(point)
+        elif isinstance(gesture, JointGesture):
+            gesture.move_end(JointEnd(point, self._snap(point, view, control)))
+        elif isinstance(gesture, SelectGesture):
+            gesture.move(point)
+        else:
+            gesture.move(self._snap(point, view, control))
+
+    def _drag(self, gesture: MoveGesture, point: Point, view: ViewScale, control: bool) -> None:
+        """Move elements so that the first one lies on the grid, or touches a plane that is near."""
+        assert self._pressed is not None
+        way = point[0] - self._pressed[0], point[1] - self._pressed[1]
+        gesture.shift_by(way)
+        self.snapped = None
+        if control:
+            return
+        box = bounds_of(self.draft.scene, self.selection[0])
+        anchor = _anchor(element_at(self.draft.scene, self.selection[0]), box)
+        if anchor is not None:
+            target = anchor[0] + way[0], anchor[1] + way[1]
+            found = snap_point(self.draft.scene, target, view.scale, view.ui_scale, self.selection)
+            gesture.shift_by((found.point[0] - anchor[0], found.point[1] - anchor[1]))
+            self.snapped = (found.point, found.to) if found.to != "grid" else None
+        contact = surface_shift(gesture.preview(), self.selection, view.scale, view.ui_scale)
+        if contact is not None:
+            x, y = gesture.by.shift
+            gesture.shift_by((x + contact[0], y + contact[1]))
+
+    def _snap(self, point: Point, view: ViewScale, control: bool) -> Point:
+        if control:
+            self.snapped = None
+            return point
+        found = snap_point(self.draft.scene, point, view.scale, view.ui_scale)
+        self.snapped = (found.point, found.to) if found.to != "grid" else None
+        return found.point
+
+    def release(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
+        """Release the left button at a point."""
+        gesture = self.gesture
+        self.move(point, view, control=control)
+        pressed, dragged = self._pressed, self.is_dragging
+        self._pressed, self.is_dragging = None, False
+        if gesture is None and self.gesture is None:
+            if self._pressed_key is not None and not dragged and not shift and pressed is not None:
+                self.selection = [self._next_at(pressed, view)]
+            return
+        gesture = self.gesture
+        assert gesture is not None
+        if gesture.is_multi_click and not (isinstance(gesture, JointGesture) and dragged):
+            return
+        self.finish()
+
+    def _next_at(self, point: Point, view: ViewScale) -> ElementKey:
+        """Return the element that a click selects: the topmost one, or the one below the one that was selected."""
+        assert self._pressed_key is not None
+        found = elements_at(self.draft.scene, point, view.metres(PICK_REACH))
+        if not self._was_selected or self._pressed_key not in found:
+            return self._pressed_key
+        return found[(found.index(self._pressed_key) + 1) % len(found)]
+
+    def _click_again(self, point: Point, view: ViewScale, control: bool) -> None:
+        gesture = self.gesture
+        assert gesture is not None
+        if isinstance(gesture, JointGesture):
+            gesture.move_end(JointEnd(point, self._snap(point, view, control)))
+            self.finish()
+        elif gesture.click(self._snap(point, view, control)):
+            self.finish()
+
+    def finish(self) -> bool:
+        """Finish the gesture, and apply its changes; return whether that succeeded."""
+        gesture, self.gesture, self.snapped = self.gesture, None, None
+        self._pressed, self.is_dragging = None, False
+        if gesture is None:
+            return False
+        try:
+            changes = gesture.changes()
+        except JointError as error:
+            self._notify(str(error), "warning")
+            return False
+        selects = gesture.selects
+        if isinstance(gesture, SelectGesture):
+            self.selection = list(selects or ())
+            return True
+        if not changes or not self.apply(changes, gesture.label):
+            return False
+        if selects is not None:
+            self.selection = [key for key in selects if exists(self.draft.scene, key)]
+        return True
+
+    def cancel(self) -> bool:
+        """Cancel the gesture, else clear the selection, else choose the select tool; return whether any applied."""
+        self.snapped, self._pressed, self.is_dragging = None, None, False
+        if self.gesture is not None:
+            self.gesture = None
+            return True
+        if self.selection:
+            self.selection = []
+            return True
+        if self.tool != "select":
+            self.tool = "select"
+            return True
+        return False
+
+    def _erase(self, point: Point, view: ViewScale) -> None:
+        key = pick_element(self.draft.scene, point, view.metres(PICK_REACH))
+        if key is not None and (self.is_dragging is False or key.table != "plane"):
+            self.selection = []
+            self.apply(removal(self.draft.scene, [key]), f"erase {name_of(self.draft.scene, key)}")
+            self.hovered = None
+
+    # --- Operations ----------------------------------------------------------------------------------------------
+
+    def apply(self, changes: Sequence[Change], label: str, merge: str | None = None) -> bool:
+        """Apply changes to the draft; return whether that succeeded. Faults are shown at the selected elements."""
+        try:
+            self.draft.change(changes, label, merge)
+        except SceneError as error:
+            message = "; ".join(fault.message for fault in error.faults[:2])
+            self.fault = list(self.selection), message
+            self._notify(message, "error")
+            return False
+        except TextEditError as error:
+            self._notify(str(error), "error")
+            return False
+        self.fault = None
+        self.hovered = None if self.hovered is None or not exists(self.draft.scene, self.hovered) else self.hovered
+        return True
+
+    def delete(self) -> None:
+        """Delete the selection, and the joints and forces of its bodies."""
+        keys = self._selection_or_note()
+        if keys:
+            self.selection = []
+            if not self.apply(removal(self.draft.scene, keys), f"delete {_count(keys)}"):
+                self.selection = keys
+
+    def select_all(self) -> None:
+        """Select all elements with a place."""
+        hidden = ("material", "pair", "drive")
+        self.selection = [key for key, _ in all_elements(self.draft.scene) if key.table not in hidden]
+
+    def copy(self) -> None:
+        """Copy the selection."""
+        keys = self._selection_or_note()
+        if keys:
+            self._clip, self._pastes = copied(self.draft.scene, keys), 0
+
+    def cut(self) -> None:
+        """Copy and delete the selection."""
+        self.copy()
+        if self.selection:
+            self.delete()
+
+    def paste(self, view: ViewScale) -> None:
+        """Add copies of what was copied, beside it, and select them."""
+        if not self._clip:
+            self._notify("nothing was copied; Ctrl+C copies the selection", "warning")
+            return
+        self._pastes += 1
+        self._add_copies(self._clip, paste_shift(grid_step(view.scale, view.ui_scale), self._pastes), "paste")
+
+    def duplicate(self, view: ViewScale) -> None:
+        """Add copies of the selection beside it, and select them."""
+        keys = self._selection_or_note()
+        if keys:
+            shift = paste_shift(grid_step(view.scale, view.ui_scale), 1)
+            self._add_copies(copied(self.draft.scene, keys), shift, "duplicate")
+
+    def _add_copies(self, elements: tuple[CopiedElement, ...], shift: Point, label: str) -> None:
+        changes, keys = pasting(self.draft.scene, elements, Similarity(shift=shift))
+        if changes and self.apply(changes, f"{label} {_count(keys)}"):
+            self.tool = "select"
+            self.selection = [key for key in keys if key.table not in ("drive",)]
+
+    def nudge(self, shift: Point) -> None:
+        """Move the selection by a vector, m."""
+        if self.selection:
+            values = transformation(self.draft.scene, self.selection, Similarity(shift=shift))
+            self.apply(set_values(values), f"move {_count(self.selection)}", "nudge")
+
+    def mirror(self, *, is_vertical: bool = False) -> None:
+        """Mirror the selection about the middle of its box, left and right or up and down."""
+        box = self.selection_bounds(self.draft.scene)
+        if box is None or not self._selection_or_note():
+            return
+        centre = 0.5 * (box[0][0] + box[1][0]), 0.5 * (box[0][1] + box[1][1])
+        by = Similarity(centre, angle=math.pi if is_vertical else 0.0, mirrored=True)
+        values = transformation(self.draft.scene, self.selection, by)
+        self.apply(set_values(values), f"mirror {_count(self.selection)}")
+
+    def align(self, side: Literal["left", "right", "top", "bottom", "middle", "centre"]) -> None:
+        """Align the selected elements by a side of their boxes, with the box of all of them."""
+        box = self.selection_bounds(self.draft.scene)
+        if box is None or len(self.selection) < 2:
+            self._notify("select two or more elements to align", "warning")
+            return
+        values: dict[ElementKey, dict[str, Any]] = {}
+        for key in self.selection:
+            own = bounds_of(self.draft.scene, key)
+            if own is not None:
+                values |= transformation(self.draft.scene, [key], Similarity(shift=_alignment(own, box, side)))
+        self.apply(set_values(values), f"align {_count(self.selection)}")
+
+    def undo(self) -> None:
+        """Undo the last change."""
+        self.gesture = None
+        label = self.draft.undo()
+        self._after_history("undone", label)
+
+    def redo(self) -> None:
+        """Do the last undone change again."""
+        self.gesture = None
+        self._after_history("redone", self.draft.redo())
+
+    def _after_history(self, what: str, label: str | None) -> None:
+        self.fault = None
+        self.selection = [key for key in self.selection if exists(self.draft.scene, key)]
+        self.hovered = None
+        self._notify(f"nothing to be {what}" if label is None else f"{what}: {label}", "info")
+
+    def take_apart(self) -> None:
+        """Replace the preset of the scene by its elements."""
+        preset = self.draft.preset
+        if preset is None:
+            self._notify("the scene has no preset", "warning")
+            return
+        self.draft.take_apart_preset()
+        self._notify(f"[{preset}] was replaced by its elements, without comments", "info")
+
+    def _selection_or_note(self) -> list[ElementKey]:
+        if not self.selection:
+            self._notify("select something first: click it", "warning")
+        return list(self.selection)
+
+    # --- Properties ----------------------------------------------------------------------------------------------
+
+    def set_property(self, keys: Collection[ElementKey] | str, name: str, value: Any) -> str | None:
+        """Set a key of elements, or of a single table; return the message of a fault, or None.
+
+        Args:
+            keys: the elements, or the heading of a single table, such as `world`.
+            name: the key.
+            value: the new value; None removes the key.
+        """
+        scene = self.draft.scene
+        changes: list[Change] = []
+        if isinstance(keys, str):
+            location: tuple[str | int, ...] = (keys, name) if keys else (name,)
+            changes = [RemoveValue(location) if value is None else SetValue(location, value)]
+            label = f"set {name}"
+        else:
+            label = f"set {name} of {_count(list(keys))}"
+            for key in keys:
+                if name == "name" and value is not None:
+                    changes += renaming(scene, key, value if len(keys) == 1 else unique_name(value, all_names(scene)))
+                else:
+                    changes.append(
+                        RemoveValue((*key.location, name)) if value is None else SetValue((*key.location, name), value)
+                    )
+        try:
+            self.draft.change(changes, label)
+        except SceneError as error:
+            return "; ".join(fault.message for fault in error.faults[:2])
+        except TextEditError as error:
+            return str(error)
+        self.fault = None
+        return None
+
+
+def _anchor(element: Part, box: tuple[Point, Point] | None) -> Point | None:
+    """Return the point of an element that lies on the grid when it is moved, m."""
+    for name in ("position", "origin", "base", "start", "corner", "point", "lower"):
+        value = getattr(element, name, None)
+        if isinstance(value, tuple):
+            return value[0], value[1]
+    points = getattr(element, "points", None)
+    if points:
+        return points[0][0], points[0][1]
+    return None if box is None else box[0]
+
+
+def _alignment(own: tuple[Point, Point], box: tuple[Point, Point], side: str) -> Point:
+    match side:
+        case "left":
+            return box[0][0] - own[0][0], 0.0
+        case "right":
+            return box[1][0] - own[1][0], 0.0
+        case "bottom":
+            return 0.0, box[0][1] - own[0][1]
+        case "top":
+            return 0.0, box[1][1] - own[1][1]
+        case "middle":
+            return 0.0, 0.5 * (box[0][1] + box[1][1] - own[0][1] - own[1][1])
+        case _:
+            return 0.5 * (box[0][0] + box[1][0] - own[0][0] - own[1][0]), 0.0
+
+
+def _count(keys: Sequence[ElementKey]) -> str:
+    """Return the number of elements in words: `a ball`, `3 balls`, `4 elements`."""
+    tables = {key.table for key in keys}
+    word = tables.pop() if len(tables) == 1 else "element"
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}" if len(keys) == 1 else f"{len(keys)} {word}s"
+
+
+__all__ = ["FIELD_OF", "TOOLS", "EditHandle", "EditTool", "Editor", "ViewScale", "preview_of"]

@@ -1,0 +1,168 @@
+"""Joints between bodies, made by one or two clicks on bodies or on the world."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Point
+from sandbox.scene.editing.elements import element_of_body, name_of, renaming
+from sandbox.scene.files.toml_changes import AddElement, Change
+from sandbox.window.editor.gestures import Gesture, round_value
+from sandbox.window.editor.picking import bodies_at, to_body
+
+JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor")
+"""Joints that have a tool; a rope is a `slide` whose lower limit is 0"""
+ONE_CLICK = ("pivot", "motor")
+"""Joints of the bodies that lie on each other at one point"""
+SPRING_FREQUENCY, SPRING_DAMPING_RATIO = 2.0, 0.1
+"""Hz and fraction of critical damping of a new spring with its lighter body"""
+MOTOR_RATE = 2.0 * math.pi
+"""rad/s of a new motor: a revolution per second"""
+MOTOR_TORQUE_FACTOR = 20.0
+"""Largest torque of a new motor, in units of m g r, or m r² · 1/s² without gravity"""
+
+
+class JointError(ValueError):
+    """A joint cannot be made there; `str()` has the reason."""
+
+
+@dataclass(frozen=True)
+class JointEnd:
+    """End of a new joint."""
+
+    click: Point
+    """m, where a body is looked for"""
+    anchor: Point
+    """m, the same point, snapped"""
+
+
+def joint_changes(
+    scene: Scene, kind: str, first: JointEnd, second: JointEnd, tolerance: float, name: str
+) -> list[Change]:
+    """Return the changes that add a joint, and names to the bodies that it needs.
+
+    Args:
+        scene: the scene.
+        kind: one of `JOINT_KINDS`.
+        first: end of the first click.
+        second: end of the second click; not used by pivots and motors.
+        tolerance: m, distance beside a body at which a click still hits it.
+        name: of the joint.
+
+    Raises:
+        JointError: there is no body that can be joined.
+    """
+    if kind in ONE_CLICK:
+        return _at_one_point(scene, kind, first, tolerance, name)
+    one, other = (next(iter(bodies_at(scene, end.click, tolerance)), None) for end in (first, second))
+    if one is None and other is None:
+        raise JointError("a joint needs a body: click a body, and then another one or the world")
+    if one is None:
+        one, other, first, second = other, None, second, first
+    assert one is not None
+    if one == other:
+        raise JointError("both ends are on the same body; click another body or the world")
+    if other is None and scene.bodies.fixed[one]:
+        raise JointError("a fixed body needs no joint to the world; click a body that moves")
+    names, changes = _names(scene, [one] if other is None else [one, other])
+    anchors = [to_body(scene, scene.bodies.names[one], first.anchor)]
+    anchors.append(second.anchor if other is None else to_body(scene, scene.bodies.names[other], second.anchor))
+    values: dict[str, Any] = {"name": name, "kind": "slide" if kind == "rope" else kind, "between": names}
+    values["anchors"] = [[round_value(x) for x in anchor] for anchor in anchors]
+    distance = round_value(math.dist(first.anchor, second.anchor))
+    if kind == "rope":
+        values["most"] = distance
+    if kind == "spring":
+        stiffness, damping = _spring(scene, [one] if other is None else [one, other])
+        values |= {"stiffness": stiffness, "damping": damping}
+    return [*changes, AddElement("joint", values)]
+
+
+def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name: str) -> list[Change]:
+    """Return the changes that add a pivot or motor of the two topmost bodies at a point, or of one and the world."""
+    found = bodies_at(scene, end.click, tolerance)[:2]
+    if not found:
+        raise JointError(f"a {kind} needs a body: click a body, or two that lie on each other")
+    if all(scene.bodies.fixed[k] for k in found):
+        raise JointError("a fixed body needs no joint to the world; click a body that moves")
+    found.sort(key=lambda k: (bool(scene.bodies.round[k]), -float(scene.bodies.radius[k])))  # a wheel comes second
+    names, changes = _names(scene, found)
+    point = [round_value(x) for x in end.anchor]
+    pivot: dict[str, Any] = {"name": name, "kind": "pivot", "between": names, "at": point}
+    if kind == "pivot":
+        return [*changes, AddElement("joint", pivot)]
+    body = found[-1]
+    index = scene.bodies.number_of[scene.bodies.names[body]]
+    gravity = math.hypot(*scene.world.gravity) or 1.0
+    torque = MOTOR_TORQUE_FACTOR * float(scene.bodies.mass[index]) * gravity * float(scene.bodies.radius[index])
+    motor = {
+        "name": f"{name} motor",
+        "kind": "motor",
+        "between": names,
+        "rate": round_value(-MOTOR_RATE if len(names) == 2 else MOTOR_RATE),
+        "max_torque": float(f"{torque:.2g}"),
+    }
+    return [*changes, AddElement("joint", pivot), AddElement("joint", motor)]
+
+
+def _names(scene: Scene, bodies: list[int]) -> tuple[list[str], list[Change]]:
+    """Return the names of bodies, and the changes that write those that the file does not have yet."""
+    names, changes = [], list[Change]()
+    for body in bodies:
+        name = scene.bodies.names[body]
+        key = element_of_body(scene, body)
+        element = getattr(scene, "kinds", {})[key.table][key.index]
+        if element.name is None and name == name_of(scene, key):  # default names change with the order of elements
+            changes += [change for change in renaming(scene, key, name) if change not in changes]
+        names.append(name)
+    return names, changes
+
+
+def _spring(scene: Scene, bodies: list[int]) -> tuple[float, float]:
+    """Return stiffness, N/m, and damping, N·s/m, of a spring that suits its lightest moving body."""
+    masses = [float(scene.bodies.mass[k]) for k in bodies if not scene.bodies.fixed[k]]
+    mass, omega = min(masses, default=1.0), 2.0 * math.pi * SPRING_FREQUENCY
+    return float(f"{mass * omega**2:.2g}"), float(f"{2.0 * SPRING_DAMPING_RATIO * mass * omega:.2g}")
+
+
+class JointGesture(Gesture):
+    """Makes a joint: one click for pivots and motors, two for the others, or a drag from one end to the other."""
+
+    is_multi_click = True
+
+    def __init__(self, scene: Scene, kind: str, name: str, end: JointEnd, tolerance: float) -> None:
+        super().__init__(scene)
+        self.kind, self.name, self._tolerance = kind, name, tolerance
+        self._first = self._second = end
+        self.label = f"add a {kind}"
+
+    @property
+    def begin(self) -> Point:
+        """First anchor, m."""
+        return self._first.anchor
+
+    @property
+    def end(self) -> Point:
+        """Second anchor, m."""
+        return self._second.anchor
+
+    def move(self, point: Point) -> None:
+        """Draw the joint as far as a point."""
+        self.move_end(JointEnd(point, point))
+
+    def move_end(self, end: JointEnd) -> None:
+        """Draw the joint as far as an end."""
+        self._second = end
+
+    def changes(self) -> list[Change]:
+        """Return the changes that add the joint.
+
+        Raises:
+            JointError: there is no body that can be joined.
+        """
+        return joint_changes(self.scene, self.kind, self._first, self._second, self._tolerance, self.name)
+
+    def dimensions(self) -> str:
+        """Return the length."""
+        return "" if self.kind in ONE_CLICK else f"{math.dist(self.begin, self.end):.4g} m"

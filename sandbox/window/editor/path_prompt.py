@@ -1,0 +1,95 @@
+"""Prompt for the file that a scene is saved as."""
+
+from pathlib import Path
+
+import pygame
+
+from sandbox.window.editor.property_panel import TextEdit
+from sandbox.window.render.palette import FAINT, INK, PANEL_RAISED, SKY, WARNING
+from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
+
+WIDTH = 520
+"""px at UI scale 1"""
+
+
+class PathPrompt:
+    """Asks for a path. `handle_event` returns it once it is entered."""
+
+    def __init__(self, path: Path) -> None:
+        self._edit = TextEdit(str(path))
+        stem = len(str(path)) - len(path.suffix)
+        self._edit.anchor, self._edit.caret = stem - len(path.stem), stem  # typing replaces the name
+        self._asked: Path | None = None
+        self.note = ""
+        """question or fault that is shown below the field"""
+        self.is_closed = False
+
+    def handle_event(self, event: pygame.event.Event) -> Path | None:
+        """Process an event of the keyboard; return the path when Enter is pressed."""
+        if event.type == pygame.TEXTINPUT:
+            self._edit.insert(event.text)
+        elif event.type == pygame.KEYDOWN:
+            if event.key == pygame.K_ESCAPE:
+                self.is_closed = True
+            elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
+                return self._path()
+            else:
+                self._edit.press(event.key, event.mod)
+        return None
+
+    def _path(self) -> Path | None:
+        """Return the path, with `.toml` added; None if it is empty, or if an existing file must be confirmed."""
+        text = self._edit.text.strip()
+        if not text:
+            self.note = "type the name of a file, such as my-scene.toml"
+            return None
+        path = Path(text).expanduser()
+        if path.suffix.lower() != ".toml":
+            path = path.with_name(f"{path.name}.toml")
+        try:
+            exists = path.exists()
+        except OSError:  # reported when it is written
+            exists = False
+        if exists and path != self._asked:
+            self._asked, self.note = path, f"{path.name} exists; Enter again replaces it"
+            return None
+        return path
+
+    def draw(self, surface: pygame.Surface, ui_scale: float) -> None:
+        """Draw the prompt in the middle of the window."""
+        size = 13.5 * ui_scale
+        lines = wrap_text(self.note, size, (WIDTH - 40) * ui_scale, 3) if self.note else []
+        width = min(round(WIDTH * ui_scale), surface.get_width() - 20)
+        rect = pygame.Rect(0, 0, width, round((96 + 20 * len(lines)) * ui_scale))
+        rect.center = surface.get_rect().center
+        draw_box(surface, rect, 8 * ui_scale, opacity=248, edge=SKY)
+        left, top = rect.left + 18 * ui_scale, rect.top + 14 * ui_scale
+        draw_text(surface, "Save the scene as", (left, top), size, INK, bold=True)
+        draw_text(
+            surface, "Enter: save · Esc: cancel", (rect.right - 18 * ui_scale, top), 0.85 * size, FAINT, "topright"
+        )
+        field = pygame.Rect(
+            round(left), round(top + 26 * ui_scale), round(rect.width - 36 * ui_scale), round(28 * ui_scale)
+        )
+        pygame.draw.rect(surface, PANEL_RAISED, field, border_radius=round(4 * ui_scale))
+        self._draw_text(surface, field, size)
+        for k, line in enumerate(lines):
+            draw_text(surface, line, (left, field.bottom + (8 + 20 * k) * ui_scale), size, WARNING)
+
+    def _draw_text(self, surface: pygame.Surface, field: pygame.Rect, size: float) -> None:
+        """Draw the text with its selection and caret, scrolled so that the caret is visible."""
+        text, caret = self._edit.text, self._edit.caret
+        begin, end = self._edit.selection
+        before = text_size(text[:caret], size, mono=True)[0]
+        shift = min(0, field.width - round(1.2 * size) - before)
+        inner = field.inflate(-round(0.8 * size), 0)
+        clip = surface.get_clip()
+        surface.set_clip(inner)
+        if begin != end:
+            x = inner.left + shift + text_size(text[:begin], size, mono=True)[0]
+            marked = text_size(text[begin:end], size, mono=True)[0]
+            pygame.draw.rect(surface, SKY, pygame.Rect(x, inner.top + 4, marked, inner.height - 8))
+        draw_text(surface, text, (inner.left + shift, inner.centery), size, INK, "midleft", mono=True)
+        x = inner.left + shift + before
+        pygame.draw.line(surface, INK, (x, inner.top + 5), (x, inner.bottom - 6), 1)
+        surface.set_clip(clip)

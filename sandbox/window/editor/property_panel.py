@@ -1,0 +1,785 @@
+"""Property panel: the fields of tables of a scene file as rows that can be edited, at the right of the window.
+
+Rows are positions and values, not widgets: a scene has hundreds of them, and only those in view are drawn.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import pygame
+
+from sandbox.scene.editing.fields import FieldSpec, format_value, parse
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    FAINT,
+    INK,
+    LINE,
+    PANEL,
+    PANEL_RAISED,
+    SKY,
+    WARNING,
+    RgbColour,
+    mix_colours,
+)
+from sandbox.window.render.text import draw_hint, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.ui.panel import MAX_WIDTH_FRACTION, PANEL_WIDTH, SCROLL_STEP
+
+LABEL_SIZE, VALUE_SIZE, UNIT_SIZE, ERROR_SIZE, NOTE_SIZE = 12.0, 11.5, 10.5, 11.0, 12.0
+"""px at UI scale 1, font sizes"""
+ROW_HEIGHT, BOX_HEIGHT, HEADING_HEIGHT, SECTION_GAP = 24, 20, 26, 8
+"""px at UI scale 1"""
+MAX_ERROR_LINES, MAX_NOTE_LINES = 5, 8
+LEFT_OUT, MIXED = "–", "…"
+"""Text of a field without a value, and of one whose values differ."""
+SELECTED: RgbColour = mix_colours(PANEL_RAISED, SKY, 0.45)
+DIMMED: RgbColour = mix_colours(FAINT, BACKGROUND, 0.15)
+"""Colour of defaults and units."""
+TYPED_KINDS = frozenset({"number", "integer", "text", "numbers", "name"})
+"""Kinds of fields that are edited as text."""
+_ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
+_MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
+
+
+@dataclass(frozen=True)
+class PropertyRow:
+    """A field and its present value."""
+
+    spec: FieldSpec
+    value: Any
+    """None if the key is left out; must not be changed in place"""
+    is_mixed: bool = False
+    """whether several elements are selected whose values differ"""
+
+
+@dataclass(frozen=True)
+class PropertySection:
+    """Rows under a heading, such as those of one element."""
+
+    title: str
+    key: str
+    """unique; passed to callbacks"""
+    rows: tuple[PropertyRow, ...]
+    is_open: bool = True
+    """whether it is initially unfolded"""
+
+
+class RowId(NamedTuple):
+    """Identity of a row: the keys of its section and of its field."""
+
+    section: str
+    field: str
+
+
+@dataclass
+class TextEdit:
+    """Text of a line with a caret and a selection. Positions are numbers of characters before them."""
+
+    text: str
+    caret: int = 0
+    anchor: int = 0
+    """other end of the selection; equal to the caret without one"""
+
+    def select_all(self) -> None:
+        """Select the whole text, with the caret at its end."""
+        self.anchor, self.caret = 0, len(self.text)
+
+    @property
+    def selection(self) -> tuple[int, int]:
+        """Start and end of the selection."""
+        return min(self.caret, self.anchor), max(self.caret, self.anchor)
+
+    def insert(self, text: str) -> None:
+        """Replace the selection by a text."""
+        start, end = self.selection
+        text = "".join(letter for letter in text if letter.isprintable())
+        self.text = self.text[:start] + text + self.text[end:]
+        self.caret = self.anchor = start + len(text)
+
+    def delete(self, step: Literal[-1, 1]) -> None:
+        """Delete the selection or, without one, the character before (−1) or behind (1) the caret."""
+        if self.caret == self.anchor:
+            self.anchor = min(max(self.caret + step, 0), len(self.text))
+        self.insert("")
+
+    def move(self, position: int, is_selecting: bool) -> None:
+        """Move the caret to a position, which is clamped; extend the selection or remove it."""
+        self.caret = min(max(position, 0), len(self.text))
+        if not is_selecting:
+            self.anchor = self.caret
+
+    def press(self, key: int, mod: int) -> bool:
+        """Process a key; return whether it has a meaning here. Text comes as `TEXTINPUT` events."""
+        is_selecting = bool(mod & pygame.KMOD_SHIFT)
+        is_whole = bool(mod & (pygame.KMOD_CTRL | pygame.KMOD_META))
+        start, end = self.selection
+        has_selection = start != end and not is_selecting
+        match key:
+            case pygame.K_LEFT:
+                self.move(0 if is_whole else start if has_selection else self.caret - 1, is_selecting)
+            case pygame.K_RIGHT:
+                self.move(len(self.text) if is_whole else end if has_selection else self.caret + 1, is_selecting)
+            case pygame.K_HOME | pygame.K_UP:
+                self.move(0, is_selecting)
+            case pygame.K_END | pygame.K_DOWN:
+                self.move(len(self.text), is_selecting)
+            case pygame.K_BACKSPACE:
+                self.delete(-1)
+            case pygame.K_DELETE:
+                self.delete(1)
+            case pygame.K_a if is_whole:
+                self.select_all()
+            case _:
+                return False
+        return True
+
+
+@dataclass
+class FieldEdit:
+    """Editing of a field."""
+
+    row: RowId
+    edit: TextEdit
+    initial: str
+    """text before the editing, which need not be applied"""
+    is_touched: bool = False
+    """whether the user has typed or deleted something"""
+    shift: int = 0
+    """px by which the text is moved to the left, so that the caret is in the box"""
+
+
+@dataclass(frozen=True)
+class RejectedInput:
+    """Input that was not applied, and the reason."""
+
+    text: str | None
+    """typed text; None for check boxes and choices"""
+    error: str
+    value: Any
+    """value of the field at that time"""
+
+
+class PanelItem(NamedTuple):
+    """Heading or row at its place in the content of the panel."""
+
+    section: PropertySection
+    row: PropertyRow | None
+    """None for a heading"""
+    top: int
+    """px below the top of the content"""
+    height: int
+    """px, including the lines of an error"""
+    error: tuple[str, ...] = ()
+
+    @property
+    def row_id(self) -> RowId:
+        """Identity of the row; without a field for a heading."""
+        return RowId(self.section.key, "" if self.row is None else self.row.spec.key)
+
+
+class PropertyPanel:
+    """Panel of fields. `show` sets its content, `on_change` reports the user's changes."""
+
+    def __init__(self, size: tuple[int, int], ui_scale: float = 1.0) -> None:
+        """Create an empty panel for a window of a size in px."""
+        self.on_change: Callable[[str, str, Any], str | None] = _accept
+        """(section key, field key, value; None removes the key); returns an error to be shown at the field, or None"""
+        self.size, self.ui_scale = size, ui_scale
+        self._sections: tuple[PropertySection, ...] = ()
+        self._note = ""
+        self._is_open: dict[str, bool] = {}
+        """by the key of the section; remains when it is no longer shown"""
+        self._editing: FieldEdit | None = None
+        self._rejected: dict[RowId, RejectedInput] = {}
+        self._items: tuple[PanelItem, ...] = ()
+        self._note_lines: tuple[str, ...] = ()
+        self._label_width, self._height = 0, 0
+        """px"""
+        self._scroll = 0
+        self._sheet = pygame.Surface((1, 1))
+        self._is_dirty = True  # whether the cached drawing is outdated
+        self._pointer: tuple[int, int] | None = None
+        self._hovered: RowId | None = None
+        self._pressed: set[int] = set()
+        self._is_bar_held = self._is_selecting = False
+        self.resize(size, ui_scale)
+
+    @property
+    def width(self) -> int:
+        """Width that the panel covers at the right of the window, px."""
+        return max(min(round(PANEL_WIDTH * self.ui_scale), round(MAX_WIDTH_FRACTION * self.size[0])), 1)
+
+    @property
+    def has_focus(self) -> bool:
+        """Whether a field is edited as text, which takes the keyboard."""
+        return self._editing is not None
+
+    @property
+    def focused(self) -> RowId | None:
+        """Section and field that are edited as text."""
+        return None if self._editing is None else self._editing.row
+
+    def resize(self, size: tuple[int, int], ui_scale: float) -> None:
+        """Lay out the panel for a window of another size, px."""
+        self.size, self.ui_scale = size, ui_scale
+        self._sheet = pygame.Surface((self.width, max(size[1], 1)))
+        self._lay_out()
+
+    def show(self, sections: Sequence[PropertySection], note: str = "") -> None:
+        """Show sections, and a note above them. The editing of a field continues if it is still among them."""
+        shown = tuple(sections)
+        if shown == self._sections and note == self._note:
+            return
+        self._sections, self._note = shown, note
+        for section in shown:
+            self._is_open.setdefault(section.key, section.is_open)
+        rows = {RowId(section.key, row.spec.key): row for section in shown for row in section.rows}
+        if self._editing is not None:
+            row = rows.get(self._editing.row)
+            if row is None or row.spec.kind not in TYPED_KINDS:
+                self._end_editing()
+        self._rejected = {
+            key: rejected
+            for key, rejected in self._rejected.items()
+            if key in rows and (rows[key].value == rejected.value or self.focused == key)
+        }
+        self._lay_out()
+
+    def is_open(self, section: str) -> bool:
+        """Return whether a section is unfolded."""
+        return self._is_open.get(section, True)
+
+    # Layout
+
+    def _px(self, length: float) -> int:
+        return round(length * self.ui_scale)
+
+    @property
+    def _column(self) -> tuple[int, int]:
+        """Left end and width of the rows, px; leaves room for the scroll bar, as in the side panel."""
+        pad = self._px(14)
+        return pad, max(self.width - 2 * pad - self._px(4), 1)
+
+    def _lay_out(self) -> None:
+        """Compute the places of all headings and rows."""
+        width = self._column[1]
+        self._note_lines = wrap_text(self._note, NOTE_SIZE * self.ui_scale, width, MAX_NOTE_LINES)
+        y = self._px(12)
+        if self._note_lines:
+            y += len(self._note_lines) * self._note_step + self._px(8)
+        items = []
+        for section in self._sections:
+            items.append(PanelItem(section, None, y, self._px(HEADING_HEIGHT)))
+            y += self._px(HEADING_HEIGHT)
+            if self.is_open(section.key):
+                for row in section.rows:
+                    rejected = self._rejected.get(RowId(section.key, row.spec.key))
+                    error = () if rejected is None else self._wrapped_error(rejected.error)
+                    height = self._px(ROW_HEIGHT) + (len(error) * self._error_step + self._px(4) if error else 0)
+                    items.append(PanelItem(section, row, y, height, error))
+                    y += height
+                y += self._px(SECTION_GAP)
+        self._items, self._height = tuple(items), y + self._px(6)
+        labels = {item.row.spec.key for item in items if item.row is not None}
+        widest = max((text_size(label, LABEL_SIZE * self.ui_scale)[0] for label in labels), default=0)
+        self._label_width = min(max(widest + self._px(8), round(0.36 * width)), round(0.53 * width))
+        self._scroll_to(self._scroll)
+        self._update_hover()
+
+    @property
+    def _note_step(self) -> int:
+        return round(1.4 * NOTE_SIZE * self.ui_scale)
+
+    @property
+    def _error_step(self) -> int:
+        return round(1.3 * ERROR_SIZE * self.ui_scale)
+
+    def _wrapped_error(self, error: str) -> tuple[str, ...]:
+        return wrap_text(error, ERROR_SIZE * self.ui_scale, self._column[1], MAX_ERROR_LINES)
+
+    def _scroll_to(self, scroll: int) -> None:
+        self._scroll = min(max(scroll, 0), max(self._height - self.size[1], 0))
+        self._is_dirty = True
+
+    def _box(self, item: PanelItem) -> pygame.Rect:
+        """Return the box of the value of a row on the sheet."""
+        left, width = self._column
+        height = self._px(BOX_HEIGHT)
+        top = item.top - self._scroll + (self._px(ROW_HEIGHT) - height) // 2
+        return pygame.Rect(left + self._label_width, top, max(width - self._label_width, 1), height)
+
+    def box_of(self, section: str, field: str) -> pygame.Rect | None:
+        """Return the box of a field's value in the window, px, which may be out of view; None if it is not shown."""
+        item = self._item_of(RowId(section, field))
+        return None if item is None else self._box(item).move(self.size[0] - self.width, 0)
+
+    def heading_of(self, section: str) -> pygame.Rect | None:
+        """Return the rectangle of a heading in the window, px, which may be out of view; None if it is not shown."""
+        item = self._item_of(RowId(section, ""))
+        if item is None:
+            return None
+        left, width = self._column
+        return pygame.Rect(self.size[0] - self.width + left, item.top - self._scroll, width, item.height)
+
+    def _item_of(self, row_id: RowId) -> PanelItem | None:
+        return next((item for item in self._items if item.row_id == row_id), None)
+
+    def _item_at(self, at: tuple[int, int]) -> PanelItem | None:
+        y = at[1] + self._scroll
+        return next((item for item in self._items if item.top <= y < item.top + item.height), None)
+
+    # Editing
+
+    def commit(self) -> None:
+        """End the editing of a field, applying it. A text that is not accepted stays at the field with its error."""
+        if self._editing is not None:
+            self._apply()
+            self._end_editing()
+
+    def _end_editing(self) -> None:
+        self._editing, self._is_selecting, self._is_dirty = None, False, True
+
+    def _start_editing(self, item: PanelItem) -> None:
+        """Edit a field as text, selected as a whole; a rejected text is continued."""
+        assert item.row is not None
+        initial = "" if item.row.is_mixed else format_value(item.row.spec, item.row.value)
+        rejected = self._rejected.get(item.row_id)
+        text = initial if rejected is None or rejected.text is None else rejected.text
+        self._editing = FieldEdit(item.row_id, TextEdit(text), initial)
+        self._editing.edit.select_all()
+        self._is_dirty = True
+        self._scroll_into_view(item)
+
+    def _scroll_into_view(self, item: PanelItem) -> None:
+        if item.top < self._scroll:
+            self._scroll_to(item.top - self._px(6))
+        elif item.top + item.height > self._scroll + self.size[1]:
+            self._scroll_to(item.top + item.height + self._px(6) - self.size[1])
+
+    def _apply(self) -> bool:
+        """Report the edited value if it differs; return whether it was accepted."""
+        editing = self._editing
+        item = None if editing is None else self._item_of(editing.row)
+        if editing is None or item is None or item.row is None:
+            return True
+        row, text = item.row, editing.edit.text
+        if text == editing.initial and not (row.is_mixed and editing.is_touched):
+            return self._settle(editing.row, None)
+        try:
+            value = parse(row.spec, text)
+        except ValueError as error:
+            return self._settle(editing.row, RejectedInput(text, str(error), row.value))
+        if not row.is_mixed and format_value(row.spec, value) == format_value(row.spec, row.value):
+            return self._settle(editing.row, None)
+        return self._report(item, value, text)
+
+    def _report(self, item: PanelItem, value: Any, text: str | None) -> bool:
+        """Report a value by the callback, which may show other content; return whether it was accepted."""
+        assert item.row is not None
+        error = self.on_change(item.section.key, item.row.spec.key, value)
+        return self._settle(item.row_id, None if error is None else RejectedInput(text, error, item.row.value))
+
+    def _settle(self, row_id: RowId, rejected: RejectedInput | None) -> bool:
+        """Keep or remove the error of a row; return whether it has none. Errors of clicks end with any other input."""
+        before = self._rejected
+        self._rejected = {key: each for key, each in before.items() if key != row_id and each.text is not None}
+        if rejected is not None:
+            self._rejected[row_id] = rejected
+        if before != self._rejected:
+            self._lay_out()
+            item = self._item_of(row_id)
+            if item is not None and rejected is not None:
+                self._scroll_into_view(item)
+        return rejected is None
+
+    def _cancel(self) -> None:
+        """End the editing of a field without applying it."""
+        if self._editing is not None:
+            row_id = self._editing.row
+            self._end_editing()
+            self._settle(row_id, None)
+
+    def _go(self, step: int) -> None:
+        """Apply the edited field and edit the next (1) or previous (−1) one that is edited as text."""
+        here = self.focused
+        if here is None or not self._apply():
+            return
+        typed = [item for item in self._items if item.row is not None and item.row.spec.kind in TYPED_KINDS]
+        self._end_editing()
+        index = next((k for k, item in enumerate(typed) if item.row_id == here), None)
+        if index is not None:
+            self._start_editing(typed[(index + step) % len(typed)])
+
+    def _cycle(self, item: PanelItem, step: int) -> None:
+        """Set a check box or choice to its next (1) or previous (−1) value."""
+        assert item.row is not None
+        spec, row = item.row.spec, item.row
+        values: list[Any] = [False, True] if spec.kind == "flag" else list(spec.choices)
+        if spec.is_optional:
+            values.insert(0, None)
+        present = spec.default if row.value is None else row.value
+        if row.is_mixed or present not in values:
+            order = [True, False] if spec.kind == "flag" else list(spec.choices)
+            value = order[0 if step > 0 else -1]
+        else:
+            value = values[(values.index(present) + step) % len(values)]
+            if value == present:
+                return
+        self._report(item, value, None)
+
+    # Events
+
+    def handle_event(self, event: pygame.event.Event) -> bool:
+        """Process an event; return whether it was consumed. Motion events are required: wheel events have no position.
+
+        While a field is edited, keys are consumed, except function keys and shortcuts without a meaning for a text.
+        """
+        if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
+            if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
+                self._release()
+            return False
+        if event.type == pygame.KEYDOWN:
+            return self._press_key(event)
+        if event.type == pygame.TEXTINPUT:
+            return self._type(event.text)
+        if event.type == pygame.MOUSEWHEEL:
+            return self._wheel(int(event.y))
+        if event.type not in _MOUSE_EVENTS:
+            return False
+        at = event.pos[0] - (self.size[0] - self.width), event.pos[1]
+        is_inside = bool(0 <= at[0] < self.width and 0 <= at[1] < self.size[1])
+        if event.type == pygame.MOUSEMOTION:
+            is_foreign = any(getattr(event, "buttons", ())) and not self._pressed
+            self._pointer = at if (is_inside and not is_foreign) or self._pressed else None
+            self._drag(at)
+            return self._pointer is not None
+        self._pointer = at if is_inside or self._pressed else None
+        if event.type == pygame.MOUSEBUTTONDOWN:
+            if is_inside and event.button <= 3:  # buttons from 4 up are wheel events
+                self._pressed.add(event.button)
+                self._press(event.button, at)
+            elif event.button <= 3:
+                self.commit()
+            return is_inside
+        is_ours = event.button in self._pressed
+        self._pressed.discard(event.button)
+        if is_ours and event.button == 1:
+            self._is_bar_held = self._is_selecting = False
+            self._is_dirty = True
+        return is_ours
+
+    def _release(self) -> None:
+        """End a press or drag without a mouse event."""
+        self._pressed.clear()
+        self._pointer = None
+        self._is_bar_held = self._is_selecting = False
+        self._is_dirty = True
+        self._update_hover()
+
+    def _press_key(self, event: pygame.event.Event) -> bool:
+        editing = self._editing
+        if editing is None:
+            return False
+        self._is_dirty = True
+        is_command = bool(event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT | pygame.KMOD_META))
+        if event.key == pygame.K_ESCAPE:
+            self._cancel()
+        elif event.key in _ENTER_KEYS and not is_command:
+            if self._apply():
+                self._end_editing()
+        elif event.key == pygame.K_TAB and not is_command:
+            self._go(-1 if event.mod & pygame.KMOD_SHIFT else 1)
+        elif editing.edit.press(event.key, event.mod):
+            editing.is_touched |= event.key in (pygame.K_BACKSPACE, pygame.K_DELETE)
+        elif is_command or pygame.K_F1 <= event.key <= pygame.K_F12:
+            return False
+        return True
+
+    def _type(self, text: str) -> bool:
+        if self._editing is None:
+            return False
+        self._editing.edit.insert(text)
+        self._editing.is_touched = self._is_dirty = True
+        return True
+
+    def _wheel(self, notches: int) -> bool:
+        if self._pointer is None:
+            return False
+        self._scroll_to(self._scroll - round(notches * SCROLL_STEP * self.ui_scale))
+        self._update_hover()
+        return True
+
+    def _press(self, button: int, at: tuple[int, int]) -> None:
+        """Process a press in the panel.
+
+        Headings, check boxes and choices act at once: an error of the edited field, which the press applies, may move
+        them away from the pointer before the release.
+        """
+        self._is_dirty = True
+        item = self._item_at(at)
+        is_on_box = item is not None and item.row is not None and bool(self._box(item).collidepoint(at))
+        if item is not None and is_on_box and button == 1 and item.row_id == self.focused:
+            self._place_caret(at[0], is_selecting=False)
+            self._is_selecting = True
+            return
+        target = None if item is None else item.row_id
+        self.commit()  # may change the content
+        if button == 1 and self._height > self.size[1] and at[0] >= self.width - 9 * self.ui_scale:
+            self._is_bar_held = True
+            self._drag(at)
+            return
+        item = None if target is None else self._item_of(target)
+        if item is None:
+            return
+        if item.row is None:
+            if button == 1:
+                self._is_open[item.section.key] = not self.is_open(item.section.key)
+                self._lay_out()
+        elif is_on_box and item.row.spec.kind in ("flag", "choice"):
+            if button in (1, 3):
+                self._cycle(item, 1 if button == 1 else -1)
+        elif is_on_box and button == 1 and item.row.spec.kind in TYPED_KINDS:
+            self._start_editing(item)
+
+    def _drag(self, at: tuple[int, int]) -> None:
+        """Scroll by the scroll bar, or extend the selection of the text."""
+        if self._is_bar_held:
+            self._scroll_to(round(at[1] / max(self.size[1], 1) * self._height - self.size[1] / 2))
+        elif self._is_selecting:
+            self._place_caret(at[0], is_selecting=True)
+        self._update_hover()
+
+    def _update_hover(self) -> None:
+        item = None if self._pointer is None else self._item_at(self._pointer)
+        hovered = None if item is None else item.row_id
+        self._is_dirty |= hovered != self._hovered
+        self._hovered = hovered
+
+    def _place_caret(self, x: int, is_selecting: bool) -> None:
+        """Move the caret to the gap between characters that is nearest to a position on the sheet, px."""
+        editing = self._editing
+        item = None if editing is None else self._item_of(editing.row)
+        if editing is None or item is None:
+            return
+        along = x - self._box(item).left - self._px(6) + editing.shift
+        text = editing.edit.text
+        nearest = min(range(len(text) + 1), key=lambda k: abs(self._value_width(text[:k]) - along))
+        editing.edit.move(nearest, is_selecting)
+        self._is_dirty = True
+
+    def _value_width(self, text: str) -> int:
+        return text_size(text, VALUE_SIZE * self.ui_scale, mono=True)[0]
+
+    # Drawing
+
+    def draw(self, surface: pygame.Surface) -> None:
+        """Draw the panel at the right of the window."""
+        if self._is_dirty:
+            self._draw_sheet()
+            self._is_dirty = False
+        surface.blit(self._sheet, (self.size[0] - self.width, 0))
+        if self._hovered is not None and self._pointer is not None and not self._pressed:
+            hint = self._hint(self._hovered, self._pointer)
+            if hint:
+                x, y = self._pointer
+                draw_hint(surface, hint, (self.size[0] - self.width + x, y), self.ui_scale)
+
+    def _hint(self, row_id: RowId, pointer: tuple[int, int]) -> str:
+        """Return the tooltip: at a label the description, after a truncated key; at a truncated value the whole."""
+        item = self._item_of(row_id)
+        if item is None or item.row is None or row_id == self.focused:
+            return ""
+        spec, box = item.row.spec, self._box(item)
+        if pointer[0] < box.left:
+            is_whole = self._label(spec.key) == spec.key
+            return spec.description if is_whole else f"{spec.key}: {spec.description}"
+        text = self._shown_text(item.row)[0]
+        is_mono = spec.kind in TYPED_KINDS
+        is_whole = text_size(text, VALUE_SIZE * self.ui_scale, mono=is_mono)[0] <= self._room(item.row, box)
+        return "" if spec.kind == "flag" or not box.collidepoint(pointer) or is_whole else f"{text} {spec.unit}".strip()
+
+    def _room(self, row: PropertyRow, box: pygame.Rect) -> int:
+        """Return the width of the text of a value in its box without the unit, px."""
+        pad = self._px(6)
+        arrow = pad + 0.28 * VALUE_SIZE * self.ui_scale if row.spec.kind == "choice" else 0
+        return round(box.width - 2 * pad - arrow)
+
+    def _label(self, key: str) -> str:
+        return ellipsis(key, LABEL_SIZE * self.ui_scale, self._label_width - self._px(6))
+
+    def _visible_items(self) -> Iterator[PanelItem]:
+        for item in self._items:
+            if item.top + item.height >= self._scroll and item.top <= self._scroll + self.size[1]:
+                yield item
+
+    def _draw_sheet(self) -> None:
+        """Draw the column on the cached surface, which most frames only blit."""
+        sheet, left = self._sheet, self._column[0]
+        sheet.fill(PANEL)
+        for k, line in enumerate(self._note_lines):
+            y = self._px(12) - self._scroll + (k + 0.5) * self._note_step
+            draw_text(sheet, line, (left, y), NOTE_SIZE * self.ui_scale, FAINT, "midleft")
+        for item in self._visible_items():
+            if item.row is None:
+                self._draw_heading(item)
+            else:
+                self._draw_row(item, item.row)
+        pygame.draw.line(sheet, LINE, (0, 0), (0, self.size[1]), max(self._px(1), 1))
+        if self._height > self.size[1]:
+            height = max(round(self.size[1] ** 2 / self._height), self._px(16))
+            top = round(self._scroll / (self._height - self.size[1]) * (self.size[1] - height))
+            bar_width = self._px(5)
+            bar = pygame.Rect(self.width - bar_width - self._px(2), top, bar_width, height)
+            colour = LINE if self._is_bar_held else PANEL_RAISED
+            pygame.draw.rect(sheet, colour, bar, border_radius=bar_width)
+
+    def _draw_heading(self, item: PanelItem) -> None:
+        """Draw a heading with a triangle that shows whether the section is unfolded."""
+        sheet, ui_scale = self._sheet, self.ui_scale
+        left, width = self._column
+        y = item.top - self._scroll + item.height // 2
+        colour = INK if item.row_id == self._hovered else FAINT
+        r = 3.5 * ui_scale
+        x = left + r
+        if self.is_open(item.section.key):
+            corners = [(x - r, y - 0.6 * r), (x + r, y - 0.6 * r), (x, y + 0.8 * r)]
+        else:
+            corners = [(x - 0.6 * r, y - r), (x - 0.6 * r, y + r), (x + 0.8 * r, y)]
+        pygame.draw.polygon(sheet, colour, corners)
+        # Titles contain names, which are case-sensitive, so that they are not in capitals as those of the side panel.
+        start = left + self._px(13)
+        size = 11.5 * ui_scale
+        title = ellipsis(item.section.title, size, width - self._px(30), bold=True)
+        word = draw_text(sheet, title, (start, y), size, colour, "midleft", bold=True)
+        if word.right + self._px(8) < left + width:
+            pygame.draw.line(sheet, LINE, (word.right + self._px(8), y), (left + width, y), max(self._px(1), 1))
+
+    def _draw_row(self, item: PanelItem, row: PropertyRow) -> None:
+        sheet, left, box = self._sheet, self._column[0], self._box(item)
+        rejected = self._rejected.get(item.row_id)
+        is_set = row.value is not None or row.is_mixed or row.spec.is_required
+        colour = INK if is_set and row.spec.kind != "other" else FAINT
+        draw_text(sheet, self._label(row.spec.key), (left, box.centery), LABEL_SIZE * self.ui_scale, colour, "midleft")
+        if row.spec.kind == "flag":
+            self._draw_check_box(item, row, box)
+        elif row.spec.kind == "choice":
+            self._draw_choice(item, row, box)
+        else:
+            self._draw_value(item, row, box)
+        for k, line in enumerate(item.error):
+            y = box.bottom + self._px(3) + (k + 0.5) * self._error_step
+            draw_text(sheet, line, (left, y), ERROR_SIZE * self.ui_scale, WARNING, "midleft")
+        if rejected is not None:
+            pygame.draw.rect(sheet, WARNING, box, max(self._px(1), 1), border_radius=self._px(3))
+
+    def _shown_text(self, row: PropertyRow) -> tuple[str, RgbColour]:
+        """Return the text of a value and its colour; the default, dimmed, of a key that is left out."""
+        if row.is_mixed:
+            return MIXED, INK
+        if row.value is not None:
+            return format_value(row.spec, row.value) or LEFT_OUT, INK if row.spec.kind != "other" else FAINT
+        return format_value(row.spec, row.spec.default) or LEFT_OUT, DIMMED
+
+    def _draw_value(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
+        """Draw the value of a field that is edited as text, or of one that cannot be edited."""
+        sheet, size = self._sheet, VALUE_SIZE * self.ui_scale
+        rejected, pad = self._rejected.get(item.row_id), self._px(6)
+        text, colour = self._shown_text(row)
+        if rejected is not None and rejected.text is not None:
+            text, colour = rejected.text, INK
+        if row.spec.kind == "other":
+            text = ellipsis(text, size, self._room(row, box))
+            draw_text(sheet, text, (box.left + pad, box.centery), size, colour, "midleft")
+            return
+        is_edited = item.row_id == self.focused
+        self._draw_box(item, box, is_edited)
+        if is_edited:
+            self._draw_edit(text, box.inflate(-2 * pad, 0))
+            return
+        unit, unit_size = row.spec.unit, UNIT_SIZE * self.ui_scale
+        unit_width = text_size(unit, unit_size)[0] + self._px(5) if unit else 0
+        room = self._room(row, box)
+        if unit and self._value_width(text) + unit_width > room:
+            unit_width = 0  # the number is more important than its unit, which the tooltip has too
+        elif unit:
+            draw_text(sheet, unit, (box.right - pad, box.centery), unit_size, DIMMED, "midright")
+        text = ellipsis(text, size, room - unit_width, mono=True)
+        x = box.left + pad
+        if row.spec.pattern.startswith("^#") and re.search(row.spec.pattern, text):
+            x += self._draw_swatch(text, box)
+        draw_text(sheet, text, (x, box.centery), size, colour, "midleft", mono=True)
+
+    def _draw_box(self, item: PanelItem, box: pygame.Rect, is_edited: bool = False) -> None:
+        is_lit = is_edited or item.row_id == self._hovered
+        pygame.draw.rect(self._sheet, BACKGROUND if is_edited else PANEL_RAISED, box, border_radius=self._px(3))
+        if is_lit:
+            edge = SKY if is_edited else LINE
+            pygame.draw.rect(self._sheet, edge, box, max(self._px(1), 1), border_radius=self._px(3))
+
+    def _draw_edit(self, placeholder: str, area: pygame.Rect) -> None:
+        """Draw the edited text in an area, with selection and caret, moved so that the caret is in view."""
+        editing = self._editing
+        assert editing is not None
+        sheet, size, edit = self._sheet, VALUE_SIZE * self.ui_scale, editing.edit
+        caret = self._value_width(edit.text[: edit.caret])
+        room = max(area.width - self._px(1), 1)
+        editing.shift = min(max(editing.shift, caret - room), caret)
+        editing.shift = min(editing.shift, max(self._value_width(edit.text) - room, 0))
+        left = area.left - editing.shift
+        sheet.set_clip(area.inflate(2, 0))
+        start, end = (self._value_width(edit.text[:position]) for position in edit.selection)
+        height = self._px(15)
+        if start != end:
+            pygame.draw.rect(sheet, SELECTED, (left + start, area.centery - height // 2, end - start, height))
+        if edit.text:
+            draw_text(sheet, edit.text, (left, area.centery), size, INK, "midleft", mono=True)
+        elif not editing.is_touched:
+            draw_text(sheet, placeholder, (left, area.centery), size, DIMMED, "midleft", mono=True)
+        line = pygame.Rect(left + caret, area.centery - height // 2, max(self._px(1), 1), height)
+        pygame.draw.rect(sheet, INK, line)
+        sheet.set_clip(None)
+
+    def _draw_check_box(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
+        sheet, side = self._sheet, self._px(14)
+        value = row.spec.default if row.value is None else row.value
+        is_on = bool(value) and not row.is_mixed
+        is_default = row.value is None and not row.is_mixed
+        square = pygame.Rect(box.left, box.centery - side // 2, side, side)
+        fill = (mix_colours(SKY, PANEL, 0.55) if is_default else SKY) if is_on else PANEL_RAISED
+        radius = self._px(3.5)
+        pygame.draw.rect(sheet, fill, square, border_radius=radius)
+        edge = SKY if is_on or item.row_id == self._hovered else LINE
+        pygame.draw.rect(sheet, edge, square, max(self._px(1), 1), border_radius=radius)
+        if is_on:
+            tick = [
+                (square.left + x * side, square.top + y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
+            ]
+            pygame.draw.lines(sheet, BACKGROUND, False, tick, max(self._px(2), 1))
+        elif row.is_mixed or value is None:
+            dash = pygame.Rect(0, 0, round(0.5 * side), max(self._px(2), 1))
+            dash.center = square.center
+            pygame.draw.rect(sheet, INK if row.is_mixed else FAINT, dash)
+
+    def _draw_choice(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
+        sheet, size = self._sheet, VALUE_SIZE * self.ui_scale
+        text, colour = self._shown_text(row)
+        self._draw_box(item, box)
+        pad, height = self._px(6), round(0.28 * size)
+        text = ellipsis(text, size, self._room(row, box))
+        draw_text(sheet, text, (box.left + pad, box.centery), size, colour, "midleft")
+        if len(row.spec.choices) + row.spec.is_optional > 1:
+            x, y = box.right - pad, box.centery
+            arrow = [(x - height, y - height), (x, y), (x - height, y + height)]
+            pygame.draw.lines(sheet, SKY, False, arrow, max(self._px(1.6), 1))
+
+    def _draw_swatch(self, colour: str, box: pygame.Rect) -> int:
+        """Draw a sample of a colour `#rrggbb` at the left of a box; return the width that it takes, px."""
+        side = self._px(11)
+        sample = pygame.Rect(box.left + self._px(6), box.centery - side // 2, side, side)
+        pygame.draw.rect(self._sheet, pygame.Color(colour), sample, border_radius=self._px(2))
+        return side + self._px(6)
+
+
+def _accept(*_: object) -> None:
+    """Accept a change, the default of the callback."""

@@ -1,0 +1,108 @@
+"""Toolbar of the editor: a column of tool buttons at the left of the window, each with its key."""
+
+from collections.abc import Sequence
+
+import pygame
+
+from sandbox.window.editor.editor import TOOLS, EditTool
+from sandbox.window.editor.tool_icons import tool_icon
+from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY
+from sandbox.window.render.text import draw_box, draw_hint, draw_text
+
+BUTTON = 32
+"""px at UI scale 1, side of a button"""
+GAP = 3
+"""px at UI scale 1 between buttons"""
+GROUP_STARTS = ("ball", "plane", "rod", "eraser")
+"""Tools before which there is a wider gap"""
+
+
+class Toolbar:
+    """Column of tool buttons."""
+
+    def __init__(self, tools: Sequence[EditTool] = TOOLS) -> None:
+        self._tools = tuple(tools)
+        self._rects: list[tuple[EditTool, pygame.Rect]] = []
+        self._hovered: EditTool | None = None
+        self._pressed: EditTool | None = None
+        self._pointer = (0, 0)
+        self.rect = pygame.Rect(0, 0, 0, 0)
+        """px, as last laid out"""
+
+    def layout(self, area: pygame.Rect, ui_scale: float) -> None:
+        """Lay out the buttons in an area, px: in one column, or in two if it is too low."""
+        side, gap, pad = round(BUTTON * ui_scale), round(GAP * ui_scale), round(6 * ui_scale)
+        columns = 1 if self._height(1, side, gap) + 2 * pad <= area.height - 2 * pad else 2
+        left, top = area.left + 2 * pad, area.top + 2 * pad
+        self._rects, x, y, column = [], left, top, 0
+        for tool in self._tools:
+            if tool.name in GROUP_STARTS:
+                y += (side + gap if column else 0) + 2 * gap
+                x, column = left, 0
+            self._rects.append((tool, pygame.Rect(x, y, side, side)))
+            column += 1
+            x += side + gap
+            if column == columns:
+                x, column = left, 0
+                y += side + gap
+        self.rect = self._rects[0][1].unionall([rect for _, rect in self._rects]).inflate(2 * pad, 2 * pad)
+
+    def layout_row(self, corner: tuple[int, int], ui_scale: float) -> None:
+        """Lay out the buttons in a row, with the upper left corner of the toolbar at a position, px."""
+        side, gap, pad = round(BUTTON * ui_scale), round(GAP * ui_scale), round(6 * ui_scale)
+        left, top = corner[0] + pad, corner[1] + pad
+        self._rects = [
+            (tool, pygame.Rect(left + k * (side + gap), top, side, side)) for k, tool in enumerate(self._tools)
+        ]
+        self.rect = pygame.Rect(*corner, len(self._tools) * (side + gap) - gap + 2 * pad, side + 2 * pad)
+
+    def _height(self, columns: int, side: int, gap: int) -> int:
+        return -(-len(self._tools) // columns) * (side + gap) + 2 * gap * len(GROUP_STARTS)
+
+    def tool_at(self, position: tuple[int, int]) -> EditTool | None:
+        """Return the tool of the button at a position, px."""
+        return next((tool for tool, rect in self._rects if rect.collidepoint(position)), None)
+
+    def rect_of(self, name: str) -> pygame.Rect:
+        """Return the rectangle of the button of a tool, px.
+
+        Raises:
+            KeyError: there is no such tool.
+        """
+        return {tool.name: rect for tool, rect in self._rects}[name]
+
+    def handle_event(self, event: pygame.event.Event) -> tuple[bool, str | None]:
+        """Process a mouse event; return whether it was consumed, and the name of a tool that is chosen."""
+        if event.type == pygame.MOUSEMOTION:
+            self._pointer, self._hovered = event.pos, self.tool_at(event.pos)
+            return self._pressed is not None, None
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self.rect.collidepoint(event.pos):
+            self._pressed = self.tool_at(event.pos) if event.button == 1 else None
+            return True, None
+        if event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self._pressed is not None:
+            pressed, self._pressed = self._pressed, None
+            return True, pressed.name if self.tool_at(event.pos) is pressed else None
+        return False, None
+
+    def draw(self, surface: pygame.Surface, chosen: str, ui_scale: float) -> None:
+        """Draw the toolbar; `chosen` is the name of the tool in use."""
+        draw_box(surface, self.rect, 7 * ui_scale, PANEL, 235)
+        for tool, rect in self._rects:
+            is_chosen = tool.name == chosen
+            fill = SKY if is_chosen else LINE if tool is self._hovered else PANEL_RAISED
+            pygame.draw.rect(surface, fill, rect, border_radius=round(5 * ui_scale))
+            colour = BACKGROUND if is_chosen else INK
+            image = tool_icon(tool.name, round(0.66 * rect.width), colour)
+            surface.blit(image, image.get_rect(center=rect.center))
+            if len(tool.key) == 1:
+                corner = rect.right - 3 * ui_scale, rect.bottom - 1 * ui_scale
+                colour = colour if is_chosen else FAINT
+                draw_text(surface, tool.key.upper(), corner, 8.5 * ui_scale, colour, "bottomright")
+
+    def draw_hint(self, surface: pygame.Surface, ui_scale: float) -> None:
+        """Draw the tooltip of the button under the pointer."""
+        if self._hovered is not None:
+            tool = self._hovered
+            at = self._pointer[0] + round(300 * ui_scale), self._pointer[1]
+            key = tool.key.upper() if len(tool.key) == 1 else tool.key
+            draw_hint(surface, f"{tool.about} ({key})", at, ui_scale)

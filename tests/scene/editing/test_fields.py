@@ -1,0 +1,364 @@
+"""Fields of tables: kinds, ranges and units from the models, and text of values."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import BaseModel, ValidationError
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.bodies import Box
+from sandbox.scene.description.discs import Ball, Emitter, Grid
+from sandbox.scene.description.fixed import Wall, Zone
+from sandbox.scene.description.forces import Attraction, PlungerDrive
+from sandbox.scene.description.game_tables import lazy_table
+from sandbox.scene.description.joints import Rod, RotarySpring
+from sandbox.scene.description.play import Play
+from sandbox.scene.description.world import Kick, Settings, World
+from sandbox.scene.editing.fields import (
+    FieldSpec,
+    evaluated,
+    fields_of,
+    format_number,
+    format_value,
+    parse,
+    summary,
+    unit_of,
+)
+
+
+def models(model: type[BaseModel], found: dict[type[BaseModel], None] | None = None) -> dict[type[BaseModel], None]:
+    """Return a model and the models of its fields, recursively."""
+    found = {} if found is None else found
+    if model not in found:
+        found[model] = None
+        for field in model.model_fields.values():
+            table = lazy_table(field)
+            for inner in _inner(field.annotation if table is None else table.model):
+                models(inner, found)
+    return found
+
+
+def _inner(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from _inner(argument)
+
+
+MODELS = tuple(models(Scene))
+SPECS = tuple((model, spec) for model in MODELS for spec in fields_of(model))
+NUMERIC = [spec for _, spec in SPECS if spec.kind in ("number", "integer", "numbers")]
+
+
+def spec_of(model: type[BaseModel], key: str) -> FieldSpec:
+    return next(spec for spec in fields_of(model) if spec.key == key)
+
+
+def ids(case: tuple[type[BaseModel], FieldSpec]) -> str:
+    return f"{case[0].__name__}-{case[1].key}"
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda model: model.__name__)
+def test_there_is_a_field_for_each_key_of_a_model(model: type[BaseModel]) -> None:
+    keys = [field.alias or name for name, field in model.model_fields.items()]
+    assert [spec.key for spec in fields_of(model)] == keys
+
+
+def test_fields_that_are_edited_have_a_description() -> None:
+    assert not [ids(case) for case in SPECS if case[1].kind != "other" and not case[1].description]
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "kind"),
+    [
+        (Ball, "radius", "number"),
+        (Ball, "mass", "number"),
+        (Ball, "position", "numbers"),
+        (Ball, "spin", "numbers"),
+        (Ball, "name", "name"),
+        (Ball, "material", "name"),
+        (Ball, "layer", "name"),
+        (Ball, "colour", "text"),
+        (Ball, "fixed", "flag"),
+        (Ball, "collides", "choice"),
+        (Grid, "columns", "integer"),
+        (Emitter, "colours", "other"),
+        (Wall, "points", "other"),
+        (Wall, "kick", "other"),
+        (Wall, "layers", "other"),
+        (Zone, "gravity", "numbers"),
+        (Rod, "between", "other"),
+        (Rod, "kind", "choice"),
+        (World, "bounds", "other"),
+        (Settings, "continuous", "flag"),
+        (Attraction, "toward", "other"),
+        (PlungerDrive, "kind", "choice"),
+        (Play, "game", "choice"),
+        (Play, "spot", "other"),
+        (Scene, "title", "text"),
+    ],
+)
+def test_kind(model: type[BaseModel], key: str, kind: str) -> None:
+    assert spec_of(model, key).kind == kind
+
+
+def test_length_choices_default_and_range() -> None:
+    position, velocity, spin = (spec_of(Ball, key) for key in ("position", "velocity", "spin"))
+    assert (position.length, spin.length, spec_of(Ball, "radius").length) == (2, 3, 0)
+    assert position.is_required and not position.is_optional and position.default is None
+    assert not velocity.is_required and not velocity.is_optional and velocity.default == (0.0, 0.0)
+    assert not spin.is_required and spin.is_optional and spin.default is None
+    assert (position.low, position.high) == (-1e16, 1e16)
+    assert (velocity.low, velocity.high) == (None, None)
+    assert spec_of(Ball, "collides").choices == ("all", "fixed", "none")
+    assert spec_of(Ball, "collides").default == "all"
+    assert spec_of(PlungerDrive, "kind").choices == ("plunger",)
+    duration = spec_of(World, "duration")
+    assert (duration.low, duration.is_low_excluded, duration.high, duration.is_high_excluded) == (0, True, 1e9, False)
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "unit"),
+    [
+        (Ball, "radius", "m"),
+        (Ball, "density", "kg/m²"),
+        (Ball, "angle", "rad"),
+        (Ball, "angular_velocity", "rad/s"),
+        (Ball, "restitution", ""),
+        (Ball, "restitution_falloff", "s/m"),
+        (Ball, "surface_speed", "m/s"),
+        (World, "linear_drag", "1/s"),
+        (World, "quadratic_drag", "1/m"),
+        (Attraction, "strength", "m³/s²"),
+        (RotarySpring, "damping", "N·m·s/rad"),
+        (RotarySpring, "strength", "N"),
+        (Kick, "profile", ""),
+        (Settings, "dt", "s"),
+    ],
+)
+def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
+    assert spec_of(model, key).unit == unit
+
+
+DIMENSIONLESS = {
+    "ball_restitution", "bias", "bot", "bounce", "curl", "cushion_friction", "cushion_restitution", "damping",
+    "direction", "error", "facing", "friction", "height", "hold_ratio", "normal", "ratio", "restitution",
+    "return_ratio", "rolling_friction", "roughness", "side", "sliding_friction", "spinning_friction", "stretch",
+}  # fmt: skip
+"""keys of the numbers without a unit, checked by eye"""
+
+
+def test_every_number_with_a_dimension_has_a_unit() -> None:
+    without = {spec.key for _, spec in SPECS if spec.kind in ("number", "numbers") and not spec.unit}
+    assert without <= DIMENSIONLESS
+
+
+def test_unit_needs_its_place_in_the_description() -> None:
+    assert unit_of("kg/m²; default: that of the body") == "kg/m²"
+    assert unit_of("direction of the cue, rad from +x") == "rad"
+    assert unit_of("1 means about 0.3 m in length and 0.1 m sideways") == ""
+    assert unit_of("larger, smaller") == ""
+
+
+def in_range(spec: FieldSpec) -> st.SearchStrategy[Any]:
+    """Return the valid values of a numeric field."""
+    if spec.kind == "integer":
+        low, high = (None if end is None else int(end) for end in (spec.low, spec.high))
+        low = low if low is None else low + spec.is_low_excluded
+        return st.integers(low, high if high is None else high - spec.is_high_excluded)
+    number = st.floats(
+        spec.low,
+        spec.high,
+        allow_nan=False,
+        allow_infinity=False,
+        exclude_min=spec.is_low_excluded,
+        exclude_max=spec.is_high_excluded,
+    )
+    return number if spec.kind == "number" else st.lists(number, min_size=spec.length, max_size=spec.length)
+
+
+@given(st.data())
+def test_text_of_a_number_is_read_as_the_same_value(data: st.DataObject) -> None:
+    spec = data.draw(st.sampled_from(NUMERIC))
+    value = data.draw(in_range(spec))
+    assert parse(spec, format_value(spec, value)) == value
+
+
+@given(st.data())
+def test_parsed_value_is_in_range_or_rejected(data: st.DataObject) -> None:
+    spec = data.draw(st.sampled_from([spec for spec in NUMERIC if spec.kind == "number"]))
+    value = data.draw(st.floats(allow_nan=False, allow_infinity=False))
+    is_low = spec.low is not None and (value < spec.low or (spec.is_low_excluded and value == spec.low))
+    is_high = spec.high is not None and (value > spec.high or (spec.is_high_excluded and value == spec.high))
+    if is_low or is_high:
+        with pytest.raises(ValueError, match=r"^must be "):
+            parse(spec, repr(value))
+    else:
+        assert parse(spec, repr(value)) == value
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_formatted_number_is_exact_and_never_longer_than_repr(value: float) -> None:
+    text = format_number(value)
+    assert evaluated(text) == value
+    assert len(text) <= len(repr(value))
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2.0, "2"), (0.1, "0.1"), (-9.81, "-9.81"), (1e16, "1e16"), (1e-9, "1e-9"), (1000.0, "1000"), (0.25, "0.25"),
+        (1 / 60, "1/60"), (-1 / 3, "-1/3"),
+        (1 / 64, "0.015625"), (2 / 3, "0.6666666666666666"),
+        (2.5e6, "2500000"), (3e6, "3e6"), (1.5e-7, "1.5e-7"), (0.0, "0"), (7, "7"), (2**63 - 1, "9223372036854775807"),
+    ],
+)  # fmt: skip
+def test_format_of_numbers(value: float, text: str) -> None:
+    assert format_number(value) == text
+
+
+@given(st.integers(2, 1000), st.sampled_from((-1, 1)))
+def test_text_of_a_fraction_is_short_and_exact(denominator: int, sign: int) -> None:
+    text = format_number(sign / denominator)
+    assert evaluated(text) == sign / denominator
+    assert len(text) <= 12
+
+
+def test_format_of_other_values() -> None:
+    assert format_value(spec_of(Ball, "position"), (0.0, 1.5)) == "0, 1.5"
+    assert format_value(spec_of(Ball, "fixed"), True) == "true"
+    assert format_value(spec_of(Ball, "name"), "a b") == "a b"
+    assert format_value(spec_of(Ball, "mass"), None) == ""
+    assert format_value(spec_of(Wall, "points"), [[0, 0], [1, 0], [1, 1]]) == "3 points"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ((), ""), (None, ""), ([[0, 1]], "1 point"), (["a", "b"], "a, b"), ("sun", "sun"), ([0.0, 1.5], "0, 1.5"),
+        ([{"name": "a"}, {"name": "b"}], "2 tables"), ({"speed": 1.0, "profile": "even"}, "speed, profile"),
+        (Kick(speed=2.0), "speed"), (Settings(), ""),
+    ],
+)  # fmt: skip
+def test_summary(value: Any, text: str) -> None:
+    assert summary(value) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e-3", 1e-3), ("2*pi", math.tau), ("2 pi", math.tau), ("1/60", 1 / 60), ("-(1 + 2) ** 2", -9), ("2^3", 8),
+        ("45 deg", math.pi / 4), ("45°", math.pi / 4), ("deg(45)", math.pi / 4), ("90*deg", math.pi / 2), ("−2", -2),
+        ("sqrt(2)", math.sqrt(2)), ("sin(30deg)", 0.5), ("cos(0)", 1), ("tau/2", math.pi), ("+.5", 0.5), ("π", math.pi),
+        ("007", 7), ("1e-05", 1e-5), ("00.5", 0.5),
+    ],
+)  # fmt: skip
+def test_expression(text: str, value: float) -> None:
+    assert evaluated(text) == pytest.approx(value, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "x", "1 +", "__import__('os')", "True", "'a'", "1j", "[1]", "1 if 1 else 2", "pi.real", "sqrt(1, 2)", "1 2",
+        "sqrt", "1 // 2", "lambda: 1", "(" * 150, "nan", "inf", "1_", "~1", "\x00", "1if 1else 2", "0x10",
+    ],
+)  # fmt: skip
+def test_text_that_is_no_number(text: str) -> None:
+    with pytest.raises(ValueError, match="must be a number, such as"):
+        evaluated(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1/0", "must not divide by 0"),
+        ("0**-1", "must not divide by 0"),
+        ("sqrt(-1)", "must have a real value"),
+        ("(-1)**0.5", "must have a real value"),
+        ("1e999", "must be a finite number"),
+        ("9**9**9**9", "must be a finite number"),
+        ("10**400", "must be a finite number"),
+        ("1" * 201, "must have at most 200 characters, has 201"),
+    ],
+)
+def test_expression_without_a_value(text: str, message: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        evaluated(text)
+    assert str(caught.value) == message
+
+
+@given(st.text(alphabet="0123456789.+-*/()episqrtdgco, °^²\x00é'\"[]{}:=", max_size=40))
+def test_any_text_is_a_finite_number_or_a_value_error(text: str) -> None:
+    try:
+        value = evaluated(text)
+    except ValueError as error:
+        assert str(error).startswith("must ")
+    else:
+        assert math.isfinite(value)
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "text", "message"),
+    [
+        (Ball, "restitution", "2", "must be between 0 and 1, is 2"),
+        (World, "duration", "0", "must be greater than 0 and at most 1e9, is 0"),
+        (World, "seed", "2**63", "must be at least 0 and less than 9223372036854775808, is 9223372036854775808"),
+        (World, "seed", "1.5", "must be a whole number, is 1.5"),
+        (Ball, "radius", "", "must have a value"),
+        (Ball, "position", "1", "must be 2 numbers with commas between them, has 1"),
+        (Ball, "position", "1, 2, 3", "must be 2 numbers with commas between them, has 3"),
+        (Ball, "position", "1,", "must be 2 numbers with commas between them, has 1"),
+        (Ball, "collides", "some", "must be all or fixed or none, is some"),
+        (Ball, "fixed", "yes", "must be true or false, is yes"),
+        (Ball, "colour", "red", "must be a colour such as #ff8000"),
+        (Ball, "name", "a\x07b", "must have no control characters"),
+        (Ball, "name", "n" * 201, "must have at most 200 characters, has 201"),
+        (Wall, "points", "1", "cannot be edited as text"),
+    ],
+)
+def test_invalid_text(model: type[BaseModel], key: str, text: str, message: str) -> None:
+    with pytest.raises(ValueError) as caught:
+        parse(spec_of(model, key), text)
+    assert str(caught.value) == message
+
+
+@pytest.mark.parametrize(
+    ("model", "key", "text", "value"),
+    [
+        (Ball, "mass", " ", None),
+        (Ball, "velocity", "", None),
+        (Ball, "layer", "", None),
+        (Ball, "velocity", "[1, pi]", [1.0, math.pi]),
+        (Ball, "fixed", "true", True),
+        (Ball, "fixed", "false", False),
+        (Ball, "collides", "none", "none"),
+        (Ball, "colour", "#Ff8000", "#Ff8000"),
+        (Ball, "name", "  cue ball ", "cue ball"),
+        (World, "seed", "2**63 - 1", 2**63 - 1),
+        (World, "seed", "6/2", 3),
+    ],
+)
+def test_valid_text(model: type[BaseModel], key: str, text: str, value: Any) -> None:
+    assert parse(spec_of(model, key), text) == value
+
+
+def test_numbers_have_the_type_of_the_file() -> None:
+    assert type(parse(spec_of(Ball, "mass"), "2")) is float
+    assert [type(each) for each in parse(spec_of(Ball, "position"), "1, 2")] == [float, float]
+    assert type(parse(spec_of(World, "seed"), "1e3")) is int
+
+
+@given(st.data())
+def test_model_accepts_a_parsed_value_of_a_box(data: st.DataObject) -> None:
+    spec = data.draw(st.sampled_from([spec for spec in fields_of(Box) if spec.kind in ("number", "numbers")]))
+    value = parse(spec, format_value(spec, data.draw(in_range(spec))))
+    document = {"position": (0.0, 0.0), "size": (1.0, 1.0)}
+    try:
+        Box.model_validate({**document, spec.key: tuple(value) if isinstance(value, list) else value})
+    except ValidationError as error:
+        assert spec.key == "velocity", error  # its length is limited, not its components

@@ -1,0 +1,453 @@
+"""Edit mode of the window, with events as SDL sends them: scenes built from nothing, saved, and run headless."""
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.editing.elements import ElementKey
+from sandbox.scene.files.load import load, loads
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.editor.edit_view import EditView
+from sandbox.window.editor.editor import TOOLS, Editor
+from sandbox.window.playback.live import LiveView
+from tests.window.pressing import key, key_up, move, press, release, wheel
+
+pytestmark = pytest.mark.full  # a window
+
+SIZE = (1280, 720)
+CTRL, SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
+Point = tuple[float, float]
+
+
+class Hand:
+    """Mouse and keyboard of a user in the editor; points in metres."""
+
+    def __init__(self, window: App) -> None:
+        self.window = window
+
+    @property
+    def view(self) -> EditView:
+        assert self.window.editing is not None
+        return self.window.editing
+
+    @property
+    def editor(self) -> Editor:
+        return self.view.editor
+
+    @property
+    def scene(self) -> Scene:
+        return self.view.draft.scene
+
+    def frame(self, *events: pygame.event.Event) -> None:
+        for event in events:
+            pygame.event.post(event)
+        self.window.run_frame(0.02)
+
+    def pixel(self, point: Point) -> tuple[float, float]:
+        x, y = self.window.context.camera.to_screen(np.asarray(point)).tolist()
+        return x, y
+
+    def key(self, code: int, mod: int = 0, text: str = "") -> None:
+        text_event = [pygame.event.Event(pygame.TEXTINPUT, text=text)] if text else []
+        self.frame(key(code, mod), *text_event, key_up(code))
+
+    def type(self, text: str) -> None:
+        for letter in text:
+            self.key(pygame.key.key_code(letter), 0, letter)
+
+    def click(self, *points: Point) -> None:
+        for point in points:
+            self.frame(move(*self.pixel(point)))
+            self.frame(press(*self.pixel(point)), release(*self.pixel(point)))
+
+    def drag(self, begin: Point, end: Point, steps: int = 3, is_released: bool = True) -> None:
+        self.frame(move(*self.pixel(begin)), press(*self.pixel(begin)))
+        for k in range(1, steps + 1):
+            point = tuple(a + (b - a) * k / steps for a, b in zip(begin, end, strict=True))
+            self.frame(move(*self.pixel((point[0], point[1])), held=True))
+        if is_released:
+            self.frame(release(*self.pixel(end)))
+
+    def set_field(self, section: str, field: str, text: str) -> None:
+        """Click a field of the property panel, type a value and press Enter."""
+        self.frame()
+        box = self.view.panel.box_of(section, field)
+        assert box is not None, (section, field, self.editor.selection)
+        self.frame(press(*box.center), release(*box.center))
+        self.key(pygame.K_a, CTRL)
+        for letter in text:
+            self.frame(pygame.event.Event(pygame.TEXTINPUT, text=letter))
+        self.key(pygame.K_RETURN)
+
+
+@pytest.fixture
+def hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
+    """A window without a scene, in which a new one is edited."""
+    monkeypatch.chdir(tmp_path)
+    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
+    pygame.event.clear()
+    window.start_editing()
+    found = Hand(window)
+    found.frame()
+    yield found
+    window.close()
+
+
+@pytest.fixture
+def open_on(tmp_path: Path) -> Iterator[Callable[[str], Hand]]:
+    """Return a function that opens a window on a scene and edits it."""
+    windows: list[App] = []
+
+    def edit(text: str) -> Hand:
+        path = tmp_path / "scene.toml"
+        path.write_text(text)
+        window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
+        windows.append(window)
+        assert window.app_state.open(path)
+        pygame.event.clear()
+        found = Hand(window)
+        found.key(pygame.K_e, CTRL)
+        found.frame()
+        return found
+
+    yield edit
+    for window in windows:
+        window.close()
+
+
+BALL = """# two balls
+[[plane]]
+point = [0, 0]
+normal = [0, 1]
+[[ball]]
+name = "a"
+position = [0.0, 2.0]  # above
+radius = 0.5
+[[ball]]
+name = "b"
+position = [2.0, 2.0]
+radius = 0.5
+"""
+
+
+def save_as(hand: Hand, path: Path) -> None:
+    """Save a new scene, typing its name."""
+    hand.key(pygame.K_s, CTRL)
+    assert hand.view.prompt is not None
+    hand.key(pygame.K_a, CTRL)
+    for letter in str(path):
+        hand.frame(pygame.event.Event(pygame.TEXTINPUT, text=letter))
+    hand.key(pygame.K_RETURN)
+    assert hand.view.prompt is None
+
+
+def test_newtons_cradle_is_built_saved_and_run(hand: Hand, tmp_path: Path) -> None:
+    hand.click((4.0, 4.0))  # clears the selection, so that the fields of the world are shown
+    hand.set_field("world", "duration", "2.4")
+    hand.key(pygame.K_b)
+    for x in (-1.0, 0.0, 1.0):
+        hand.drag((x, 1.0), (x + 0.4, 1.0), is_released=False)
+        hand.type("0.5")
+        hand.key(pygame.K_RETURN)
+    hand.key(pygame.K_1)
+    for x in (-1.0, 0.0, 1.0):
+        hand.click((x, 1.0), (x, 4.0))
+    hand.key(pygame.K_v)
+    hand.drag((-2.0, 0.4), (2.0, 1.6))
+    assert [each.table for each in hand.editor.selection] == ["ball"] * 3
+    hand.set_field("selection:ball", "restitution", "1")
+    hand.click((-1.0, 1.0))
+    hand.set_field("selection:ball", "velocity", "-2, 0")
+    save_as(hand, tmp_path / "cradle.toml")
+    scene = load(tmp_path / "cradle.toml")
+    written = loads(
+        """
+[world]
+gravity = [0, -9.81]
+duration = 2.4
+[[plane]]
+name = "ground"
+point = [0, 0]
+normal = [0, 1]
+friction = 0.5
+restitution = 0.5
+"""
+        + "".join(
+            f'[[ball]]\nname = "{name}"\nposition = [{x}, 1]\nradius = 0.5\nrestitution = 1\n{more}'
+            for name, x, more in (("ball", -1, "velocity = [-2, 0]\n"), ("ball 2", 0, ""), ("ball 3", 1, ""))
+        )
+        + "".join(
+            f'[[joint]]\nname = "{rod}"\nkind = "rod"\nbetween = ["{ball}"]\nanchors = [[0, 0], [{x}, 4]]\n'
+            for rod, ball, x in (("rod", "ball", -1), ("rod 2", "ball 2", 0), ("rod 3", "ball 3", 1))
+        )
+    )
+    assert scene.balls == written.balls
+    assert scene.joints == written.joints
+    one, other = run(scene, "reference"), run(written, "reference")
+    assert one.position.tobytes() == other.position.tobytes()
+    right = one.position[:, 2, 0].max()
+    assert right > 1.1  # the last ball was struck
+
+
+def test_car_with_motor_wheels_and_spring_drives(hand: Hand, tmp_path: Path) -> None:
+    hand.key(pygame.K_x)
+    hand.drag((-1.0, 0.8), (1.0, 1.2))
+    hand.key(pygame.K_b)
+    for x in (-0.8, 0.8):
+        hand.drag((x, 0.5), (x + 0.4, 0.5))
+    hand.key(pygame.K_v)
+    hand.click((-0.8, 0.4))
+    hand.drag((-1.5, -0.2), (1.5, 2.0))
+    hand.set_field("selection:ball", "friction", "1")
+    for x in (-0.8, 0.8):
+        hand.key(pygame.K_2 if x > 0 else pygame.K_5)
+        hand.click((x, 0.85))
+    joints = hand.scene.joints
+    assert [joint.kind for joint in joints] == ["pivot", "motor", "pivot"]
+    assert all(len(joint.between) == 2 for joint in joints)
+    save_as(hand, tmp_path / "car.toml")
+    found = run(load(tmp_path / "car.toml", ["world.duration=3"]), "pymunk")
+    assert found.status == "ok"
+    names = found.names.tolist()
+    assert found.position[-1, names.index("box"), 0] > 1.0  # it has driven to the right
+
+
+def test_bridge_of_planks_and_pivots_holds(hand: Hand, tmp_path: Path) -> None:
+    hand.key(pygame.K_x)
+    for x in (-3.0, -1.0, 1.0):
+        hand.drag((x, 2.0), (x + 2.0, 2.2))
+    hand.key(pygame.K_2)
+    hand.click((-3.0, 2.1), (-1.0, 2.1), (1.0, 2.1), (3.0, 2.1))
+    assert [len(joint.between) for joint in hand.scene.joints] == [1, 2, 2, 1]
+    save_as(hand, tmp_path / "bridge.toml")
+    found = run(load(tmp_path / "bridge.toml", ["world.duration=2"]), "pymunk")
+    assert found.status == "ok"
+    low = found.position[-1, :, 1]
+    assert (low > 0.1).all()  # it hangs between its ends
+    assert math.isclose(low[0], low[2], abs_tol=0.05)  # and is symmetric
+
+
+def test_lane_of_walls_and_posts(hand: Hand, tmp_path: Path) -> None:
+    hand.key(pygame.K_w)
+    hand.click((-2.0, 4.0), (-2.0, 1.0), (-1.0, 0.5))
+    hand.key(pygame.K_RETURN)
+    hand.click((2.0, 4.0), (3.0, 4.0), (3.0, 3.0), (2.0, 3.0), (2.0, 4.0))  # ends at its first corner
+    hand.key(pygame.K_t)
+    hand.drag((0.0, 2.5), (0.3, 2.5))
+    hand.key(pygame.K_y)
+    hand.click((-4.0, 1.0), (-3.0, 1.0), (-3.0, 2.0), (-4.0, 1.0))
+    save_as(hand, tmp_path / "lane.toml")
+    scene = load(tmp_path / "lane.toml")
+    assert scene.walls[0].points == ((-2.0, 4.0), (-2.0, 1.0), (-1.0, 0.5))
+    assert (len(scene.walls[1].points), scene.walls[1].closed) == (4, True)
+    assert (scene.posts[0].position, scene.posts[0].radius) == ((0.0, 2.5), 0.3)
+    assert scene.polygons[0].position == (-4.0, 1.0)
+    assert scene.polygons[0].points == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+
+
+def test_running_starts_at_the_edited_scene_and_returning_restores_it(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.drag((0.0, 2.0), (0.0, 3.0))
+    edited = hand.view.draft.text
+    assert "position = [0.0, 3.0]  # above" in edited
+    camera = hand.window.context.camera
+    hand.key(pygame.K_SPACE)
+    assert hand.window.editing is None
+    live = hand.window.app_state.view
+    assert isinstance(live, LiveView)
+    assert live.frame.position[0].tolist() == [0.0, 3.0]
+    assert hand.window.context.camera == camera
+    for _ in range(10):
+        hand.frame()
+    assert live.step_number > 0
+    hand.key(pygame.K_e, CTRL)
+    assert hand.view.draft.text == edited
+    hand.key(pygame.K_z, CTRL)  # also what was done before it ran
+    assert hand.view.draft.text == BALL
+
+
+def test_selection_by_click_shift_and_rubber_band(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    a, b = ElementKey("ball", 0), ElementKey("ball", 1)
+    hand.click((0.0, 2.0))
+    assert hand.editor.selection == [a]
+    at = hand.pixel((2.0, 2.0))
+    pygame.key.set_mods(SHIFT)
+    hand.frame(press(*at), release(*at))
+    assert hand.editor.selection == [a, b]
+    hand.frame(press(*at), release(*at))
+    assert hand.editor.selection == [a]
+    pygame.key.set_mods(0)
+    hand.drag((-1.0, 1.0), (3.0, 3.0))
+    assert hand.editor.selection == [a, b]
+    hand.key(pygame.K_ESCAPE)
+    assert hand.editor.selection == []
+    hand.key(pygame.K_a, CTRL)
+    assert len(hand.editor.selection) == 3
+
+
+def test_handles_rotate_and_scale(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on('[[box]]\nname = "a"\nposition = [0.0, 0.0]\nsize = [2.0, 1.0]\n')
+    hand.click((0.0, 0.0))
+    hand.frame()
+    view = hand.view._view
+    rotate = next(handle for handle in hand.editor.handles(view) if handle.kind == "rotate")
+    radius = math.hypot(*rotate.point)
+    hand.drag(rotate.point, (radius * math.cos(math.radians(62)), radius * math.sin(math.radians(62))))
+    assert math.isclose(hand.scene.boxes[0].angle, math.radians(-30), abs_tol=1e-8)  # in steps of 15°
+    hand.key(pygame.K_z, CTRL)
+    corner = next(handle for handle in hand.editor.handles(view) if handle.kind == "scale" and handle.index == 2)
+    hand.drag(corner.point, (3.0, 1.5), is_released=False)
+    hand.type("2")
+    hand.key(pygame.K_RETURN)
+    assert hand.scene.boxes[0].size == (4.0, 2.0)
+    assert hand.scene.boxes[0].position == (1.0, 0.5)  # the opposite corner stays
+
+
+def test_snapping_to_the_ground_and_suspending_it(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.drag((0.0, 2.0), (0.01, 0.515))
+    assert hand.scene.balls[0].position == (0.0, 0.5)  # it lies on the ground
+    pygame.key.set_mods(CTRL)
+    hand.drag((0.0, 0.5), (0.513, 1.377))
+    pygame.key.set_mods(0)
+    x, y = hand.scene.balls[0].position
+    assert math.hypot(x - 0.513, y - 1.377) < 0.02  # a pixel is 0.01 m
+
+
+def test_fault_is_shown_at_the_element_and_changes_nothing(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    hand.set_field("selection:ball", "radius", "-1")
+    assert hand.scene.balls[0].radius == 0.5
+    assert hand.view.panel.has_focus  # the text stays, to be mended
+    hand.key(pygame.K_ESCAPE)
+    hand.set_field("selection:ball", "name", "b")
+    assert hand.view.draft.text == BALL
+    hand.key(pygame.K_ESCAPE)
+    hand.key(pygame.K_v)
+    assert not hand.editor.apply([*_moved_to(hand, (0.0, -3000.0))], "move")
+    assert hand.editor.fault is not None
+    assert "behind the plane" in hand.editor.fault[1]
+    hand.frame()  # draws it
+
+
+def _moved_to(hand: Hand, point: Point) -> list:  # type: ignore[type-arg]
+    from sandbox.scene.files.toml_changes import SetValue
+
+    return [SetValue(("ball", 0, "position"), list(point))]
+
+
+def test_editing_keys(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    hand.key(pygame.K_RIGHT)
+    hand.key(pygame.K_RIGHT)
+    x = hand.scene.balls[0].position[0]
+    assert x > 0.0
+    hand.key(pygame.K_z, CTRL)
+    assert hand.view.draft.text == BALL  # both steps at once
+    hand.key(pygame.K_d, CTRL)
+    assert [ball.name for ball in hand.scene.balls] == ["a", "b", "a 2"]
+    hand.key(pygame.K_c, CTRL)
+    hand.key(pygame.K_v, CTRL)
+    assert hand.scene.balls[-1].name == "a 3"
+    hand.key(pygame.K_x, CTRL)
+    assert len(hand.scene.balls) == 3
+    hand.key(pygame.K_DELETE)  # nothing is selected
+    assert len(hand.scene.balls) == 3
+    hand.key(pygame.K_e)
+    hand.click((2.0, 2.0))
+    assert [ball.name for ball in hand.scene.balls] == ["a", "a 2"]
+    for _ in range(4):
+        hand.key(pygame.K_z, CTRL)
+    hand.key(pygame.K_z, CTRL | SHIFT)
+    assert len(hand.scene.balls) == 3
+
+
+@pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.name)
+def test_every_tool_has_a_key_and_a_button(hand: Hand, tool: object) -> None:
+    name, letter = getattr(tool, "name"), getattr(tool, "key")  # noqa: B009, of pytest's parameters
+    hand.key(pygame.key.key_code(letter))
+    assert hand.editor.tool == name
+    hand.key(pygame.K_v)
+    rect = hand.view.toolbar.rect_of(name)
+    hand.frame(press(*rect.center), release(*rect.center))
+    assert hand.editor.tool == name
+    hand.click((0.0, 3.0))
+    hand.key(pygame.K_ESCAPE)
+    hand.key(pygame.K_ESCAPE)
+    hand.key(pygame.K_ESCAPE)
+    assert hand.editor.tool == "select"
+
+
+def test_saving_a_file_that_changed_on_disk_asks(open_on: Callable[[str], Hand], tmp_path: Path) -> None:
+    hand = open_on(BALL)
+    path = tmp_path / "scene.toml"
+    hand.drag((0.0, 2.0), (0.0, 3.0))
+    path.write_text("# written by another program\n" + BALL)
+    hand.key(pygame.K_s, CTRL)
+    assert hand.view.prompt is not None
+    assert "changed by another program" in hand.view.prompt.note
+    assert path.read_text().startswith("# written by another")
+    hand.key(pygame.K_RETURN)
+    assert "Enter again replaces it" in hand.view.prompt.note
+    hand.key(pygame.K_RETURN)
+    assert hand.view.prompt is None
+    assert path.read_text() == hand.view.draft.text
+
+
+def test_unsaved_scene_is_asked_about_before_quitting(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    hand.key(pygame.K_DELETE)
+    hand.key(pygame.K_ESCAPE)
+    assert hand.window.context.exit_status is None
+    assert "not saved" in (hand.window.app_state.question or "")
+    hand.frame()
+    hand.key(pygame.K_z, CTRL)
+    assert hand.window.app_state.question is None
+    hand.key(pygame.K_ESCAPE)
+    assert hand.window.context.exit_status == 0
+
+
+def test_scene_of_a_preset_is_taken_apart(tmp_path: Path) -> None:
+    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
+    try:
+        from sandbox.scene.files.shipped_scenes import find
+
+        assert window.app_state.open(find("9-ball"))
+        pygame.event.clear()
+        window.start_editing()
+        hand = Hand(window)
+        hand.frame()
+        ball = hand.scene.balls[0].position
+        hand.click(ball)
+        assert hand.editor.selection == []
+        hand.key(pygame.K_x, CTRL | SHIFT)
+        hand.click(ball)
+        assert hand.editor.selection == [ElementKey("ball", 0)]
+    finally:
+        window.close()
+
+
+def test_zoom_and_panel_work_while_editing(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    scale = hand.window.context.camera.scale
+    hand.frame(move(400, 300), wheel(2))
+    assert hand.window.context.camera.scale > scale
+    hand.key(pygame.K_TAB)
+    assert not hand.window.context.gui.panel.visible
+    hand.key(pygame.K_F1)
+    assert hand.window.context.gui.help.open
+    hand.frame()
+    hand.key(pygame.K_F1)
+    assert not hand.window.context.gui.help.open
+    assert hand.window.editing is not None
