@@ -20,7 +20,7 @@ from sandbox.window.app_state import AppState
 from sandbox.window.commands import CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
-from sandbox.window.editor.edit_view import HELP_ROWS, EditView
+from sandbox.window.editor.edit_view import HELP_GROUPS, EditView
 from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.gamepad import Gamepads
 from sandbox.window.input.keymap import Command, Keyboard
@@ -292,7 +292,7 @@ class App:
         context = self.context
         editing.draw(context.surface)
         if context.gui.help.open:
-            context.gui.help.draw(context.surface, context.gui.ui_scale, HELP_ROWS)
+            context.gui.help.draw(context.surface, context.gui.ui_scale, groups=HELP_GROUPS)
         if self.app_state.question is not None:
             size = 16 * context.gui.ui_scale
             draw_notice(context.surface, self.app_state.question, context.gui.area, size, ORANGE)

@@ -26,6 +26,7 @@ from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
+from sandbox.window.ui.help import HelpGroup
 from sandbox.window.ui.hud import draw_messages
 
 ACTIONS = (
@@ -49,20 +50,49 @@ DELEGATED_WITH_CONTROL = {
     pygame.K_r: Command.RECORD,
     pygame.K_o: Command.PICKER,
 }
-HELP_ROWS = (
-    *((tool.key.upper(), tool.about) for tool in TOOLS),
-    ("Shift+click", "add to the selection, or remove from it"),
-    ("Ctrl while dragging", "suspend snapping"),
-    ("digits while dragging", "type dimensions; Enter applies"),
-    ("Delete", "delete the selection"),
-    ("Arrows (Shift: × 10)", "move the selection by the grid"),
-    ("M or Shift+M", "mirror left and right, or up and down"),
-    ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
-    ("Ctrl+D or Ctrl+A", "duplicate; select all"),
-    ("Ctrl+Z or Ctrl+Shift+Z", "undo; redo"),
-    ("Ctrl+S or Ctrl+Shift+S", "save; save as"),
-    ("Ctrl+Shift+X", "take a preset apart"),
-    ("Space or Ctrl+E", "run the scene"),
+HELP_GROUPS = (
+    HelpGroup("Tools", tuple((tool.key.upper(), tool.about) for tool in TOOLS)),
+    HelpGroup(
+        "Selection",
+        (
+            ("Click", "select; again: the element below"),
+            ("Shift+click", "add to the selection, or remove from it"),
+            ("Drag", "move; on empty ground: select all inside"),
+            ("Ctrl+drag", "without snapping"),
+            ("Digits", "while dragging: dimensions; Enter applies"),
+            ("Arrows", "move by the grid; with Shift: ten steps"),
+            ("M or Shift+M", "mirror left and right, up and down"),
+            ("Delete", "delete"),
+            ("Ctrl+A", "select all"),
+            ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
+            ("Ctrl+D", "duplicate"),
+        ),
+    ),
+    HelpGroup(
+        "Scene",
+        (
+            ("Space or Ctrl+E", "run the scene; Ctrl+E returns"),
+            ("Ctrl+Z", "undo"),
+            ("Ctrl+Shift+Z", "redo"),
+            ("Ctrl+S", "save"),
+            ("Ctrl+Shift+S", "save as"),
+            ("Ctrl+Shift+X", "take a preset apart"),
+            ("Ctrl+O", "open a scene"),
+            ("Ctrl+P", "screenshot"),
+            ("Esc", "cancel; select nothing; quit"),
+        ),
+    ),
+    HelpGroup(
+        "View",
+        (
+            ("Wheel", "zoom at the cursor"),
+            ("Right-drag", "pan"),
+            ("Home", "fit the scene"),
+            ("Tab", "show or hide the panel"),
+            ("F11", "full screen"),
+            ("F1 or H", "this help"),
+        ),
+    ),
 )
 """Keys of edit mode, for the help page."""
 

@@ -180,8 +180,9 @@ class Editor:
         return self.draft.preset is not None
 
     def choose_tool(self, name: str) -> None:
-        """Choose a tool, and cancel a gesture."""
-        self.cancel()
+        """Choose a tool, and cancel a gesture; the selection stays."""
+        if self.gesture is not None:
+            self.cancel()
         self.tool = name
 
     def selected(self) -> list[tuple[ElementKey, Part]]:

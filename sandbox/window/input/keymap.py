@@ -108,7 +108,7 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_RIGHTBRACKET,), 0, Command.NEXT, "next scene", "]", _SCENE, "]"),
     Binding((pygame.K_o,), _CTRL, Command.PICKER, "open a scene", "Ctrl+O", _SCENE),
     Binding((pygame.K_l,), _CTRL, Command.RELOAD, "reload the file", "Ctrl+L", _SCENE),
-    Binding((pygame.K_e,), _CTRL, Command.EDIT, "edit the scene", "Ctrl+E", _SCENE),
+    Binding((pygame.K_e,), _CTRL, Command.EDIT, "edit the scene", "Ctrl+E", _BODIES),
     Binding((pygame.K_e,), 0, Command.ENGINE, "next engine", "E", _SCENE),
     Binding((pygame.K_g,), 0, Command.GHOST, "ghost: another engine's run", "G", _SCENE),
     Binding((pygame.K_t,), 0, Command.TRUST, "predictability horizon", "T", _SCENE),

@@ -93,10 +93,11 @@ class HelpOverlay:
         ui_scale: float,
         scene_keys: Sequence[tuple[str, str]] = (),
         gamepad: Sequence[tuple[str, str]] = (),
+        groups: Sequence[HelpGroup] = (),
     ) -> None:
-        """Draw the overlay over the whole window, regardless of `open`."""
+        """Draw the overlay over the whole window, regardless of `open`; `groups` replace all others, if given."""
         draw_box(surface, surface.get_rect(), 0, BACKGROUND, 236, None)
-        groups = help_groups(scene_keys, gamepad)
+        groups = tuple(groups) or help_groups(scene_keys, gamepad)
         margin = round(min(28 * ui_scale, 0.04 * min(surface.get_size())))
         area = surface.get_rect().inflate(-2 * margin, -2 * margin)
         size, columns = _fit_columns(groups, area, ui_scale)

@@ -43,6 +43,7 @@ PLAIN = {
     "0": Command.ENERGY,
 }
 WITH_CTRL = {
+    "e": Command.EDIT,
     "o": Command.PICKER,
     "p": Command.SCREENSHOT,
     "r": Command.RECORD,
