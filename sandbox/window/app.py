@@ -17,7 +17,7 @@ from sandbox.scene.editing.draft import NEW_SCENE, SceneDraft
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps
 from sandbox.window.app_state import AppState
-from sandbox.window.commands import CommandDispatcher
+from sandbox.window.commands import LOSE_DRAFT, CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
 from sandbox.window.editor.edit_view import HELP_GROUPS, EditView
@@ -116,6 +116,8 @@ class App:
         self._edited: EditView | None = None
         """the editor of the open scene, which was left to run it"""
         self.commands.on_edit = self.start_editing
+        self._folder = folder or Path()
+        self._asked: Command | None = None  # command that the last event may have confirmed
         self._clock = pygame.time.Clock()
         app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
@@ -143,6 +145,8 @@ class App:
         self.app_state.covered = has_cover or self.editing is not None
         compiled = COMPILE_CLOCK.seconds
         self.app_state.update(elapsed)
+        if self._edited is not None:
+            self._edited.update()
         if COMPILE_CLOCK.seconds > compiled:
             self._clock.tick()  # compile time does not advance the scene
         self.context.update_camera(elapsed)
@@ -204,6 +208,8 @@ class App:
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event: window events, start of a game, gamepads, then keys and mouse, topmost part first."""
         app_state, gui = self.app_state, self.context.gui
+        if self.context.exit_status is None:
+            self._asked = self.commands.pending
         if event.type == pygame.QUIT:
             self.commands.run(Command.QUIT)
         elif event.type == pygame.WINDOWFOCUSLOST:
@@ -242,6 +248,8 @@ class App:
             app_state.messages.add("a stored run cannot be edited; open its scene with `sandbox play`", "warning")
             return
         editing = self._edited
+        if editing is not None and not editing.draft.is_changed and editing.draft.is_file_changed():
+            editing = self._reopened(editing)
         if editing is None:
             try:
                 path = app_state.path
@@ -250,7 +258,7 @@ class App:
             except SceneError as error:
                 app_state.messages.add(str(error), "error")
                 return
-            editing = EditView(self.context, draft, self.stop_editing, self.commands.run)
+            editing = EditView(self.context, draft, self.stop_editing, self.commands.run, self._folder)
         self.mouse.release_all()
         self.context.following = None
         if not editing.draft.scene.bodies.names:
@@ -260,6 +268,18 @@ class App:
             self.context.camera = self.context.camera.zoomed(TOOLBAR_ZOOM, (area.right, area.centery))
         self.context.is_fitted = False  # the view stays when the scene runs
         self.editing = self._edited = editing
+
+    def _reopened(self, editing: EditView) -> EditView:
+        """Return an editor of a file that was changed on disk; the former one if it cannot be edited any more."""
+        path = editing.draft.path
+        try:
+            draft = None if path is None else SceneDraft.read(path)
+        except SceneError:  # a message of the window says so when it is saved
+            draft = None
+        if draft is None:
+            return editing
+        editing.close(is_lost=False)
+        return EditView(self.context, draft, self.stop_editing, self.commands.run, self._folder)
 
     def stop_editing(self) -> None:
         """Run the edited scene from the start."""
@@ -320,6 +340,7 @@ class App:
             other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
         if other:
             self.commands.cancel_confirmation()
+            self._asked = None
 
     def _starts_game(self, event: pygame.event.Event) -> bool:
         """Return whether an event starts the game that waits for it: Space, or any button of a gamepad."""
@@ -341,10 +362,17 @@ class App:
 
     def _on_scene_changed(self, same: bool) -> None:
         self._release_handlers.clear()  # they act on the former session
-        if not same:
-            self.editing = self._edited = None
+        is_reload_confirmed = self._asked is Command.RELOAD and self.commands.pending is None
+        if not same or is_reload_confirmed:
+            self._end_editing()
             self.app_state.has_unsaved_draft = False
         self.context.on_scene_changed(same)
+
+    def _end_editing(self) -> None:
+        """Close the editor; unsaved changes are lost only if the last event has confirmed it."""
+        if self._edited is not None:
+            self._edited.close(is_lost=self._asked in LOSE_DRAFT and self.commands.pending is None)
+        self.editing = self._edited = None
 
     def _resize(self) -> None:
         surface = pygame.display.get_surface()
@@ -370,6 +398,7 @@ class App:
     def close(self) -> None:
         """Finish a film that is being recorded, and close the window."""
         COMPILE_CLOCK.on_begin = None
+        self._end_editing()
         self.context.capture.stop_recording()
         self.context.gui.close()
         self.app_state.compute = compute_here

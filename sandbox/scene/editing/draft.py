@@ -118,6 +118,11 @@ class SceneDraft:
         return self._now.scene
 
     @property
+    def saved_text(self) -> str | None:
+        """The text as it is in the file, with its byte order mark; None if it is not in a file."""
+        return self._saved
+
+    @property
     def is_changed(self) -> bool:
         """Whether the text differs from the file."""
         return self._file_text != self._saved and (self._saved is not None or bool(self._past))

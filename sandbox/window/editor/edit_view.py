@@ -1,21 +1,25 @@
 """Edit view: what the window shows and how it reacts while a scene is edited. Time stands at 0."""
 
 from collections.abc import Callable, Sequence
+from datetime import date, datetime
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import pygame
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
+from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import ElementKey, element_at, name_of, table_values
 from sandbox.scene.editing.fields import fields_of
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
-from sandbox.window.editor.editor import TOOLS, Editor, EditTool, ViewScale
+from sandbox.window.editor.editor import TOOLS, AlignmentSide, Editor, EditTool, ViewScale
 from sandbox.window.editor.gestures import OutlineGesture
-from sandbox.window.editor.overlay import draw_overlay
+from sandbox.window.editor.ghost_path import GhostPredictor
+from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
 from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection
@@ -27,7 +31,7 @@ from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 from sandbox.window.ui.help import HelpGroup
-from sandbox.window.ui.hud import draw_messages
+from sandbox.window.ui.hud import draw_messages, draw_notice
 
 ACTIONS = (
     EditTool("play", "Space", "run the scene from the start"),
@@ -36,6 +40,12 @@ ACTIONS = (
     EditTool("save", "Ctrl+S", "save the scene file"),
 )
 ARROWS = {pygame.K_LEFT: (-1, 0), pygame.K_RIGHT: (1, 0), pygame.K_UP: (0, 1), pygame.K_DOWN: (0, -1)}
+ALIGNMENTS: dict[int, AlignmentSide] = {
+    pygame.K_LEFT: "left",
+    pygame.K_RIGHT: "right",
+    pygame.K_UP: "top",
+    pygame.K_DOWN: "bottom",
+}
 TYPED = "0123456789.,-x "
 """Characters that are typed into the dimensions of a gesture"""
 DELEGATED = {
@@ -62,6 +72,7 @@ HELP_GROUPS = (
             ("Digits", "while dragging: dimensions; Enter applies"),
             ("Arrows", "move by the grid; with Shift: ten steps"),
             ("M or Shift+M", "mirror left and right, up and down"),
+            ("Ctrl+arrows", "align sides; with Shift: middles"),
             ("Delete", "delete"),
             ("Ctrl+A", "select all"),
             ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
@@ -76,7 +87,7 @@ HELP_GROUPS = (
             ("Ctrl+Shift+Z", "redo"),
             ("Ctrl+S", "save"),
             ("Ctrl+Shift+S", "save as"),
-            ("Ctrl+Shift+X", "take a preset apart"),
+            ("Ctrl+Shift+X", "take a preset or generators apart"),
             ("Ctrl+O", "open a scene"),
             ("Ctrl+P", "screenshot"),
             ("Esc", "cancel; select nothing; quit"),
@@ -105,6 +116,7 @@ class EditView:
         draft: the draft of the scene.
         leave: called to run the scene.
         run_command: runs a command of the window.
+        folder: for autosaves of scenes without a file; by default the working folder.
     """
 
     def __init__(
@@ -113,6 +125,7 @@ class EditView:
         draft: SceneDraft,
         leave: Callable[[], None],
         run_command: Callable[[Command], None],
+        folder: Path | None = None,
     ) -> None:
         self._context, self._leave, self._run_command = context, leave, run_command
         self.editor = Editor(draft, context.app_state.messages.add)
@@ -120,7 +133,10 @@ class EditView:
         self.panel = PropertyPanel(context.surface.get_size(), context.gui.ui_scale)
         self.panel.on_change = self._set_property
         self.prompt: PathPrompt | None = None
-        self._renderer = Renderer()
+        self.autosave, self._folder = Autosave(draft, folder), folder
+        self.recovered: RecoveredText | None = recoverable(draft.path, folder)
+        """unsaved changes of a former editor, about which the user is asked"""
+        self._renderer, self._ghost = Renderer(), GhostPredictor()
         self._shown: tuple[object, ...] = ()
         self._button_held = False
 
@@ -138,6 +154,9 @@ class EditView:
 
     def handle_event(self, event: pygame.event.Event) -> bool:
         """Process an event; return whether it was consumed. Wheel, panning and window events are left to others."""
+        if self.recovered is not None and event.type in (pygame.KEYDOWN, pygame.TEXTINPUT, pygame.MOUSEBUTTONDOWN):
+            self._answer_recovery(self.recovered, event)
+            return True
         if self.prompt is not None and event.type in (pygame.KEYDOWN, pygame.TEXTINPUT, pygame.MOUSEBUTTONDOWN):
             self._prompt(self.prompt, event)
             return True
@@ -256,6 +275,9 @@ class EditView:
             editor.duplicate(view)
         elif key == pygame.K_a:
             editor.select_all()
+        elif key in ALIGNMENTS:
+            is_height = key in (pygame.K_UP, pygame.K_DOWN)
+            editor.align(("middle" if is_height else "centre") if shift else ALIGNMENTS[key])
         elif key in DELEGATED_WITH_CONTROL:
             self._run_command(DELEGATED_WITH_CONTROL[key])
         self._note_unsaved()
@@ -305,6 +327,52 @@ class EditView:
     def _note_unsaved(self) -> None:
         self._context.app_state.has_unsaved_draft = self.draft.is_changed
 
+    # --- Autosave ------------------------------------------------------------------------------------------------
+
+    def update(self) -> None:
+        """Write unsaved changes to the autosave; called every frame, also while the scene runs."""
+        self._note_unsaved()
+        message = self.autosave.update(monotonic())
+        if message is not None:
+            self._context.app_state.messages.add(message, "warning")
+
+    def close(self, is_lost: bool) -> None:
+        """End the editing of the scene.
+
+        Args:
+            is_lost: whether the user has confirmed that unsaved changes are lost; otherwise they are offered again.
+        """
+        if is_lost:
+            self.autosave.discard()
+            return
+        if self.draft.is_changed:
+            self._context.app_state.messages.add("unsaved changes are kept, and offered when the scene is edited again")
+        self.autosave.release()
+
+    def _answer_recovery(self, recovered: RecoveredText, event: pygame.event.Event) -> None:
+        """Restore the unsaved changes of a former editor, or discard them."""
+        if event.type != pygame.KEYDOWN:
+            return
+        if event.key == pygame.K_ESCAPE:
+            recovered.discard()
+            self.recovered = recoverable(self.draft.path, self._folder)
+        elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
+            self.recovered = None
+            try:
+                self.draft.replace_text(recovered.text, "restore unsaved changes")
+            except SceneError as error:
+                text = f"the changes are no valid scene, and stay in {recovered.autosave}: {error.faults[0].message}"
+                self._context.app_state.messages.add(text, "error")
+                return
+            self.autosave.adopt(recovered)
+
+    def _recovery_question(self, recovered: RecoveredText) -> str:
+        name = "a new scene" if self.draft.path is None else self.draft.path.name
+        written = datetime.fromtimestamp(recovered.written_at)
+        when = f"{written:%H:%M}" if written.date() == date.today() else f"{written:%d %B, %H:%M}"
+        changed = f" ({name} has changed since)" if recovered.is_file_changed else ""
+        return f"unsaved changes of {name} from {when} were found{changed}: Enter restores them, Esc discards them"
+
     # --- Properties ----------------------------------------------------------------------------------------------
 
     def _sections(self) -> list[PropertySection]:
@@ -346,6 +414,7 @@ class EditView:
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
         snapshot = Snapshot(scene, scene.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
+        self._draw_ghost(surface, scene)
         draw_overlay(surface, context.camera, editor, self._view)
         area = gui.area
         self.toolbar.layout(area, gui.ui_scale)
@@ -362,6 +431,18 @@ class EditView:
         self.actions.draw_hint(surface, gui.ui_scale)
         if self.prompt is not None:
             self.prompt.draw(surface, gui.ui_scale)
+        if self.recovered is not None:
+            draw_notice(surface, self._recovery_question(self.recovered), area, 16 * gui.ui_scale, ORANGE)
+
+    def _draw_ghost(self, surface: pygame.Surface, scene: Scene) -> None:
+        """Draw where the selected body will be in the next seconds."""
+        body = None if self.editor.is_locked else self.editor.single_body
+        self._ghost.submit(scene, body)
+        if self._ghost.path is not None:
+            draw_ghost_path(surface, self._context.camera, self._ghost.path, self._context.gui.ui_scale)
+        if self._ghost.fault is not None:
+            self._context.app_state.messages.add(self._ghost.fault, "warning")
+            self._ghost.fault = None
 
     def _show_panel(self, size: tuple[int, int]) -> None:
         """Update the property panel if the selection or the draft has changed."""

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import Part, Point
+from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.bodies import Polygon
 from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
 from sandbox.scene.editing.draft import SceneDraft
@@ -16,6 +16,7 @@ from sandbox.scene.editing.elements import (
     ElementKey,
     all_elements,
     all_names,
+    bodies_of,
     element_at,
     exists,
     name_of,
@@ -23,9 +24,11 @@ from sandbox.scene.editing.elements import (
     renaming,
     unique_name,
 )
+from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
 from sandbox.scene.editing.transforms import Similarity, transformation
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.toml_changes import Change, RemoveValue, SetValue, TextEditError
+from sandbox.scene.files.toml_changes import AddElement, Change, RemoveValue, SetValue, TextEditError
+from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
 from sandbox.window.editor.gestures import (
     BoxGesture,
     CapsuleGesture,
@@ -38,26 +41,35 @@ from sandbox.window.editor.gestures import (
     RotateGesture,
     ScaleGesture,
     SelectGesture,
+    VelocityGesture,
     VertexGesture,
     default_size,
     preview_of,
     set_values,
 )
-from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointError, JointGesture
+from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointGesture, PlacementError
 from sandbox.window.editor.picking import bounds_of, elements_at, pick_element
 from sandbox.window.editor.snapping import REACH, grid_step, snap_point, surface_shift
 
 MessageCallback = Callable[[str, str], None]
 """Callback with a text and a level, `info`, `warning` or `error`."""
-HandleKind = Literal["scale", "rotate", "vertex"]
+AlignmentSide = Literal["left", "right", "top", "bottom", "middle", "centre"]
+"""Sides of boxes; `middle` is half of the height, `centre` half of the width."""
+HandleKind = Literal["scale", "rotate", "vertex", "velocity"]
 ROTATE_DISTANCE = 26.0
 """px at UI scale 1 of the handle for rotation above the selection"""
 HANDLE_REACH = 9.0
 """px at UI scale 1 within which a handle is picked"""
 PICK_REACH = 6.0
 """px at UI scale 1 beside an element within which it is picked"""
+FREEHAND_TOLERANCE = 2.5
+"""px at UI scale 1 by which a freehand outline may be simplified"""
 DRAG_REACH = 4.0
 """px at UI scale 1 that the pointer moves before a press becomes a drag"""
+VELOCITY_TIME = 0.25
+"""s: the arrow of a velocity is as long as the way in this time"""
+VELOCITY_DISTANCE = 22.0
+"""px at UI scale 1 from the selection to the handle of a velocity of 0"""
 MAX_VERTICES = 200
 """Corners of an element that have handles"""
 
@@ -87,6 +99,8 @@ TOOLS = (
     EditTool("rope", "3", "rope: click two bodies, or a body and the world"),
     EditTool("spring", "4", "spring: click two bodies, or a body and the world"),
     EditTool("motor", "5", "motor with its pivot: click one or two bodies"),
+    EditTool("thrust", "f", "thrust: drag the arrow of a force from a body"),
+    EditTool("attraction", "g", "attraction: click a point or a body"),
     EditTool("eraser", "e", "eraser: click or drag over elements"),
 )
 """All tools, in the order of the toolbar."""
@@ -215,6 +229,7 @@ class Editor:
         left, bottom, right, top = left - margin, bottom - margin, right + margin, top + margin
         corners = (left, bottom), (right, bottom), (right, top), (left, top)
         found += [EditHandle("scale", k, corner) for k, corner in enumerate(corners)]
+        found += self._velocity_handle(scene, right, view)
         return [*found, EditHandle("rotate", 0, (0.5 * (left + right), top + view.metres(ROTATE_DISTANCE)))]
 
     def _vertex_handles(self, scene: Scene) -> list[EditHandle]:
@@ -228,6 +243,26 @@ class Editor:
         if isinstance(element, Polygon) and element.angle:
             return []
         return [EditHandle("vertex", k, (x + dx, y + dy)) for k, (x, y) in enumerate(points)]
+
+    def _velocity_handle(self, scene: Scene, right: float, view: ViewScale) -> list[EditHandle]:
+        """Return the handle at the tip of the velocity of a single body; at its right side if it is at rest."""
+        body = self.single_body
+        element = None if body is None or not exists(scene, self.selection[0]) else element_at(scene, self.selection[0])
+        if body is None or not isinstance(element, BodySpec) or element.fixed:
+            return []
+        (x, y), (vx, vy) = scene.bodies.position[body].tolist(), element.velocity
+        tip = x + VELOCITY_TIME * vx, y + VELOCITY_TIME * vy
+        if not (vx or vy):
+            tip = right + view.metres(VELOCITY_DISTANCE), y
+        return [EditHandle("velocity", body, tip)]
+
+    @property
+    def single_body(self) -> int | None:
+        """Index of the body if exactly one single body is selected."""
+        if len(self.selection) != 1 or not exists(self.draft.scene, self.selection[0]):
+            return None
+        bodies = bodies_of(self.draft.scene, self.selection[0])
+        return bodies[0] if len(bodies) == 1 else None
 
     # --- Mouse ---------------------------------------------------------------------------------------------------
 
@@ -257,10 +292,23 @@ class Editor:
             self._press_select(point, view, shift)
         elif self.tool == "eraser":
             self._erase(point, view)
+        elif self.tool == "attraction":
+            self._add_attraction(point, view, control)
         else:
-            self.gesture = self._new_gesture(point, view, control)
+            try:
+                self.gesture = self._new_gesture(point, view, control)
+            except PlacementError as error:
+                self._notify(str(error), "warning")
             if isinstance(self.gesture, JointGesture) and self.tool in ONE_CLICK:
                 self.finish()
+
+    def _add_attraction(self, point: Point, view: ViewScale, control: bool) -> None:
+        scene = self.draft.scene
+        name, at = unique_name("attraction", all_names(scene)), self._snap(point, view, control)
+        count = len(scene.attractions)
+        if self.apply(attraction_changes(scene, name, at, point, view.size), "add an attraction"):
+            self.selection = [ElementKey("attraction", count)]
+        self._pressed = self.snapped = None
 
     def _press_select(self, point: Point, view: ViewScale, shift: bool) -> None:
         scene, handle = self.draft.scene, self.handle_at(point, view)
@@ -289,6 +337,8 @@ class Editor:
 
     def _handle_gesture(self, handle: EditHandle) -> Gesture:
         scene, box = self.draft.scene, self.selection_bounds(self.draft.scene)
+        if handle.kind == "velocity":
+            return VelocityGesture(scene, self.selection[0], handle.index, VELOCITY_TIME)
         if handle.kind == "vertex":
             element = element_at(scene, self.selection[0])
             offset = element.position if isinstance(element, Polygon) else (0.0, 0.0)
@@ -307,6 +357,8 @@ class Editor:
         if tool in JOINT_KINDS:
             end = JointEnd(point, self._snap(point, view, control))
             return JointGesture(scene, tool, unique_name(tool, all_names(scene)), end, tolerance)
+        if tool == "thrust":
+            return ThrustGesture(scene, unique_name(tool, all_names(scene)), point, tolerance)
         point = self._snap(point, view, control)
         name, size = unique_name(tool, all_names(scene)), default_size(view.size)
         kinds: dict[str, type[DrawGesture]] = {
@@ -340,7 +392,9 @@ class Editor:
             gesture.move(point)
         elif isinstance(gesture, JointGesture):
             gesture.move_end(JointEnd(point, self._snap(point, view, control)))
-        elif isinstance(gesture, SelectGesture):
+        elif isinstance(gesture, OutlineGesture) and self._pressed is not None and self.is_dragging:
+            gesture.draw_freehand(point, view.metres(FREEHAND_TOLERANCE))
+        elif isinstance(gesture, SelectGesture | VelocityGesture | ThrustGesture):
             gesture.move(point)
         else:
             gesture.move(self._snap(point, view, control))
@@ -385,7 +439,8 @@ class Editor:
             return
         gesture = self.gesture
         assert gesture is not None
-        if gesture.is_multi_click and not (isinstance(gesture, JointGesture) and dragged):
+        is_freehand = isinstance(gesture, OutlineGesture) and gesture.is_freehand
+        if gesture.is_multi_click and not is_freehand and not (isinstance(gesture, JointGesture) and dragged):
             return
         self.finish()
 
@@ -414,7 +469,7 @@ class Editor:
             return False
         try:
             changes = gesture.changes()
-        except JointError as error:
+        except PlacementError as error:
             self._notify(str(error), "warning")
             return False
         selects = gesture.selects
@@ -528,7 +583,7 @@ class Editor:
         values = transformation(self.draft.scene, self.selection, by)
         self.apply(set_values(values), f"mirror {_count(self.selection)}")
 
-    def align(self, side: Literal["left", "right", "top", "bottom", "middle", "centre"]) -> None:
+    def align(self, side: AlignmentSide) -> None:
         """Align the selected elements by a side of their boxes, with the box of all of them."""
         box = self.selection_bounds(self.draft.scene)
         if box is None or len(self.selection) < 2:
@@ -559,13 +614,25 @@ class Editor:
         self._notify(f"nothing to be {what}" if label is None else f"{what}: {label}", "info")
 
     def take_apart(self) -> None:
-        """Replace the preset of the scene by its elements."""
+        """Replace the preset of the scene by its elements, or else the selected generators by their bodies."""
         preset = self.draft.preset
         if preset is None:
-            self._notify("the scene has no preset", "warning")
+            self._take_generators_apart()
             return
         self.draft.take_apart_preset()
         self._notify(f"[{preset}] was replaced by its elements, without comments", "info")
+
+    def _take_generators_apart(self) -> None:
+        keys = self._selection_or_note()
+        try:
+            changes = taking_apart(self.draft.scene, keys)
+        except TakeApartError as error:
+            self._notify(str(error), "warning")
+            return
+        bodies = sum(len(bodies_of(self.draft.scene, key)) for key in keys)
+        if keys and self.apply(changes, f"take {_count(keys)} apart"):
+            self.selection = []
+            self._notify(f"{bodies} bodies are elements of their own now", "info")
 
     def _selection_or_note(self) -> list[ElementKey]:
         if not self.selection:
@@ -591,6 +658,8 @@ class Editor:
         else:
             label = f"set {name} of {_count(list(keys))}"
             for key in keys:
+                if name == "material" and value is not None and value not in {m.name for m in scene.materials}:
+                    changes += [] if changes else [AddElement("material", {"name": value})]  # a new one
                 if name == "name" and value is not None:
                     changes += renaming(scene, key, value if len(keys) == 1 else unique_name(value, all_names(scene)))
                 else:

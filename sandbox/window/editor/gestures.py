@@ -22,6 +22,7 @@ from sandbox.scene.editing.elements import (
     with_elements,
     with_moved_bodies,
 )
+from sandbox.scene.editing.outlines import simplified, simplified_loop
 from sandbox.scene.editing.transforms import Similarity, transformation
 from sandbox.scene.files.toml_changes import AddElement, Change, SetValue
 from sandbox.window.editor.snapping import rounded
@@ -278,6 +279,55 @@ class VertexGesture(Gesture):
         return f"({x + self._offset[0]:.4g}, {y + self._offset[1]:.4g}) m"
 
 
+class VelocityGesture(Gesture):
+    """Sets the velocity of a body by the tip of its arrow."""
+
+    label = "set a velocity"
+
+    def __init__(self, scene: Scene, key: ElementKey, body: int, time: float) -> None:
+        """Begin to set a velocity.
+
+        Args:
+            scene: the scene.
+            key: the element of the body.
+            body: index of the body.
+            time: s, way of the arrow divided by the velocity.
+        """
+        super().__init__(scene)
+        self._key, self._time = key, time
+        x, y = scene.bodies.position[body].tolist()
+        self._centre: Point = x, y
+        element = element_at(scene, key)
+        self.velocity: Point = cast("Point", getattr(element, "velocity", (0.0, 0.0)))
+
+    def move(self, point: Point) -> None:
+        """Point the arrow to a point."""
+        vx, vy = ((a - b) / self._time for a, b in zip(point, self._centre, strict=True))
+        speed = math.hypot(vx, vy)
+        digits = 1 - math.floor(math.log10(speed)) if speed > 0.0 else 0
+        self.velocity = round(vx, digits) + 0.0, round(vy, digits) + 0.0
+
+    def type_text(self, text: str) -> None:
+        """Set typed components."""
+        super().type_text(text)
+        numbers = typed_numbers(text)
+        if numbers:
+            self.velocity = numbers[0], numbers[1] if len(numbers) > 1 else 0.0
+
+    def preview(self) -> Scene:
+        """Return the scene with the velocity."""
+        return preview_of(self.scene, {self._key: {"velocity": self.velocity}})
+
+    def changes(self) -> list[Change]:
+        """Return the change of the velocity."""
+        return set_values({self._key: {"velocity": self.velocity}})
+
+    def dimensions(self) -> str:
+        """Return speed and components."""
+        x, y = self.velocity
+        return f"{math.hypot(x, y):.3g} m/s ({x:g}, {y:g})"
+
+
 class DrawGesture(Gesture):
     """Draws a new element."""
 
@@ -474,7 +524,27 @@ class OutlineGesture(DrawGesture):
         super().__init__(scene, table, name, point, default)
         self.corners: list[Point] = [point]
         self.is_closed = False
+        self._freehand: list[Point] = []
         self._reach, self._thickness = reach, thickness
+
+    @property
+    def is_freehand(self) -> bool:
+        """Whether the outline is drawn with the button held."""
+        return bool(self._freehand)
+
+    def draw_freehand(self, point: Point, tolerance: float) -> None:
+        """Draw freehand to a point; the line is simplified within a tolerance, m."""
+        if not self._freehand:
+            if len(self.corners) > 1:
+                return
+            self._freehand = [self.begin]
+        step = 10.0 ** math.floor(math.log10(tolerance))
+        self._freehand.append((rounded(point[0], step), rounded(point[1], step)))
+        near = math.dist(self._freehand[0], point) <= self._reach and len(self._freehand) > 8
+        self.is_closed = near or self.table != "wall"
+        points = self._freehand[:-1] if near else self._freehand
+        self.corners = (simplified_loop if self.is_closed else simplified)(points, tolerance)
+        self.end = self.corners[-1]
 
     def click(self, point: Point) -> bool:
         """Add a corner; return whether the outline is finished, at its first or its last corner."""

@@ -23,8 +23,8 @@ MOTOR_TORQUE_FACTOR = 20.0
 """Largest torque of a new motor, in units of m g r, or m r² · 1/s² without gravity"""
 
 
-class JointError(ValueError):
-    """A joint cannot be made there; `str()` has the reason."""
+class PlacementError(ValueError):
+    """An element cannot be made there; `str()` has the reason."""
 
 
 @dataclass(frozen=True)
@@ -51,20 +51,20 @@ def joint_changes(
         name: of the joint.
 
     Raises:
-        JointError: there is no body that can be joined.
+        PlacementError: there is no body that can be joined.
     """
     if kind in ONE_CLICK:
         return _at_one_point(scene, kind, first, tolerance, name)
     one, other = (next(iter(bodies_at(scene, end.click, tolerance)), None) for end in (first, second))
     if one is None and other is None:
-        raise JointError("a joint needs a body: click a body, and then another one or the world")
+        raise PlacementError("a joint needs a body: click a body, and then another one or the world")
     if one is None:
         one, other, first, second = other, None, second, first
     assert one is not None
     if one == other:
-        raise JointError("both ends are on the same body; click another body or the world")
+        raise PlacementError("both ends are on the same body; click another body or the world")
     if other is None and scene.bodies.fixed[one]:
-        raise JointError("a fixed body needs no joint to the world; click a body that moves")
+        raise PlacementError("a fixed body needs no joint to the world; click a body that moves")
     names, changes = _names(scene, [one] if other is None else [one, other])
     anchors = [to_body(scene, scene.bodies.names[one], first.anchor)]
     anchors.append(second.anchor if other is None else to_body(scene, scene.bodies.names[other], second.anchor))
@@ -83,9 +83,9 @@ def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name
     """Return the changes that add a pivot or motor of the two topmost bodies at a point, or of one and the world."""
     found = bodies_at(scene, end.click, tolerance)[:2]
     if not found:
-        raise JointError(f"a {kind} needs a body: click a body, or two that lie on each other")
+        raise PlacementError(f"a {kind} needs a body: click a body, or two that lie on each other")
     if all(scene.bodies.fixed[k] for k in found):
-        raise JointError("a fixed body needs no joint to the world; click a body that moves")
+        raise PlacementError("a fixed body needs no joint to the world; click a body that moves")
     found.sort(key=lambda k: (bool(scene.bodies.round[k]), -float(scene.bodies.radius[k])))  # a wheel comes second
     names, changes = _names(scene, found)
     point = [round_value(x) for x in end.anchor]
@@ -159,7 +159,7 @@ class JointGesture(Gesture):
         """Return the changes that add the joint.
 
         Raises:
-            JointError: there is no body that can be joined.
+            PlacementError: there is no body that can be joined.
         """
         return joint_changes(self.scene, self.kind, self._first, self._second, self._tolerance, self.name)
 

@@ -14,14 +14,16 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.description.surface import Pocket
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at, exists
 from sandbox.window.camera import Camera
-from sandbox.window.editor.editor import Editor, ViewScale
+from sandbox.window.editor.editor import EditHandle, Editor, ViewScale
+from sandbox.window.editor.force_tools import ACCELERATION_PER_METRE, ThrustGesture
 from sandbox.window.editor.gestures import OutlineGesture, SelectGesture
+from sandbox.window.editor.ghost_path import GhostPath
 from sandbox.window.editor.joint_tools import JointGesture
-from sandbox.window.editor.picking import attachment_lines, start_frame
+from sandbox.window.editor.picking import attachment_lines, start_frame, to_world
 from sandbox.window.hit_test import hulls_of, rounded_hull
 from sandbox.window.render.circles import draw_disc
-from sandbox.window.render.lines import draw_dashes, draw_line
-from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, WARNING, RgbColour, mix_colours
+from sandbox.window.render.lines import draw_arrow, draw_dashes, draw_line
+from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, PURPLE, SKY, WARNING, YELLOW, RgbColour, mix_colours
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
 
 MAX_OUTLINES = 1_000
@@ -67,6 +69,7 @@ def _circle(centre: Point, radius: float) -> FloatArray:
 def draw_overlay(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:
     """Draw everything of the editor that lies on the scene."""
     scene = editor.scene
+    _draw_forces(surface, camera, scene, view)
     if editor.hovered is not None and editor.gesture is None and editor.hovered not in editor.selection:
         _draw_outlines(surface, camera, scene, editor.hovered, mix_colours(SKY, INK, 0.5), 1.0, view)
     faulty, message = editor.fault or ([], "")
@@ -84,6 +87,31 @@ def draw_overlay(surface: pygame.Surface, camera: Camera, editor: Editor, view: 
     _draw_dimensions(surface, camera, editor, view)
     if message:
         _draw_fault(surface, camera, editor, message, view)
+
+
+def _draw_forces(surface: pygame.Surface, camera: Camera, scene: Scene, view: ViewScale) -> None:
+    """Draw the arrows of thrusts, as long as the accelerations that they give, and the centres of attractions."""
+    unit, mass = view.ui_scale, scene.bodies.mass
+    for thrust in scene.thrusts:
+        index = scene.bodies.number_of.get(thrust.body)
+        begin = to_world(scene, thrust.body, thrust.point)
+        if index is None or begin is None:
+            continue
+        length = float(mass[index]) * ACCELERATION_PER_METRE
+        (px, py), (fx, fy) = thrust.point, thrust.force
+        end = to_world(scene, thrust.body, (px + fx / length, py + fy / length))
+        a, b = camera.to_screen(np.asarray((begin, end))).tolist()
+        draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), ORANGE, 2.5 * unit, edge=BACKGROUND)
+    for attraction in scene.attractions:
+        if isinstance(attraction.toward, str):
+            index = scene.bodies.number_of.get(attraction.toward)
+            place = None if index is None else scene.bodies.position[index]
+        else:
+            place = np.asarray(attraction.toward)
+        if place is not None:
+            x, y = camera.to_screen(place).tolist()
+            draw_disc(surface, (x, y), 7 * unit, PURPLE, 5.4 * unit)
+            draw_disc(surface, (x, y), 2.5 * unit, PURPLE)
 
 
 def _draw_outlines(
@@ -135,6 +163,9 @@ def _draw_gesture(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         for x, y in pixels[:-1]:
             draw_disc(surface, (x, y), 4 * unit, SKY)
         draw_disc(surface, (pixels[0][0], pixels[0][1]), 6 * unit, INK, 4 * unit)
+    elif isinstance(gesture, ThrustGesture):
+        a, b = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
+        draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), ORANGE, 3.0 * unit, edge=BACKGROUND)
     elif isinstance(gesture, JointGesture):
         a, b = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
         draw_line(surface, (a[0], a[1]), (b[0], b[1]), SKY, 2.0 * unit)
@@ -157,12 +188,36 @@ def _draw_handles(surface: pygame.Surface, camera: Camera, editor: Editor, view:
             rect.center = round(x), round(y)
             pygame.draw.rect(surface, INK, rect)
             pygame.draw.rect(surface, SKY, rect, max(round(1.5 * unit), 1))
+        elif handle.kind == "velocity":
+            _draw_velocity(surface, camera, editor, handle, view)
         elif handle.kind == "rotate":
             draw_disc(surface, (x, y), 6.5 * unit, INK)
             draw_disc(surface, (x, y), 5 * unit, SKY, 2 * unit)
         else:
             draw_disc(surface, (x, y), 5 * unit, SKY)
             draw_disc(surface, (x, y), 3.4 * unit, INK)
+
+
+def _draw_velocity(
+    surface: pygame.Surface, camera: Camera, editor: Editor, handle: EditHandle, view: ViewScale
+) -> None:
+    """Draw the arrow of the velocity of the selected body, and its handle."""
+    scene, unit = editor.scene, view.ui_scale
+    a, b = camera.to_screen(np.asarray((scene.bodies.position[handle.index], handle.point))).tolist()
+    if scene.bodies.velocity[handle.index].any():
+        draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), YELLOW, 2.5 * unit, edge=BACKGROUND)
+    draw_disc(surface, (b[0], b[1]), 5.5 * unit, BACKGROUND)
+    draw_disc(surface, (b[0], b[1]), 4 * unit, YELLOW)
+
+
+def draw_ghost_path(surface: pygame.Surface, camera: Camera, path: GhostPath, ui_scale: float) -> None:
+    """Draw a predicted path as dots, which are equally far apart in time and fade out."""
+    pixels = camera.to_screen(path.points)
+    finite = pixels[np.isfinite(pixels).all(axis=1)]
+    count = len(finite)
+    for k, (x, y) in enumerate(finite.tolist()):
+        colour = mix_colours(YELLOW, BACKGROUND, 0.15 + 0.7 * k / max(count, 1))
+        draw_disc(surface, (x, y), (2.2 if k % 10 else 3.2) * ui_scale, colour)
 
 
 def _draw_dimensions(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:

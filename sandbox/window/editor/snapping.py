@@ -1,7 +1,7 @@
 """Snapping of points in the editor: to a grid that depends on the zoom, to centres and corners, and to surfaces."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,7 +90,9 @@ def _targets(scene: Scene, without: Collection[ElementKey]) -> tuple[FloatArray,
 
 
 def surface_shift(scene: Scene, keys: Collection[ElementKey], scale: float, ui_scale: float = 1.0) -> Point | None:
-    """Return the shift, m, that makes moved bodies touch the nearest plane within reach; None without one.
+    """Return the shift, m, that makes moved bodies touch the nearest surface within reach; None without one.
+
+    All bodies snap to planes, balls also to walls, posts and other balls.
 
     Args:
         scene: the scene, with the bodies at their present places.
@@ -98,19 +100,63 @@ def surface_shift(scene: Scene, keys: Collection[ElementKey], scale: float, ui_s
         scale: of the camera, px/m.
         ui_scale: UI scale.
     """
-    reach, frame = REACH * ui_scale / scale, start_frame(scene)
-    bodies = [body for key in keys for body in bodies_of(scene, key)]
-    nearest: tuple[float, Point] | None = None
+    reach = REACH * ui_scale / scale
+    moved = [body for key in keys for body in bodies_of(scene, key)]
+    gaps = list(_plane_gaps(scene, keys, moved))
+    if len(moved) == 1 and scene.bodies.round[moved[0]]:
+        gaps += _ball_gaps(scene, keys, moved[0])
+    near = [(abs(gap), (-gap * x, -gap * y)) for gap, (x, y) in gaps if abs(gap) <= reach]
+    return min(near)[1] if near else None
+
+
+def _plane_gaps(
+    scene: Scene, keys: Collection[ElementKey], moved: Sequence[int]
+) -> Iterator[tuple[float, tuple[float, float]]]:
+    """Yield the gap of moved bodies to each plane, m, and its normal."""
+    frame = start_frame(scene)
     for k, plane in enumerate(scene.planes):
-        if ElementKey("plane", k) in keys or not bodies:
+        if ElementKey("plane", k) in keys or not moved:
             continue
         normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
         gap = min(
             float(((hull.corners - np.asarray(plane.point)) @ normal).min()) - hull.radius
-            for body in bodies
+            for body in moved
             for hull in hulls_of(scene.bodies, frame, body)
         )
-        if abs(gap) <= reach and (nearest is None or abs(gap) < abs(nearest[0])):
-            x, y = (-gap * normal).tolist()
-            nearest = gap, (x, y)
-    return None if nearest is None else nearest[1]
+        x, y = normal.tolist()
+        yield gap, (x, y)
+
+
+def _ball_gaps(scene: Scene, keys: Collection[ElementKey], ball: int) -> Iterator[tuple[float, tuple[float, float]]]:
+    """Yield the gap of a ball to each wall, post and other ball, m, and the direction from there to the ball."""
+    bodies = scene.bodies
+    centre, radius = bodies.position[ball], float(bodies.radius[ball])
+    nearest: list[tuple[FloatArray, float]] = []
+    for k, wall in enumerate(scene.walls):
+        if ElementKey("wall", k) not in keys:
+            ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
+            nearest += [
+                (_nearest_on_segment(np.asarray(a), np.asarray(b), centre), 0.5 * wall.thickness)
+                for a, b in zip(wall.points, ends, strict=False)
+            ]
+    nearest += [
+        (np.asarray(post.position), post.radius)
+        for k, post in enumerate(scene.posts)
+        if ElementKey("post", k) not in keys
+    ]
+    others = np.flatnonzero(bodies.round & (np.hypot(*(bodies.position - centre).T) <= 2.0 * radius + bodies.radius))
+    nearest += [(bodies.position[k], float(bodies.radius[k])) for k in others.tolist() if k != ball]
+    for point, margin in nearest:
+        offset = centre - point
+        distance = float(np.hypot(*offset))
+        if distance > 0.0:
+            x, y = (offset / distance).tolist()
+            yield distance - radius - margin, (x, y)
+
+
+def _nearest_on_segment(a: FloatArray, b: FloatArray, point: FloatArray) -> FloatArray:
+    """Return the point of a segment that is nearest to another, (2,) m."""
+    along = b - a
+    squared = float(along @ along)
+    fraction = min(max(float((point - a) @ along) / squared, 0.0), 1.0) if squared else 0.0
+    return np.asarray(a + fraction * along)

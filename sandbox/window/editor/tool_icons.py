@@ -124,6 +124,23 @@ def _motor(canvas: IconCanvas) -> None:
     canvas.disc(12, 12, 2.4)
 
 
+def _thrust(canvas: IconCanvas) -> None:
+    canvas.line((4, 20), (14, 10), width=2.6)
+    canvas.polygon((20, 4), (17.6, 13), (11, 6.4))
+
+
+def _attraction(canvas: IconCanvas) -> None:
+    canvas.disc(12, 12, 3)
+    for k in range(4):
+        angle = math.radians(45 + 90 * k)
+        cos, sin = math.cos(angle), math.sin(angle)
+        canvas.line((12 + 10.5 * cos, 12 + 10.5 * sin), (12 + 7 * cos, 12 + 7 * sin), width=1.8)
+        tip = 12 + 5 * cos, 12 + 5 * sin
+        side = 2.4 * sin, -2.4 * cos
+        base = 12 + 8 * cos, 12 + 8 * sin
+        canvas.polygon(tip, (base[0] + side[0], base[1] + side[1]), (base[0] - side[0], base[1] - side[1]))
+
+
 def _eraser(canvas: IconCanvas) -> None:
     canvas.line((4, 15), (12.5, 6.5), (19, 13), (12.5, 19.5), (8.5, 19.5), closed=True)
     canvas.polygon((12.5, 6.5), (19, 13), (15.2, 16.8), (8.7, 10.3))
@@ -160,6 +177,8 @@ _DRAWINGS: Mapping[str, Callable[[IconCanvas], None]] = {
     "rope": _rope,
     "spring": _spring,
     "motor": _motor,
+    "thrust": _thrust,
+    "attraction": _attraction,
     "eraser": _eraser,
     "play": lambda canvas: canvas.polygon((7, 4), (20, 12), (7, 20)),
     "undo": _undo,

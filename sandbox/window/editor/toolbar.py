@@ -13,7 +13,7 @@ BUTTON = 32
 """px at UI scale 1, side of a button"""
 GAP = 3
 """px at UI scale 1 between buttons"""
-GROUP_STARTS = ("ball", "plane", "rod", "eraser")
+GROUP_STARTS = ("ball", "plane", "rod", "thrust", "eraser")
 """Tools before which there is a wider gap"""
 
 

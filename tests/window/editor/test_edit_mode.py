@@ -451,3 +451,94 @@ def test_zoom_and_panel_work_while_editing(open_on: Callable[[str], Hand]) -> No
     hand.key(pygame.K_F1)
     assert not hand.window.context.gui.help.open
     assert hand.window.editing is not None
+
+
+def test_velocity_is_set_by_its_arrow(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    view = hand.view._view
+    tip = next(handle for handle in hand.editor.handles(view) if handle.kind == "velocity").point
+    hand.drag(tip, (0.5, 2.25), is_released=False)
+    hand.type("3,-4")
+    hand.key(pygame.K_RETURN)
+    assert hand.scene.balls[0].velocity == (3.0, -4.0)
+    tip = next(handle for handle in hand.editor.handles(view) if handle.kind == "velocity").point
+    assert tip == (0.75, 1.0)  # 0.25 s of motion from the centre
+
+
+def test_freehand_outline_becomes_a_polygon(hand: Hand) -> None:
+    hand.key(pygame.K_y)
+    circle = [(-2.0 + math.cos(a), 2.5 + math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 60).tolist()]
+    hand.frame(move(*hand.pixel(circle[0])), press(*hand.pixel(circle[0])))
+    for point in circle[1:]:
+        hand.frame(move(*hand.pixel(point), held=True))
+    hand.frame(release(*hand.pixel(circle[-1])))
+    polygon = hand.scene.polygons[0]
+    assert 8 <= len(polygon.points) < 40
+    (left, bottom), (right, top) = hand.editor.selection_bounds() or ((0.0, 0.0), (0.0, 0.0))
+    assert (left, right) == pytest.approx((-3.0, -1.0), abs=0.06)  # the tolerance, and a pixel
+    assert (bottom, top) == pytest.approx((1.5, 3.5), abs=0.06)
+    hand.key(pygame.K_w)
+    hand.drag((1.0, 1.0), (3.0, 1.0), steps=12)
+    assert [len(wall.points) for wall in hand.scene.walls] == [2]
+
+
+def test_thrusts_and_attractions_are_drawn(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.key(pygame.K_f)
+    hand.drag((0.0, 2.0), (0.0, 2.6), is_released=False)
+    hand.type("12")
+    hand.key(pygame.K_RETURN)
+    thrust = hand.scene.thrusts[0]
+    assert thrust.body == "a"
+    assert thrust.force == pytest.approx((0.0, 12.0), abs=0.2)  # its direction is within a pixel
+    hand.drag((1.0, 0.8), (1.0, 1.5))  # there is no body
+    assert len(hand.scene.thrusts) == 1
+    hand.key(pygame.K_g)
+    hand.click((1.0, 0.9))
+    hand.click((2.0, 2.0))
+    assert hand.scene.attractions[0].toward == (1.0, 0.9)
+    assert hand.scene.attractions[1].toward == "b"
+    hand.key(pygame.K_v)
+    hand.click((2.0, 2.0))
+    hand.key(pygame.K_DELETE)
+    assert [each.toward for each in hand.scene.attractions] == [(1.0, 0.9)]
+
+
+def test_alignment_and_new_materials(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL.replace("[2.0, 2.0]", "[2.0, 3.0]"))
+    hand.drag((-1.0, 1.0), (3.2, 4.0))
+    assert len(hand.editor.selection) == 2
+    hand.key(pygame.K_DOWN, CTRL)
+    assert [ball.position[1] for ball in hand.scene.balls] == [2.0, 2.0]
+    hand.key(pygame.K_z, CTRL)
+    hand.key(pygame.K_UP, CTRL | SHIFT)
+    assert [ball.position[1] for ball in hand.scene.balls] == [2.5, 2.5]
+    hand.set_field("selection:ball", "material", "rubber")
+    assert [ball.material for ball in hand.scene.balls] == ["rubber", "rubber"]
+    assert [material.name for material in hand.scene.materials] == ["rubber"]
+    hand.key(pygame.K_ESCAPE)
+    hand.frame()
+    heading = hand.view.panel.heading_of("material:0")
+    assert heading is not None
+
+
+def test_ball_snaps_to_walls_and_other_balls(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL + "[[wall]]\npoints = [[-1.0, 4.0], [3.0, 4.0]]\nthickness = 0.2\n")
+    hand.drag((0.0, 2.0), (0.0, 3.41))
+    assert hand.scene.balls[0].position == pytest.approx((0.0, 3.4), abs=1e-9)  # 4 − 0.1 − 0.5
+    hand.drag((0.0, 3.4), (1.01, 2.0))
+    x, y = hand.scene.balls[0].position
+    assert math.dist((x, y), (2.0, 2.0)) == pytest.approx(1.0, abs=1e-8)
+
+
+def test_generators_are_taken_apart_on_request(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(
+        BALL + '# atoms\n[[grid]]\nname = "atom"\norigin = [0, 4]\ncolumns = 3\nspacing = [0.5, 0.5]\nradius = 0.2\n'
+    )
+    hand.click((0.5, 4.0))
+    assert hand.editor.selection == [ElementKey("grid", 0)]
+    hand.key(pygame.K_x, CTRL | SHIFT)
+    assert [ball.name for ball in hand.scene.balls] == ["a", "b", "atom-1", "atom-2", "atom-3"]
+    hand.key(pygame.K_z, CTRL)
+    assert len(hand.scene.grids) == 1

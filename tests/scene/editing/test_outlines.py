@@ -1,0 +1,91 @@
+"""Simplification of freehand outlines."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sandbox.scene.editing.elements import ElementKey
+from sandbox.scene.editing.outlines import simplified, simplified_loop
+from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
+from sandbox.scene.files.load import loads
+from sandbox.scene.files.toml_changes import with_changes
+
+POINTS = st.lists(st.tuples(st.floats(-10, 10), st.floats(-10, 10)), min_size=2, max_size=40)
+
+
+def distance(point: tuple[float, float], a: tuple[float, float], b: tuple[float, float]) -> float:
+    p, u = np.subtract(point, a), np.subtract(b, a)
+    squared = float(u @ u)
+    fraction = min(max(float(p @ u) / squared, 0.0), 1.0) if squared else 0.0
+    return float(np.hypot(*(p - fraction * u)))
+
+
+@given(POINTS, st.floats(1e-3, 3.0))
+def test_no_point_is_farther_than_the_tolerance(points: list[tuple[float, float]], tolerance: float) -> None:
+    found = simplified(points, tolerance)
+    assert (found[0], found[-1]) == (points[0], points[-1])
+    assert set(found) <= set(points)
+    sides = list(pairwise(found))
+    for point in points:
+        assert min(distance(point, a, b) for a, b in sides) <= tolerance * (1 + 1e-9) + 1e-12  # rounding
+
+
+def test_straight_line_keeps_its_ends() -> None:
+    assert simplified([(0.1 * k, 0.2 * k) for k in range(50)], 1e-9) == [(0.0, 0.0), (4.9, 9.8)]
+
+
+def test_circle_becomes_a_polygon_with_few_corners() -> None:
+    circle = [(math.cos(0.01 * k), math.sin(0.01 * k)) for k in range(628)]
+    corners = simplified_loop(circle, 0.02)
+    assert 8 <= len(corners) <= 32  # a sagitta of 0.02 subtends 0.4 rad, 16 sides
+    area = 0.5 * abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)))
+    assert area == pytest.approx(math.pi, rel=0.05)
+
+
+TEXT = """
+[world]
+seed = 4
+# the bricks
+[[stack]]
+name = "brick"
+base = [0, 0]
+columns = 2
+rows = 2
+size = [0.4, 0.2]
+friction = 0.8
+[[grid]]
+name = "atom"
+origin = [5, 5]
+columns = 2
+rows = 2
+spacing = [1, 1]
+jitter = 0.1
+velocity_jitter = 1
+radius = 0.2
+mass = 2
+colour = "#ff0000"
+"""
+
+
+def test_generators_taken_apart_start_as_before() -> None:
+    before = loads(TEXT)
+    text = with_changes(TEXT, taking_apart(before, [ElementKey("stack", 0), ElementKey("grid", 0)]))
+    after = loads(text)
+    assert (after.grids, after.stacks, len(after.balls), len(after.boxes)) == ((), (), 4, 4)
+    assert sorted(after.bodies.names) == sorted(before.bodies.names)
+    for name in before.bodies.names:
+        k, n = before.bodies.number_of[name], after.bodies.number_of[name]
+        for column in ("position", "velocity", "angle", "angular_velocity", "mass", "moment", "radius"):
+            assert getattr(before.bodies, column)[k].tobytes() == getattr(after.bodies, column)[n].tobytes()
+    assert {ball.colour for ball in after.balls} == {"#ff0000"}
+    assert {box.friction for box in after.boxes} == {0.8}
+
+
+def test_other_elements_cannot_be_taken_apart() -> None:
+    scene = loads(TEXT + '[[ball]]\nname = "a"\nposition = [9, 9]\nradius = 1\n')
+    with pytest.raises(TakeApartError, match="cannot be taken apart"):
+        taking_apart(scene, [ElementKey("ball", 0)])
