@@ -28,6 +28,7 @@ from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES
 from sandbox.scene.description.world import COMMON, Settings
 from sandbox.scene.validate.scene import MAX_SURFACES
 from sandbox.trajectory import Trajectory
+from sandbox.window.editor.edit_view import HELP_GROUPS
 from sandbox.window.input.bindings import control_help
 from sandbox.window.ui.help import help_groups
 
@@ -169,6 +170,12 @@ def window_keys() -> str:
     return "\n\n".join(parts)
 
 
+def edit_keys() -> str:
+    """Return the keys of the editor by group, as its help lists them."""
+    parts = [f"### {group.title}: editing\n\n{_keys(group.lines)}" for group in HELP_GROUPS]
+    return "\n\n".join(parts)
+
+
 def cue_keys() -> str:
     """Return the keys at a billiard table."""
     return _keys(CUE_KEY_HELP)
@@ -235,6 +242,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "limits": limits,
     "fixed-limits": fixed_limits,
     "window-keys": window_keys,
+    "edit-keys": edit_keys,
     "cue-keys": cue_keys,
     "game-keys": game_keys,
     "store-columns": store_columns,

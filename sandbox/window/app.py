@@ -51,7 +51,7 @@ MODIFIER_KEYS = frozenset(
 
 TOOLBAR_ZOOM = 0.9
 """zoom factor at which a fitted scene leaves room for the toolbar of the editor"""
-EMPTY_VIEW = (-6.0, -1.5), (6.0, 5.0)
+EMPTY_VIEW = (-6.0, -0.6), (6.0, 6.0)
 """m, part of the world that is shown while a scene without bodies is edited"""
 
 INPUT_EVENTS = frozenset(

@@ -361,7 +361,7 @@ class EditView:
             try:
                 self.draft.replace_text(recovered.text, "restore unsaved changes")
             except SceneError as error:
-                text = f"the changes are no valid scene, and stay in {recovered.autosave}: {error.faults[0].message}"
+                text = f"the changes are no valid scene, and stay in {recovered.autosave.name}: {error.faults[0]}"
                 self._context.app_state.messages.add(text, "error")
                 return
             self.autosave.adopt(recovered)

@@ -9,6 +9,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from time import monotonic
 from typing import Any
 
@@ -23,7 +24,7 @@ from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
 from sandbox.measure.preflight.joint_chains import MAX_STRETCH
 from sandbox.measure.preflight.trial_run import run_preflight
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
-from sandbox.scene.compile.demands import demands
+from sandbox.scene.compile.demands import Demand, demands
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_STEPS, BodySpec, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
@@ -89,7 +90,7 @@ def check_scene(scene: Scene) -> CheckResult:
     """Check a scene by formulas, without a trial run. A large scene is not checked, which a note says."""
     needs = demands(scene)
     lacks = tuple((name, tuple(engine.missing(scene, scene.solver))) for name, engine in ENGINES.items())
-    names = tuple(str(demand) for demand in type(next(iter(needs))) if demand in needs) if needs else ()
+    names = tuple(str(demand) for demand in Demand if demand in needs)
     bodies, joints = len(scene.bodies), len(scene.links)
     if bodies > MAX_CHECKED_BODIES or joints > MAX_CHECKED_JOINTS:
         note = f"{bodies:,} bodies and {joints:,} joints are too many to be checked while editing; use sandbox check"
@@ -263,7 +264,7 @@ def _thickness(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
     reach = float(details["safe_dt"]) / scene.solver.dt * travel
     added = 2.0 * (travel - reach) if isinstance(element, Wall) else travel - reach
     thicker = _rounded(thickness + added, is_up=True)
-    length = sum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False))
+    length = sum(math.dist(a, b) for a, b in pairwise(points))
     if thicker >= length or (isinstance(element, Wall) and not _has_room(scene, element, 0.5 * (thicker - thickness))):
         return
     yield Remedy(f"thickness {thicker:g} m", (SetValue((*key.location, "thickness"), thicker),))

@@ -42,11 +42,11 @@ def names(folder: Path) -> set[str]:
     return {each.name for each in folder.iterdir()}
 
 
-def make_dead(file: Path) -> None:
-    """Change the process in the header of an autosave to one that cannot exist."""
-    line, _, text = file.read_text().partition("\n")
-    header = json.loads(line.removeprefix(HEADER)) | {"pid": DEAD_PID}
-    file.write_text(f"{HEADER}{json.dumps(header)}\n{text}")
+def set_process(file: Path, pid: int) -> None:
+    """Change the process in the header of an autosave."""
+    line, _, text = file.read_bytes().decode().partition("\n")
+    header = json.loads(line.removeprefix(HEADER)) | {"pid": pid, "start": 0}
+    file.write_bytes(f"{HEADER}{json.dumps(header)}\n{text}".encode())
 
 
 def left_behind(path: Path, x: float = 1.0, folder: Path | None = None) -> Path:
@@ -58,7 +58,7 @@ def left_behind(path: Path, x: float = 1.0, folder: Path | None = None) -> Path:
     assert autosave.update(0.0) is None
     autosave.release()
     (name,) = names(folder or path.parent) - before
-    make_dead((folder or path.parent) / name)
+    set_process((folder or path.parent) / name, DEAD_PID)
     return (folder or path.parent) / name
 
 
@@ -219,9 +219,7 @@ def test_two_editors_that_restore_one_text_do_not_share_its_file(path: Path) -> 
         autosave.adopt(found)
     move(one, 6.0)
     saves[0].update(0.0)
-    line, _, text = found.autosave.read_text().partition("\n")
-    header = json.loads(line.removeprefix(HEADER)) | {"pid": os.getppid(), "start": 0}  # as if of another process
-    found.autosave.write_text(f"{HEADER}{json.dumps(header)}\n{text}")
+    set_process(found.autosave, os.getppid())  # as if of another process
     move(other, 7.0)
     saves[1].update(0.0)
     assert "6.0, 2.0" in found.autosave.read_text()

@@ -1,0 +1,581 @@
+"""Edit mode under random input, hostile files and unusual scenes: no exception, and no text that is not a scene."""
+
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.scene.editing.draft import SceneDraft
+from sandbox.scene.editing.elements import FIELD_OF
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.editor.edit_view import EditView
+from sandbox.window.editor.editor import TOOLS
+from tests.window.pressing import FOCUS_LOST, key, key_up, move, press, release, wheel
+
+pytestmark = pytest.mark.full  # windows and long sequences
+
+CTRL, SHIFT, ALT, META = pygame.KMOD_CTRL, pygame.KMOD_SHIFT, pygame.KMOD_ALT, pygame.KMOD_META
+Point = tuple[float, float]
+
+BALL = """# one ball
+[[ball]]
+name = "a"
+position = [0.0, 2.0]  # above
+radius = 0.5
+"""
+
+EVERYTHING = """#:schema ../scene.schema.json
+# every kind of element
+title = "Everything"
+[world]
+gravity = [0.0, -9.81]
+duration = 2.0
+
+[[material]]
+name = "wood"
+friction = 0.4
+[[material]]
+name = "steel"
+[[pair]]
+between = ["wood", "steel"]
+friction = 0.1
+
+[[plane]]
+name = "ground"
+point = [0, -5]
+normal = [0.0, 1.0]
+[[wall]]
+name = "lane"
+points = [[-8, 0], [-7, -1.0], [-6, 0]]  # open
+thickness = 0.1
+material = "wood"
+[[wall]]
+points = [[-8, 3], [-7, 3], [-7.5, 4]]
+closed = true
+one_way = false
+[[post]]
+position = [-5.0, 1.0]
+radius = 0.2
+[[zone]]
+name = "round"
+position = [-5.0, 3.0]
+radius = 0.4
+gravity = [1.0, 1.0]
+[[zone]]
+points = [[-9, 5], [-8, 5], [-8, 6]]
+to_layer = "ramp"
+[[zone]]
+points = [[-9, 7], [-8, 7], [-8, 8]]
+thickness = 0.3
+layers = ["ramp"]
+
+[[ball]]
+name = "a"
+position = [0.0, 3.0]
+radius = 0.5
+[[ball]]
+name = '7 "b"'
+position = [ 2.0, 3.0 ] # m
+radius = 5e-1
+material = "steel"
+[[ball]]
+position = [4.0, 3.0]
+radius = 0.5
+[[box]]
+name = "c"
+position = [6.0, 3.0]
+size = [1, 1]
+angle = 0.3
+[[box]]
+name = "anchor"
+position = [6.0, 5.0]
+size = [1, 1]
+fixed = true
+[[capsule]]
+name = "bat"
+position = [8.0, 3.0]
+length = 1.0
+radius = 0.1
+[[capsule]]
+name = "pin"
+position = [8.0, 5.0]
+length = 0.5
+radius = 0.1
+angle = 1.5
+[[polygon]]
+name = "tri"
+position = [8.0, 7.0]
+points = [[0, 0], [1, 0], [0, 1]]
+[[polygon]]
+position = [6.0, 7.0]
+angle = 0.5
+points = [[0, 0], [1, 0], [1, 1], [0, 1]]
+[[body]]
+name = "ship"
+position = [4.0, 7.0]
+mass = 1.0
+[[body.polygon]]
+points = [[-0.5, -0.5], [0.5, -0.5], [0, 0.5]]
+[[body.ball]]
+position = [0, 0.6]
+radius = 0.2
+[[body.box]]
+position = [0.0, -0.6]
+size = [0.3, 0.2]
+angle = 0.2
+[[body.capsule]]
+position = [0.5, 0.0]
+length = 0.3
+radius = 0.1
+[[grid]]
+name = "g"
+origin = [-3, 5]
+columns = 3
+rows = 2
+spacing = [0.5, 0.5]
+radius = 0.2
+[[scatter]]
+lower = [-3, 7]
+upper = [0, 9]
+count = 4
+radius = 0.2
+[[emitter]]
+position = [1, 6]
+count = 5
+velocity_min = [-1, -1]
+velocity_max = [1, 1]
+lifetime = 0.5
+[[stack]]
+base = [-4.0, -4.0]
+columns = 2
+rows = 3
+size = [0.5, 0.5]
+[[rope]]
+name = "line"
+start = [0.0, 5.0]
+end = [2.0, 5.0]
+links = 4
+tie = { start = "a" }
+[[rope]]
+start = [0.0, -1.0]
+end = [2.0, -1.0]
+links = 3
+kind = "planks"
+[[cloth]]
+corner = [2, 0]
+columns = 3
+rows = 3
+spacing = [0.4, 0.4]
+stiffness = 90.0
+bend = 1.0
+[[ragdoll]]
+position = [5.0, -1.0]
+height = 1.8
+
+[[joint]]
+name = "rod"
+kind = "rod"
+between = ["a", "c"]
+length = 6.0
+[[joint]]
+kind = "rod"
+between = ["a"]
+anchors = [[0, 0], [0, 5]]
+[[joint]]
+kind = "pivot"
+between = ["a", '7 "b"']
+at = [1.0, 3.0]
+[[joint]]
+kind = "pivot"
+between = ["c", "tri"]
+anchors = [[1.0, 2.0], [-1.0, -2.0]]
+[[joint]]
+kind = "pivot"
+between = ["ship"]
+[[joint]]
+kind = "slide"
+between = ["a", "ship"]
+least = 0.5
+most = 9.0
+[[joint]]
+kind = "groove"
+between = ["a", "c"]
+groove = [[0, 0], [1, 0]]
+[[joint]]
+kind = "groove"
+between = ["tri"]
+groove = [[8, 7], [9, 7]]
+[[joint]]
+kind = "rotary_limit"
+between = ["a", "c"]
+least = -1
+most = 1
+[[joint]]
+kind = "motor"
+between = ["c"]
+rate = 1.0
+[[joint]]
+kind = "gear"
+between = ["a", "c"]
+ratio = 2.0
+[[joint]]
+kind = "spring"
+between = ["ball-3", "c"]
+anchors = [[0.1, 0], [0, 0.2]]
+stiffness = 10.0
+[[joint]]
+kind = "rotary_spring"
+between = ["a", "tri"]
+stiffness = 10.0
+[[joint]]
+kind = "pulley"
+between = ["a", "c"]
+wheels = [[0.0, 9.0], [6.0, 9.0]]
+
+[[attraction]]
+toward = [0.0, 3.0]
+strength = 1.0
+[[attraction]]
+toward = "a"
+strength = 1.0
+[[thrust]]
+name = "engine"
+body = "ship"
+force = [0.0, 5.0]
+point = [0.0, -0.3]
+key = "up"
+[[drive]]
+name = "flip"
+kind = "stroke"
+body = "bat"
+pivot = [7.5, 3.0]
+stops = [0.0, 1.0]
+rate = 1.0
+key = "left"
+[[drive]]
+name = "plunger"
+kind = "plunger"
+body = "pin"
+direction = [0, 1]
+travel = 1.0
+speed = 1.0
+key = "space"
+"""
+
+TABLE = """title = "Table"
+world = { gravity = [0.0, 0.0] }
+surface = { sliding_friction = 0.2, rolling_friction = 0.01 }
+
+[[ball]]
+name = "cue"
+position = [-0.5, 0.0]
+radius = 0.03
+[[ball]]
+position = [0.5, 0.0]
+radius = 0.03
+[[pocket]]
+position = [1.1, 0.6]
+radius = 0.06
+[[wall]]
+points = [[-1.2, -0.7], [1.2, -0.7], [1.2, 0.7], [-1.2, 0.7]]
+closed = true
+height = 0.04
+[[shot]]
+ball = "cue"
+speed = 1.0
+aim = 0.1
+"""
+
+CRLF = "\ufeff" + BALL.replace("\n", "\r\n")
+
+CROWD = "".join(
+    f'[[ball]]\nname = "b{k}"\nposition = [{0.5 * (k % 20)}, {0.5 * (k // 20)}]\nradius = 0.2\n' for k in range(300)
+)
+
+SHIPPED = ("billiards/9-ball", "artillery/duel", "pinball/classic", "tutorial/overpass")
+
+
+class MonkeyUser:
+    """Random input to a window with an editor, reproducible by its seed."""
+
+    KEYS = tuple(getattr(pygame, name) for name in dir(pygame) if name.startswith("K_"))
+    LIKELY = (
+        *(ord(tool.key) for tool in TOOLS),
+        *(pygame.K_RETURN, pygame.K_DELETE, pygame.K_BACKSPACE, pygame.K_m, pygame.K_TAB),
+        *(pygame.K_LEFT, pygame.K_RIGHT, pygame.K_UP, pygame.K_DOWN, pygame.K_HOME),
+    )
+    WITH_CONTROL = (
+        *(pygame.K_z, pygame.K_y, pygame.K_x, pygame.K_c, pygame.K_v, pygame.K_v, pygame.K_d, pygame.K_a),
+        *(pygame.K_e, pygame.K_s),
+    )
+    TEXTS = ("0.5", "-1", "1e9", "2x3", "1,2", "", " ", "x", ".", "-", "é", "\u202e", "\ud800", "👩‍👩‍👧", "\0", "9" * 400)
+    SIZES = ((640, 480), (160, 120), (200, 700), (700, 130), (1, 1), (1280, 720))
+    SKIPPED = (pygame.K_F11,)  # full screen is the display's
+
+    def __init__(self, window: App, seed: int) -> None:
+        self.window, self.random = window, random.Random(seed)
+        self.log: list[str] = []
+
+    def act(self) -> None:
+        """Post one to a few random events, and run a frame."""
+        actions: tuple[tuple[Callable[[], None], int], ...] = (
+            (self.click, 6),
+            (self.drag, 6),
+            (self.likely_key, 5),
+            (self.control_key, 6),
+            (self.any_key, 3),
+            (self.text, 3),
+            (self.field, 4),
+            (self.wheel, 1),
+            (self.lose_focus, 1),
+            (self.resize, 1),
+            (self.scale, 1),
+        )
+        (action,) = self.random.choices([each for each, _ in actions], [weight for _, weight in actions])
+        self.log.append(action.__name__)
+        action()
+        self.frame()
+        pygame.key.set_mods(0)
+        self.withdraw()
+
+    def withdraw(self) -> None:
+        """Return to the editor if the random input has left it, and never quit."""
+        window = self.window
+        window.context.exit_status = None
+        window.commands.cancel_confirmation()
+        if window.context.gui.help.open:
+            window.context.gui.toggle_help()
+        window.context.gui.scene_browser = None
+        if window.editing is None:
+            self.frame()
+            window.start_editing()
+            self.frame()
+        assert window.editing is not None, window.app_state.messages.visible()
+
+    def frame(self) -> None:
+        self.window.run_frame(0.02)
+
+    def point(self) -> Point:
+        """Return a random position, px: often at an element or handle, sometimes outside the window."""
+        width, height = self.window.context.surface.get_size()
+        editing = self.window.editing
+        kind = self.random.random()
+        if editing is not None and kind < 0.3 and len(editing.draft.scene.bodies):
+            position = editing.draft.scene.bodies.position
+            at = position[self.random.randrange(len(position))]
+            x, y = self.window.context.camera.to_screen(at).tolist()
+            return x + self.random.choice((0, 0, 3, -5)), y
+        if editing is not None and kind < 0.5:
+            handles = editing.editor.handles(editing._view)
+            if handles:
+                x, y = self.window.context.camera.to_screen(np.asarray(self.random.choice(handles).point)).tolist()
+                return x, y
+        margin = 0 if kind < 0.9 else 300
+        return self.random.uniform(-margin, width + margin), self.random.uniform(-margin, height + margin)
+
+    def post(self, *events: pygame.event.Event) -> None:
+        for event in events:
+            pygame.event.post(event)
+
+    def modify(self) -> int:
+        mods = self.random.choice((0, 0, 0, SHIFT, CTRL, SHIFT | CTRL, ALT))
+        pygame.key.set_mods(mods)
+        return mods
+
+    def click(self) -> None:
+        x, y = _clamped(self.point())
+        self.modify()
+        button = self.random.choice((1, 1, 1, 1, 2, 3, 4, 5, 8))
+        self.post(move(x, y), press(x, y, button))
+        if self.random.random() < 0.9:
+            self.post(release(x, y, button))
+
+    def drag(self) -> None:
+        (x, y), end = _clamped(self.point()), _clamped(self.point())
+        self.modify()
+        button = self.random.choice((1, 1, 1, 1, 3))
+        self.post(move(x, y), press(x, y, button))
+        self.frame()
+        self.post(move(*end, held=True))
+        if self.random.random() < 0.3:
+            self.frame()
+            self.random.choice((self.text, self.any_key, self.control_key, self.lose_focus))()
+        if self.random.random() < 0.9:
+            self.post(release(*end, button))
+
+    def likely_key(self) -> None:
+        code = self.random.choice(self.LIKELY)
+        self.post(key(code, self.modify() & SHIFT), key_up(code))
+
+    def control_key(self) -> None:
+        code = self.random.choice(self.WITH_CONTROL)
+        mods = CTRL | self.random.choice((0, 0, SHIFT))
+        self.post(key(code, mods), key_up(code))
+
+    def any_key(self) -> None:
+        code = self.random.choice(self.KEYS)
+        if code not in self.SKIPPED:
+            self.post(key(code, self.random.choice((0, SHIFT, CTRL, ALT, META, CTRL | SHIFT, CTRL | ALT))), key_up(code))
+
+    def text(self) -> None:
+        self.post(pygame.event.Event(pygame.TEXTINPUT, text=self.random.choice(self.TEXTS)))
+
+    def field(self) -> None:
+        """Click a field of the panel that is in view, and type into it."""
+        editing = self.window.editing
+        if editing is None:
+            return
+        boxes = [
+            box
+            for item in editing.panel._visible_items()
+            if item.row is not None and (box := editing.panel.box_of(*item.row_id)) is not None
+        ]
+        if not boxes:
+            return
+        x, y = self.random.choice(boxes).center
+        button = self.random.choice((1, 1, 1, 3))
+        self.post(press(x, y, button), release(x, y, button))
+        self.frame()
+        if self.random.random() < 0.7:
+            self.text()
+            self.post(key(self.random.choice((pygame.K_RETURN, pygame.K_TAB, pygame.K_ESCAPE, pygame.K_DELETE))))
+
+    def wheel(self) -> None:
+        self.post(move(*_clamped(self.point())), wheel(self.random.choice((-30, -3, -1, 1, 3, 30))))
+
+    def lose_focus(self) -> None:
+        self.post(FOCUS_LOST)
+
+    def resize(self) -> None:
+        size = self.random.choice(self.SIZES)
+        self.post(pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
+        pygame.display.set_mode(size, pygame.RESIZABLE)
+
+    def scale(self) -> None:
+        self.window.context.gui.ui_scale = self.random.choice((1.0, 1.0, 1.25, 2.0))
+
+
+def _clamped(point: Point) -> Point:
+    """Return a position within the range of pygame's events, px."""
+    return min(max(point[0], -30_000.0), 30_000.0), min(max(point[1], -30_000.0), 30_000.0)
+
+
+@pytest.fixture
+def open_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., App]]:
+    """Return a function that opens a window on a scene file and edits it; without a file, a new scene."""
+    monkeypatch.chdir(tmp_path)
+    windows: list[App] = []
+
+    def edit(path: Path | None, scale: float = 1.0, edits: bool = True) -> App:
+        window = App(AppState(), size=(900, 600), folder=tmp_path, say=lambda _: None)
+        window.context.gui.ui_scale = scale
+        windows.append(window)
+        assert path is None or window.app_state.open(path), window.app_state.faults
+        pygame.event.clear()
+        if edits:
+            window.start_editing()
+            window.run_frame(0.02)
+            assert window.editing is not None
+        return window
+
+    yield edit
+    pygame.key.set_mods(0)
+    for window in windows:
+        window.close()
+
+
+def view_of(window: App) -> EditView:
+    assert window.editing is not None
+    return window.editing
+
+
+def type_key(window: App, code: int, mod: int = 0) -> None:
+    pygame.event.post(key(code, mod))
+    pygame.event.post(key_up(code))
+    window.run_frame(0.02)
+
+
+def messages(window: App) -> str:
+    return " ".join(text for _, text in window.app_state.messages.visible())
+
+
+def check(draft: SceneDraft) -> None:
+    """Check that the text of a draft is its scene."""
+    assert loads(draft.text) == draft.scene
+    assert load is not None
+
+
+def check_history(draft: SceneDraft, original: str) -> None:
+    """Undo everything, which must restore the original, and redo it."""
+    text, count = draft.text, 0
+    while draft.undo() is not None:
+        count += 1
+    assert draft.text == original
+    for _ in range(count):
+        assert draft.redo() is not None
+    assert draft.text == text
+
+
+def run_random_input(window: App, seed: int, count: int) -> None:
+    user = MonkeyUser(window, seed)
+    original = view_of(window).draft.text
+    drafts = [view_of(window).draft]
+    for k in range(count):
+        user.act()
+        draft = view_of(window).draft
+        if draft is not drafts[-1]:  # the file was changed on disk
+            drafts.append(draft)
+        if k % 20 == 19:
+            check(draft)
+    assert len(drafts) == 1
+    view = view_of(window)
+    view.prompt = None
+    view.panel.commit()
+    view.editor.gesture = None
+    check(view.draft)
+    check_history(view.draft, original)
+    saved = view.draft.save(Path("saved.toml"))
+    assert loads(saved.read_text(encoding="utf-8-sig")) == view.draft.scene
+
+
+SCENES = {"ball": BALL, "everything": EVERYTHING, "table": TABLE, "crlf": CRLF}
+
+
+def test_scene_with_everything_has_every_kind_of_element() -> None:
+    found = loads(EVERYTHING), loads(TABLE)
+    for table, name in FIELD_OF.items():
+        assert any(getattr(scene, name) for scene in found), table
+    assert {joint.kind for joint in found[0].joints} >= {"pulley", "gear", "groove", "slide", "motor", "spring"}
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("name", SCENES)
+def test_random_input_to_a_scene(open_on: Callable[..., App], tmp_path: Path, name: str, seed: int) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(SCENES[name].encode())
+    run_random_input(open_on(path, 1.0 + seed % 2), seed, 60)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_input_to_a_new_scene(open_on: Callable[..., App], seed: int) -> None:
+    run_random_input(open_on(None, 1.0 + seed % 2), seed, 80)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_random_input_to_a_shipped_scene(open_on: Callable[..., App], tmp_path: Path, name: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(find(name).read_bytes())
+    run_random_input(open_on(path), 1, 40)
+
+
+def test_random_input_to_300_bodies(open_on: Callable[..., App], tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(CROWD)
+    run_random_input(open_on(path), 2, 40)
