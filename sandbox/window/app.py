@@ -49,6 +49,13 @@ MODIFIER_KEYS = frozenset(
 )
 """keys that have no command of their own"""
 
+NOT_REPEATED = frozenset(
+    {
+        *(pygame.K_ESCAPE, pygame.K_SPACE, pygame.K_p, pygame.K_e, pygame.K_s, pygame.K_o, pygame.K_r),
+        *(pygame.K_TAB, pygame.K_F1, pygame.K_h, pygame.K_F11),
+    }
+)
+"""keys of the editor that act only once while they are held; a held Esc must not clear the selection and then quit"""
 TOOLBAR_ZOOM = 0.9
 """zoom factor at which a fitted scene leaves room for the toolbar of the editor"""
 EMPTY_VIEW = (-6.0, -0.6), (6.0, 6.0)
@@ -287,7 +294,7 @@ class App:
         if editing is None:
             return
         editing.panel.commit()
-        editing.editor.cancel() if editing.editor.gesture is not None else None
+        editing.drop_gesture()
         self.app_state.paused = False
         self.editing = None
         if not self.app_state.play_draft(editing.draft.scene, editing.draft.path):
@@ -296,6 +303,8 @@ class App:
 
     def _edit(self, editing: EditView, event: pygame.event.Event) -> None:
         """Pass an event to the editor; zoom, panning and Esc are those of the window."""
+        if event.type == pygame.KEYDOWN and event.key in NOT_REPEATED and self._keyboard.is_repeat:
+            return
         if editing.handle_event(event):
             return
         if event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
@@ -344,7 +353,8 @@ class App:
 
     def _starts_game(self, event: pygame.event.Event) -> bool:
         """Return whether an event starts the game that waits for it: Space, or any button of a gamepad."""
-        if not self.app_state.waits_for_start or self.context.gui.covers_scene or self.app_state.faults:
+        is_hidden = self.editing is not None or self.context.gui.covers_scene
+        if not self.app_state.waits_for_start or is_hidden or self.app_state.faults:
             return False
         space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
         return space or event.type == pygame.JOYBUTTONDOWN

@@ -4,7 +4,7 @@ from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers, s
 from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.row import Bench
-from tools.benchmarks.turning import turns
+from tools.benchmarks.turning import edits, turns
 from tools.benchmarks.workloads import (
     balls_on_plane,
     command,
@@ -378,6 +378,12 @@ BENCHES = (
         "a frame of the window in which a body is dragged to the pointer / a frame without events",
         lambda: turns("gas", hand=True),
         lambda: turns("gas", hand=False),
+    ),
+    Bench(
+        "edit-drag",
+        "a frame of the editor in which one of 1,000 balls is dragged / a frame of it without events",
+        lambda: edits(hand=True),
+        lambda: edits(hand=False),
     ),
     Bench(
         "check-start",

@@ -92,7 +92,6 @@ def make(path: Path) -> None:
     window.start_editing()
     window.app_state.messages = Messages()
     hand = _Hand(window)
-    hand.film(4)
     hand.choose("box")
     hand.drag((-4.5, 0.6), (-2.5, 1.0))
     hand.choose("ball")

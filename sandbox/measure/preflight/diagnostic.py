@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from sandbox.jsonable import in_json
+from sandbox.scene.description.world import Settings
 
 ROUNDING = 1e-9
 """Relative: a limit that is exceeded by less counts as kept, because both sides are rounded."""
@@ -31,12 +32,12 @@ def floor_3_digits(limit: float) -> str:
     return f"{float(Context(prec=3, rounding=ROUND_FLOOR).create_decimal(limit * (1.0 + ROUNDING))):g}"
 
 
-def required_iterations(needed: float, h: float, substeps: int) -> tuple[int, float]:
+def required_iterations(needed: float, settings: Settings) -> tuple[int, float]:
     """Return the iterations, and the dt, s, either of which alone raises iterations/h to a required value.
 
     Args:
         needed: required iterations per second.
-        h: substep, s.
-        substeps: substeps of a step.
+        settings: the present settings.
     """
-    return math.ceil(needed * h * (1.0 - ROUNDING)), substeps / needed
+    iterations = math.ceil(needed * settings.h * (1.0 - ROUNDING))
+    return iterations, settings.iterations * settings.substeps / needed

@@ -65,7 +65,8 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         if needed <= available * (1.0 + ROUNDING):
             continue
         needed_if_equal = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, (inverse > 0.0).astype(np.float64))
-        iterations, dt = required_iterations(needed, settings.h, settings.substeps)
+        iterations, _ = required_iterations(needed, settings)
+        dt = settings.substeps * _safe_substep(needed, settings, bias)
         details: Details = {
             "joints": len(some),
             "joint": some.names[0],
@@ -73,7 +74,8 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
             "has": available,
             "safe_dt": dt,
         }
-        remedy = f"use solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s ({needed:.3g} a second)"
+        shorter = f" or dt <= {floor_3_digits(dt)} s" if dt > 0.0 else ""
+        remedy = f"use solver.iterations >= {iterations:,}{shorter} ({needed:.3g} a second)"
         budget = f"with {settings.iterations} iterations every {settings.h:.3g} s ({available:.3g} a second)"
         k, ratio = _most_unequal(some, inverse)
         if needed_if_equal <= available * (1.0 + ROUNDING) and ratio >= MIN_MASS_RATIO:
@@ -89,6 +91,23 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
                 name = f"{len(some):,} joints, {some.names[0]!r} among them, are connected"
             message = f"{name}; {budget} {'it' if len(some) == 1 else 'they'} would come apart; {remedy}"
             yield Diagnostic("chain", message, details)
+
+
+def _safe_substep(needed: float, settings: Settings, bias: float) -> float:
+    """Return the largest substep, s, at which the present number of iterations is enough.
+
+    The required iterations per second grow as the substep h shrinks, as (1 − bias^h)/h, so that the condition is
+    iterations >= K (1 − bias^h).
+
+    Args:
+        needed: required iterations per second with the present substep.
+        settings: the present settings.
+        bias: fraction of an error that remains after one second of correction.
+    """
+    most = needed * settings.h / (1.0 - bias**settings.h)  # K: needed if the whole error is corrected at once
+    if bias == 0.0 or settings.iterations >= most:
+        return 0.0 if bias == 0.0 else settings.h
+    return math.log1p(-settings.iterations / most) / math.log(bias)
 
 
 def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:

@@ -67,8 +67,7 @@ def stack_warnings(scene: Scene, settings: Settings, close: InitialContacts) -> 
     if needed > has * (1.0 + ROUNDING):
         name = scene.bodies.names[base]
         advised = needed * UPRIGHT_ITERATIONS / TOWER_ITERATIONS
-        iterations, _ = required_iterations(advised, settings.h, settings.substeps)
-        dt = settings.iterations * settings.substeps / advised
+        iterations, dt = required_iterations(advised, settings)
         substeps = math.ceil(advised * settings.dt / settings.iterations * (1.0 - ROUNDING))
         remedy = f"solver.substeps >= {substeps:,}, solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s"
         message = (
@@ -131,9 +130,9 @@ def _available_text(settings: Settings, has: float) -> str:
 
 
 def _remedy(needed: float, settings: Settings) -> str:
-    iterations, dt = required_iterations(needed, settings.h, settings.substeps)
+    iterations, dt = required_iterations(needed, settings)
     return f"use solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s ({needed:.3g} a second)"
 
 
 def _details(needed: float, has: float, settings: Settings) -> Details:
-    return {"needed": needed, "has": has, "safe_dt": settings.substeps / needed}
+    return {"needed": needed, "has": has, "safe_dt": required_iterations(needed, settings)[1]}

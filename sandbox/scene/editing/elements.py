@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from sandbox.scene.compile.bodies import Bodies, centre_of
-from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec, Part
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.description.joints import Joined
@@ -87,14 +85,28 @@ def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> 
     moved = replace(before, position=position, angle=angle, elements=preview.elements)
     for name in ("round", "all_round", "shapes", "number_of"):  # they depend on shapes and names only
         vars(moved)[name] = getattr(before, name)
-    vars(preview)["bodies"] = moved
+    vars(preview)["bodies"], vars(preview)[BODY_RANGES] = moved, body_ranges(scene)
     return preview
+
+
+def differ_in_places_only(scene: Scene, other: Scene) -> bool:
+    """Tell whether two scenes have the same bodies and static elements, but for the places and angles of bodies.
+
+    It recognises scenes of `with_moved_bodies`, by identity.
+    """
+    static = ("planes", "walls", "posts", "pockets", "zones", "surface", "play")
+    same_static = all(getattr(scene, name) is getattr(other, name) for name in static)
+    return same_static and scene.bodies.shapes is other.bodies.shapes
 
 
 def name_of(scene: SceneDescription, key: ElementKey) -> str:
     """Return the name of an element; its default name if it has none."""
     name = getattr(element_at(scene, key), "name", None)
     return default_name(key.table, key.index) if name is None else str(name)
+
+
+BODY_RANGES = "_body_ranges"
+"""Attribute of a scene that keeps its `BodyRanges`"""
 
 
 class BodyRanges(NamedTuple):
@@ -108,17 +120,21 @@ class BodyRanges(NamedTuple):
     """index after the last body of each"""
 
 
-@derived_once
-def body_ranges(setup: Setup) -> BodyRanges:
-    """Return which bodies belong to which element, at the start of a scene."""
+def body_ranges(scene: Scene) -> BodyRanges:
+    """Return which bodies belong to which element, at the start of a scene; computed once for a scene."""
+    known = vars(scene).get(BODY_RANGES)
+    if isinstance(known, BodyRanges):
+        return known
     of: dict[ElementKey, range] = {}
     begin = 0
-    for table, sources in setup.scene.kinds.items():
+    for table, sources in scene.kinds.items():
         for index, source in enumerate(sources):
             end = begin + count_of(source)
             of[ElementKey(table, index)] = range(begin, end)
             begin = end
-    return BodyRanges(of, tuple(of), tuple(bodies.stop for bodies in of.values()))
+    found = BodyRanges(of, tuple(of), tuple(bodies.stop for bodies in of.values()))
+    vars(scene)[BODY_RANGES] = found  # beside the values that pydantic keeps, as cached properties are
+    return found
 
 
 def bodies_of(scene: Scene, key: ElementKey) -> range:

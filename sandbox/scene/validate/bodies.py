@@ -56,7 +56,9 @@ def check_start_positions(
 
     movable = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
     max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movable.sum())
-    overlaps = count_overlaps(bodies.position[movable], bodies.core[movable], max_overlaps)
+    overlaps, pairs = 0, int(movable.sum()) * (int(movable.sum()) - 1) // 2
+    if pairs > max_overlaps:  # few bodies cannot overlap so often, and need no search
+        overlaps = count_overlaps(bodies.position[movable], bodies.core[movable], max_overlaps)
     if overlaps > max_overlaps:
         message = (
             f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; the limit is {max_overlaps:,}. "
@@ -147,11 +149,9 @@ def count_overlaps(
     Args:
         position: (N, 2) m.
         radius: (N,) m.
-        max_count: counting stops beyond this number. If there are not as many pairs, the result is 0.
+        max_count: counting stops beyond this number.
         owner: (N,) index of the body of each disc; two discs of one body are no pair.
     """
-    if len(radius) * (len(radius) - 1) // 2 <= max_count < math.inf:
-        return 0
     owner = np.arange(len(radius)) if owner is None else owner
     position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
     octave = np.floor(np.log2(radius))

@@ -12,20 +12,22 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
 from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import ElementKey, element_at, name_of, table_values
+from sandbox.scene.editing.elements import ElementKey, differ_in_places_only, element_at, name_of, table_values
 from sandbox.scene.editing.fields import fields_of
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
+from sandbox.window.editor.check_marks import CheckMarks
 from sandbox.window.editor.editor import TOOLS, AlignmentSide, Editor, EditTool, ViewScale
 from sandbox.window.editor.gestures import OutlineGesture
 from sandbox.window.editor.ghost_path import GhostPredictor
+from sandbox.window.editor.live_check import LiveCheck
 from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
 from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection
 from sandbox.window.editor.snapping import grid_step
 from sandbox.window.editor.toolbar import Toolbar
-from sandbox.window.input.keymap import Command
+from sandbox.window.input.keymap import Command, _latin
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
@@ -137,6 +139,7 @@ class EditView:
         self.recovered: RecoveredText | None = recoverable(draft.path, folder)
         """unsaved changes of a former editor, about which the user is asked"""
         self._renderer, self._ghost = Renderer(), GhostPredictor()
+        self.live_check, self.check_marks = LiveCheck(), CheckMarks()
         self._shown: tuple[object, ...] = ()
         self._button_held = False
 
@@ -148,7 +151,7 @@ class EditView:
     @property
     def _view(self) -> ViewScale:
         camera, gui = self._context.camera, self._context.gui
-        return ViewScale(camera.scale, gui.ui_scale, min(gui.area.size) / camera.scale)
+        return ViewScale(camera.scale, gui.ui_scale, max(min(gui.area.size), 1) / camera.scale)
 
     # --- Events --------------------------------------------------------------------------------------------------
 
@@ -162,6 +165,8 @@ class EditView:
             return True
         if self._context.gui.panel.visible and self.panel.handle_event(event):
             return True
+        if self._use_check_marks(event):
+            return True
         if event.type == pygame.KEYDOWN:
             return self._press_key(event)
         if event.type == pygame.TEXTINPUT:
@@ -169,9 +174,24 @@ class EditView:
         if event.type in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION):
             return self._mouse(event)
         if event.type == pygame.WINDOWFOCUSLOST:
-            self._button_held = False
-            self.editor.cancel() if self.editor.gesture is not None else None
+            self.drop_gesture()
         return False
+
+    def drop_gesture(self) -> None:
+        """Cancel the gesture and the press of the button, whose release will not be seen."""
+        self._button_held = False
+        if self.editor.gesture is not None:
+            self.editor.cancel()
+
+    def _use_check_marks(self, event: pygame.event.Event) -> bool:
+        """Pass an event to the marks of the check, and apply the remedy that is clicked; return whether it was used."""
+        self.check_marks.takes_marks = self.editor.gesture is None and not self._button_held
+        used, remedy = self.check_marks.handle_event(event)
+        if remedy is not None:
+            self.panel.commit()
+            self.editor.apply(list(remedy.changes), f"set {remedy.label}")
+            self._note_unsaved()
+        return used
 
     def _mouse(self, event: pygame.event.Event) -> bool:
         for bar, use in ((self.actions, self._use_action), (self.toolbar, self.editor.choose_tool)):
@@ -201,29 +221,34 @@ class EditView:
         return False
 
     def _press_key(self, event: pygame.event.Event) -> bool:
+        if event.mod & (pygame.KMOD_ALT | pygame.KMOD_META | pygame.KMOD_MODE):
+            return True  # Ctrl+Alt may be AltGr, which types characters
+        key = _latin(event)
         control, shift = bool(event.mod & pygame.KMOD_CTRL), bool(event.mod & pygame.KMOD_SHIFT)
         if control:
-            self._press_control(event.key, shift)
+            self._press_control(key, shift)
             return True
         gesture = self.editor.gesture
-        if gesture is not None and self._press_in_gesture(event.key):
+        if gesture is not None and self._press_in_gesture(key):
             return True
-        if event.key == pygame.K_ESCAPE:
+        if key == pygame.K_ESCAPE:
             return self.editor.cancel()  # otherwise the window asks whether to quit
-        if event.key in DELEGATED:
-            self._run_command(DELEGATED[event.key])
-        elif event.key in (pygame.K_SPACE, pygame.K_p):
+        if key in DELEGATED:
+            if DELEGATED[key] is Command.HELP and not (gesture is not None and gesture.is_multi_click):
+                self.drop_gesture()  # the help page receives the release
+            self._run_command(DELEGATED[key])
+        elif key in (pygame.K_SPACE, pygame.K_p):
             self._leave()
-        elif event.key in ARROWS:
+        elif key in ARROWS:
             step = grid_step(self._view.scale, self._view.ui_scale) * (10.0 if shift else 1.0)
-            x, y = ARROWS[event.key]
+            x, y = ARROWS[key]
             self.editor.nudge((x * step, y * step))
-        elif event.key in (pygame.K_DELETE, pygame.K_BACKSPACE):
+        elif key in (pygame.K_DELETE, pygame.K_BACKSPACE):
             self.editor.delete()
-        elif event.key == pygame.K_m:
+        elif key == pygame.K_m:
             self.editor.mirror(is_vertical=shift)
         else:
-            name = next((tool.name for tool in TOOLS if pygame.key.name(event.key) == tool.key), None)
+            name = next((tool.name for tool in TOOLS if pygame.key.name(key) == tool.key), None)
             if name is not None:
                 self.editor.choose_tool(name)
         return True
@@ -279,6 +304,8 @@ class EditView:
             is_height = key in (pygame.K_UP, pygame.K_DOWN)
             editor.align(("middle" if is_height else "centre") if shift else ALIGNMENTS[key])
         elif key in DELEGATED_WITH_CONTROL:
+            if key == pygame.K_o:
+                self.drop_gesture()
             self._run_command(DELEGATED_WITH_CONTROL[key])
         self._note_unsaved()
 
@@ -342,6 +369,7 @@ class EditView:
         Args:
             is_lost: whether the user has confirmed that unsaved changes are lost; otherwise they are offered again.
         """
+        self.live_check.close()
         if is_lost:
             self.autosave.discard()
             return
@@ -412,12 +440,15 @@ class EditView:
         context, gui, editor = self._context, self._context.gui, self.editor
         scene = editor.scene
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
-        snapshot = Snapshot(scene, scene.bodies, start_frame(scene), overlays=frozenset(overlays))
+        # While bodies are dragged, only the frame differs, so that the renderer need not prepare the scene again.
+        drawn = self.draft.scene if differ_in_places_only(scene, self.draft.scene) else scene
+        snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)
         draw_overlay(surface, context.camera, editor, self._view)
         area = gui.area
         self.toolbar.layout(area, gui.ui_scale)
+        self._draw_check(surface, scene, area)
         self.toolbar.draw(surface, editor.tool, gui.ui_scale)
         self._draw_status(surface, area)
         if gui.panel.visible:
@@ -426,13 +457,24 @@ class EditView:
         messages = context.app_state.messages.visible()
         free = area.inflate(-round(24 * gui.ui_scale), -round(24 * gui.ui_scale))
         free.left = self.toolbar.rect.right + round(10 * gui.ui_scale)
-        draw_messages(surface, messages, free, [], 13.0 * gui.ui_scale)
+        draw_messages(surface, messages, free, self.check_marks.plates, 13.0 * gui.ui_scale)
         self.toolbar.draw_hint(surface, gui.ui_scale)
         self.actions.draw_hint(surface, gui.ui_scale)
         if self.prompt is not None:
             self.prompt.draw(surface, gui.ui_scale)
         if self.recovered is not None:
-            draw_notice(surface, self._recovery_question(self.recovered), area, 16 * gui.ui_scale, ORANGE)
+            narrow = area.inflate(-max(area.width - round(640 * gui.ui_scale), 0), 0)
+            draw_notice(surface, self._recovery_question(self.recovered), narrow, 16 * gui.ui_scale, ORANGE)
+
+    def _draw_check(self, surface: pygame.Surface, scene: Scene, area: pygame.Rect) -> None:
+        """Check the draft, and draw the result right of the toolbar and below the plate of the file."""
+        ui_scale = self._context.gui.ui_scale
+        self.live_check.submit(self.draft.scene)
+        free = area.inflate(-round(24 * ui_scale), -round(24 * ui_scale))
+        top = free.top + round(54 * ui_scale)
+        free = pygame.Rect(self.toolbar.rect.right + round(10 * ui_scale), top, 0, free.bottom - top)
+        free.width = max(area.right - round(12 * ui_scale) - free.left, 0)
+        self.check_marks.draw(surface, self._context.camera, scene, self.live_check.result, free, ui_scale)
 
     def _draw_ghost(self, surface: pygame.Surface, scene: Scene) -> None:
         """Draw where the selected body will be in the next seconds."""
@@ -466,17 +508,18 @@ class EditView:
         path = self.draft.path
         name = ("new scene" if path is None else path.name) + (" ●" if self.draft.is_changed else "")
         grid = grid_step(self._view.scale, ui_scale)
-        detail = f"grid {grid:g} m"
+        ghost = self._ghost.path
+        detail = f"grid {grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
         left, top = self.toolbar.rect.right + pad, self.toolbar.rect.top
         self.actions.layout_row((left, top), ui_scale)
         x = self.actions.rect.right + pad
-        width = area.right - x - 2 * pad
-        if width < 8 * size:
+        badge = text_size("EDIT", size, bold=True)[0]
+        room = area.right - x - badge - 5 * pad
+        if room < 5 * size:
             self.actions.draw(surface, "", ui_scale)
             return
-        name = ellipsis(name, size, width - 9 * size, True)
-        wide = max(text_size(name, size, bold=True)[0], text_size(detail, 0.85 * size)[0])
-        badge = text_size("EDIT", size, bold=True)[0]
+        name, detail = ellipsis(name, size, room, True), ellipsis(detail, 0.85 * size, room, mono=True)
+        wide = max(text_size(name, size, bold=True)[0], text_size(detail, 0.85 * size, mono=True)[0])
         rect = pygame.Rect(x, top, wide + badge + 4 * pad, self.actions.rect.height)
         draw_box(surface, rect, 7 * ui_scale)
         draw_text(surface, "EDIT", (x + pad, rect.centery), size, ORANGE, "midleft", bold=True)

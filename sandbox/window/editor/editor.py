@@ -407,14 +407,14 @@ class Editor:
         self.snapped = None
         if control:
             return
-        box = bounds_of(self.draft.scene, self.selection[0])
-        anchor = _anchor(element_at(self.draft.scene, self.selection[0]), box)
+        first = gesture.keys[0]
+        anchor = _anchor(element_at(self.draft.scene, first), bounds_of(self.draft.scene, first))
         if anchor is not None:
             target = anchor[0] + way[0], anchor[1] + way[1]
-            found = snap_point(self.draft.scene, target, view.scale, view.ui_scale, self.selection)
+            found = snap_point(self.draft.scene, target, view.scale, view.ui_scale, gesture.keys)
             gesture.shift_by((found.point[0] - anchor[0], found.point[1] - anchor[1]))
             self.snapped = (found.point, found.to) if found.to != "grid" else None
-        contact = surface_shift(gesture.preview(), self.selection, view.scale, view.ui_scale)
+        contact = surface_shift(gesture.preview(), gesture.keys, view.scale, view.ui_scale)
         if contact is not None:
             x, y = gesture.by.shift
             gesture.shift_by((x + contact[0], y + contact[1]))
@@ -518,8 +518,13 @@ class Editor:
             self._notify(str(error), "error")
             return False
         self.fault = None
+        self._drop_gesture()
         self.hovered = None if self.hovered is None or not exists(self.draft.scene, self.hovered) else self.hovered
         return True
+
+    def _drop_gesture(self) -> None:
+        """Cancel the gesture and the click under way when the draft changes: they refer to its old elements."""
+        self.gesture = self.snapped = self._pressed_key = None
 
     def delete(self) -> None:
         """Delete the selection, and the joints and forces of its bodies."""
@@ -598,13 +603,13 @@ class Editor:
 
     def undo(self) -> None:
         """Undo the last change."""
-        self.gesture = None
+        self._drop_gesture()
         label = self.draft.undo()
         self._after_history("undone", label)
 
     def redo(self) -> None:
         """Do the last undone change again."""
-        self.gesture = None
+        self._drop_gesture()
         self._after_history("redone", self.draft.redo())
 
     def _after_history(self, what: str, label: str | None) -> None:
@@ -619,7 +624,12 @@ class Editor:
         if preset is None:
             self._take_generators_apart()
             return
-        self.draft.take_apart_preset()
+        self._drop_gesture()
+        try:
+            self.draft.take_apart_preset()
+        except SceneError as error:
+            self._notify(error.faults[0].message, "error")
+            return
         self._notify(f"[{preset}] was replaced by its elements, without comments", "info")
 
     def _take_generators_apart(self) -> None:
@@ -672,6 +682,7 @@ class Editor:
             return "; ".join(fault.message for fault in error.faults[:2])
         except TextEditError as error:
             return str(error)
+        self._drop_gesture()
         self.fault = None
         return None
 

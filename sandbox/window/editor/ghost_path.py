@@ -15,7 +15,9 @@ SECONDS = 2.0
 """s of motion that are predicted"""
 MAX_POINTS = 200
 """Points of a path"""
-MAX_WORK = 200_000
+MAX_BODIES = 300
+"""Bodies of a scene up to which paths are predicted: more would slow the window down while it is edited"""
+MAX_WORK = 50_000
 """Steps × bodies of a prediction; a scene with more bodies is predicted for a shorter time"""
 MAX_TIME = 0.2
 """s of computing after which a prediction ends early"""
@@ -33,7 +35,7 @@ class GhostPath:
 
 
 def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath | None:
-    """Return the path of a body from the start of a scene; None if no engine can run the scene.
+    """Return the path of a body from the start of a scene; None if no engine can run it, or it is too large.
 
     The engine `exact` predicts it where it can, whose answer does not depend on the time step; otherwise pymunk, or the
     first engine that can. The path is shorter where the body is removed, or where the work would exceed its limits.
@@ -43,7 +45,7 @@ def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath
         body: index of the body.
         seconds: duration, s.
     """
-    engines = able(scene)
+    engines = able(scene) if len(scene.bodies) <= MAX_BODIES else ()
     name = next((each for each in ("exact", USUAL) if each in engines), engines[0] if engines else None)
     if name is None:
         return None

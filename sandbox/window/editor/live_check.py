@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from sandbox.engines.common.base import BIAS
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.clearance import bounding_clearances
 from sandbox.measure.preflight.checks import FAILED, MIN_ITERATIONS
@@ -45,8 +44,10 @@ CHECK_DELAY = 0.15
 """s without a change after which a scene is checked"""
 MAX_CHECKED_BODIES, MAX_CHECKED_JOINTS = 20_000, 2_000
 """Largest scene that is checked: up to about 1 s, most of it for the modes of joints."""
-MIN_DEPTH_SHIFT = 2e-9
-"""m, gap left between bodies that are moved apart: positions are written with nine decimals"""
+ROUNDING_GAP = 2e-9
+"""m, gap left between bodies that are moved apart, because positions are written with nine decimals. Overlaps with
+static elements count from the slop of the engines on.
+"""
 BODY_DETAILS, STATIC_DETAILS = ("ball", "body", "other", "first", "second"), ("thing", "second")
 """Keys of the details of a diagnostic that name bodies, and static elements."""
 
@@ -231,23 +232,8 @@ def _iteration_remedies(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy
     yield from _solver_remedy(scene, "iterations", _ceil(needed * solver.h))
     factor = solver.iterations / (needed * solver.h)
     if "joint" in details:
-        factor = _factor_with_bias(scene, factor)
+        factor = float(details["safe_dt"]) / solver.dt
     yield from _step_remedies(scene, factor)
-
-
-def _factor_with_bias(scene: Scene, factor: float) -> float:
-    """Return the factor of the substep at which joints hold; 0 if there is none.
-
-    The required iterations per second are proportional to the rate of the position correction, (1 − bias^h)/h, which
-    grows as h shrinks.
-    """
-    bias, h = BIAS if scene.solver.bias is None else scene.solver.bias, scene.solver.h
-    least, most = 0.0, 1.0
-    for _ in range(60):  # bisection to the precision of a float
-        middle = 0.5 * (least + most)
-        growth = (1.0 - bias ** (middle * h)) / ((1.0 - bias**h) * middle)
-        least, most = (middle, most) if middle * growth <= factor else (least, middle)
-    return least * (1.0 - ROUNDING)
 
 
 def _thickness(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
@@ -317,7 +303,7 @@ def _separation(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
         normal = _direction_of_separation(scene, name, other, static)
         if normal is None:
             continue
-        depth = float(details["depth"]) + MIN_DEPTH_SHIFT
+        depth = float(details["depth"]) + (ROUNDING_GAP if static is None else 0.0)
         shift = normal[0] * depth, normal[1] * depth
         if not _is_free_at(scene, name, shift):
             continue

@@ -30,6 +30,8 @@ MAX_OUTLINES = 1_000
 """Elements, and bodies of an element, that get an outline"""
 MAX_STRONG_OUTLINES = 30
 """Selected elements up to which outlines have a dark edge"""
+FARTHEST = 1e6
+"""px, largest coordinate of rectangles"""
 
 ElementOutline = tuple[FloatArray, bool]
 """Corners, (K, 2) m, and whether the last one is connected to the first."""
@@ -64,6 +66,22 @@ def outlines_of(scene: Scene, key: ElementKey) -> list[ElementOutline]:
 def _circle(centre: Point, radius: float) -> FloatArray:
     angles = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
     return np.asarray(centre) + radius * np.column_stack((np.cos(angles), np.sin(angles)))
+
+
+def _draw_dot(
+    surface: pygame.Surface, position: tuple[float, float], radius: float, colour: RgbColour, hole: float = 0.0
+) -> None:
+    """Draw a disc or ring, unless it is out of sight: SDL has no coordinates beyond 32 bits."""
+    (x, y), (width, height) = position, surface.get_size()
+    if -radius <= x <= width + radius and -radius <= y <= height + radius:
+        draw_disc(surface, (x, y), radius, colour, hole)
+
+
+def _nearest_to_view(camera: Camera, points: FloatArray) -> list[list[float]]:
+    """Return points, (K, 2) m, in pixels; those that SDL has no coordinates for are moved to `FARTHEST`."""
+    pixels = np.nan_to_num(camera.to_screen(points), nan=FARTHEST, posinf=FARTHEST, neginf=-FARTHEST)
+    moved: list[list[float]] = np.clip(pixels, -FARTHEST, FARTHEST).tolist()
+    return moved
 
 
 def draw_overlay(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:
@@ -110,8 +128,8 @@ def _draw_forces(surface: pygame.Surface, camera: Camera, scene: Scene, view: Vi
             place = np.asarray(attraction.toward)
         if place is not None:
             x, y = camera.to_screen(place).tolist()
-            draw_disc(surface, (x, y), 7 * unit, PURPLE, 5.4 * unit)
-            draw_disc(surface, (x, y), 2.5 * unit, PURPLE)
+            _draw_dot(surface, (x, y), 7 * unit, PURPLE, 5.4 * unit)
+            _draw_dot(surface, (x, y), 2.5 * unit, PURPLE)
 
 
 def _draw_outlines(
@@ -126,7 +144,7 @@ def _draw_outlines(
     for corners, closed in outlines_of(scene, key):
         pixels = [tuple(point) for point in camera.to_screen(corners).tolist()]
         if len(pixels) == 2 and math.dist(pixels[0], pixels[1]) < 1.0:  # a pivot
-            draw_disc(surface, pixels[0], 8 * view.ui_scale, colour, 6 * view.ui_scale)
+            _draw_dot(surface, pixels[0], 8 * view.ui_scale, colour, 6 * view.ui_scale)
             continue
         if width < 2.0 and len(pixels) > 2:
             draw_thin_outline(surface, pixels, closed, colour)
@@ -151,7 +169,7 @@ def draw_thin_outline(
 def _draw_gesture(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:
     gesture, unit = editor.gesture, view.ui_scale
     if isinstance(gesture, SelectGesture):
-        (ax, ay), (bx, by) = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
+        (ax, ay), (bx, by) = _nearest_to_view(camera, np.asarray((gesture.begin, gesture.end)))
         rect = pygame.Rect(round(min(ax, bx)), round(min(ay, by)), round(abs(ax - bx)), round(abs(ay - by)))
         draw_box(surface, rect, 0, SKY, 40, SKY)
     elif isinstance(gesture, OutlineGesture):
@@ -161,8 +179,8 @@ def _draw_gesture(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         if len(gesture.corners) > 2:
             draw_dashes(surface, [((pixels[-1][0], pixels[-1][1]), (pixels[0][0], pixels[0][1]))], SKY, 5 * unit)
         for x, y in pixels[:-1]:
-            draw_disc(surface, (x, y), 4 * unit, SKY)
-        draw_disc(surface, (pixels[0][0], pixels[0][1]), 6 * unit, INK, 4 * unit)
+            _draw_dot(surface, (x, y), 4 * unit, SKY)
+        _draw_dot(surface, (pixels[0][0], pixels[0][1]), 6 * unit, INK, 4 * unit)
     elif isinstance(gesture, ThrustGesture):
         a, b = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
         draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), ORANGE, 3.0 * unit, edge=BACKGROUND)
@@ -170,7 +188,7 @@ def _draw_gesture(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         a, b = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
         draw_line(surface, (a[0], a[1]), (b[0], b[1]), SKY, 2.0 * unit)
         for x, y in (a, b):
-            draw_disc(surface, (x, y), 4 * unit, SKY)
+            _draw_dot(surface, (x, y), 4 * unit, SKY)
 
 
 def _draw_handles(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:
@@ -181,7 +199,7 @@ def _draw_handles(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         sides = [((a[0], a[1]), (b[0], b[1])) for a, b in zip(pixels, (*pixels[1:], pixels[0]), strict=True)]
         draw_dashes(surface, sides, mix_colours(SKY, BACKGROUND, 0.3), 4 * unit)
     for handle in handles:
-        x, y = camera.to_screen(np.asarray(handle.point)).tolist()
+        ((x, y),) = _nearest_to_view(camera, np.asarray((handle.point,)))
         if handle.kind == "scale":
             side = round(8 * unit)
             rect = pygame.Rect(0, 0, side, side)
@@ -191,11 +209,11 @@ def _draw_handles(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         elif handle.kind == "velocity":
             _draw_velocity(surface, camera, editor, handle, view)
         elif handle.kind == "rotate":
-            draw_disc(surface, (x, y), 6.5 * unit, INK)
-            draw_disc(surface, (x, y), 5 * unit, SKY, 2 * unit)
+            _draw_dot(surface, (x, y), 6.5 * unit, INK)
+            _draw_dot(surface, (x, y), 5 * unit, SKY, 2 * unit)
         else:
-            draw_disc(surface, (x, y), 5 * unit, SKY)
-            draw_disc(surface, (x, y), 3.4 * unit, INK)
+            _draw_dot(surface, (x, y), 5 * unit, SKY)
+            _draw_dot(surface, (x, y), 3.4 * unit, INK)
 
 
 def _draw_velocity(
@@ -206,8 +224,8 @@ def _draw_velocity(
     a, b = camera.to_screen(np.asarray((scene.bodies.position[handle.index], handle.point))).tolist()
     if scene.bodies.velocity[handle.index].any():
         draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), YELLOW, 2.5 * unit, edge=BACKGROUND)
-    draw_disc(surface, (b[0], b[1]), 5.5 * unit, BACKGROUND)
-    draw_disc(surface, (b[0], b[1]), 4 * unit, YELLOW)
+    _draw_dot(surface, (b[0], b[1]), 5.5 * unit, BACKGROUND)
+    _draw_dot(surface, (b[0], b[1]), 4 * unit, YELLOW)
 
 
 def draw_ghost_path(surface: pygame.Surface, camera: Camera, path: GhostPath, ui_scale: float) -> None:
@@ -217,7 +235,7 @@ def draw_ghost_path(surface: pygame.Surface, camera: Camera, path: GhostPath, ui
     count = len(finite)
     for k, (x, y) in enumerate(finite.tolist()):
         colour = mix_colours(YELLOW, BACKGROUND, 0.15 + 0.7 * k / max(count, 1))
-        draw_disc(surface, (x, y), (2.2 if k % 10 else 3.2) * ui_scale, colour)
+        _draw_dot(surface, (x, y), (2.2 if k % 10 else 3.2) * ui_scale, colour)
 
 
 def _draw_dimensions(surface: pygame.Surface, camera: Camera, editor: Editor, view: ViewScale) -> None:
@@ -230,7 +248,7 @@ def _draw_dimensions(surface: pygame.Surface, camera: Camera, editor: Editor, vi
         return
     size = 13 * view.ui_scale
     width, height = text_size(text, size, mono=True)
-    x, y = camera.to_screen(np.asarray(editor.pointer)).tolist()
+    ((x, y),) = _nearest_to_view(camera, np.asarray((editor.pointer,)))
     rect = pygame.Rect(round(x + 16 * view.ui_scale), round(y + 14 * view.ui_scale), round(width + size), height + 6)
     rect.clamp_ip(surface.get_rect())
     draw_box(surface, rect, 4 * view.ui_scale, edge=ORANGE if gesture.typed else None, opacity=235)
@@ -245,7 +263,7 @@ def _draw_fault(surface: pygame.Surface, camera: Camera, editor: Editor, message
     size = 12.5 * view.ui_scale
     lines = wrap_text(message, size, 320 * view.ui_scale, 4)
     width = max(text_size(line, size)[0] for line in lines) + round(1.4 * size)
-    x, y = camera.to_screen(np.asarray((0.5 * (box[0][0] + box[1][0]), box[0][1]))).tolist()
+    ((x, y),) = _nearest_to_view(camera, np.asarray(((0.5 * (box[0][0] + box[1][0]), box[0][1]),)))
     step = round(1.4 * size)
     rect = pygame.Rect(0, 0, width, len(lines) * step + round(0.9 * size))
     rect.midtop = round(x), round(y + 14 * view.ui_scale)

@@ -43,7 +43,13 @@ class PathPrompt:
         if not text:
             self.note = "type the name of a file, such as my-scene.toml"
             return None
-        path = Path(text).expanduser()
+        try:
+            path = Path(text).expanduser()
+        except RuntimeError:  # there is no such user
+            path = Path(text)
+        if not path.name:
+            self.note = f"{text} is a folder; give the name of a file"
+            return None
         if path.suffix.lower() != ".toml":
             path = path.with_name(f"{path.name}.toml")
         try:

@@ -1,6 +1,7 @@
 """Toolbar of the editor: a column of tool buttons at the left of the window, each with its key."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import pygame
 
@@ -13,6 +14,7 @@ BUTTON = 32
 """px at UI scale 1, side of a button"""
 GAP = 3
 """px at UI scale 1 between buttons"""
+MAX_COLUMNS = 4
 GROUP_STARTS = ("ball", "plane", "rod", "thrust", "eraser")
 """Tools before which there is a wider gap"""
 
@@ -30,9 +32,10 @@ class Toolbar:
         """px, as last laid out"""
 
     def layout(self, area: pygame.Rect, ui_scale: float) -> None:
-        """Lay out the buttons in an area, px: in one column, or in two if it is too low."""
+        """Lay out the buttons in an area, px: in one column, or in as many more as it needs if it is too low."""
         side, gap, pad = round(BUTTON * ui_scale), round(GAP * ui_scale), round(6 * ui_scale)
-        columns = 1 if self._height(1, side, gap) + 2 * pad <= area.height - 2 * pad else 2
+        free = area.height - 4 * pad
+        columns = next((n for n in range(1, MAX_COLUMNS) if self._height(n, side, gap) <= free), MAX_COLUMNS)
         left, top = area.left + 2 * pad, area.top + 2 * pad
         self._rects, x, y, column = [], left, top, 0
         for tool in self._tools:
@@ -57,7 +60,11 @@ class Toolbar:
         self.rect = pygame.Rect(*corner, len(self._tools) * (side + gap) - gap + 2 * pad, side + 2 * pad)
 
     def _height(self, columns: int, side: int, gap: int) -> int:
-        return -(-len(self._tools) // columns) * (side + gap) + 2 * gap * len(GROUP_STARTS)
+        """Return the height of all groups, each of which begins in a row of its own, px."""
+        names = [tool.name for tool in self._tools]
+        starts = [0, *(k for k, name in enumerate(names) if name in GROUP_STARTS and k > 0), len(names)]
+        rows = sum(-(-(end - begin) // columns) for begin, end in pairwise(starts))
+        return rows * (side + gap) + 2 * gap * (len(starts) - 2)
 
     def tool_at(self, position: tuple[int, int]) -> EditTool | None:
         """Return the tool of the button at a position, px."""
@@ -76,9 +83,9 @@ class Toolbar:
         if event.type == pygame.MOUSEMOTION:
             self._pointer, self._hovered = event.pos, self.tool_at(event.pos)
             return self._pressed is not None, None
-        if event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self.rect.collidepoint(event.pos):
-            self._pressed = self.tool_at(event.pos) if event.button == 1 else None
-            return True, None
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3:
+            self._pressed = self.tool_at(event.pos) if event.button == 1 else None  # also after a lost release
+            return self.rect.collidepoint(event.pos), None
         if event.type == pygame.MOUSEBUTTONUP and event.button == 1 and self._pressed is not None:
             pressed, self._pressed = self._pressed, None
             return True, pressed.name if self.tool_at(event.pos) is pressed else None

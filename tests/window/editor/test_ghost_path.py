@@ -44,10 +44,12 @@ def test_path_ends_where_the_body_is_removed() -> None:
 
 
 def test_path_of_many_bodies_is_shorter() -> None:
-    grid = "[[grid]]\norigin = [0, 20]\ncolumns = 100\nrows = 30\nspacing = [1, 1]\nradius = 0.1\n"
+    grid = "[[grid]]\norigin = [0, 20]\ncolumns = 29\nrows = 10\nspacing = [1, 1]\nradius = 0.1\n"
     path = predict_path(loads(FLIGHT + grid), 0)
     assert path is not None
     assert len(path.points) * path.interval < SECONDS
+    crowd = predict_path(loads(FLIGHT + grid.replace("rows = 10", "rows = 11")), 0)
+    assert crowd is None
 
 
 def wait_for(predictor: GhostPredictor, seconds: float = 20.0) -> GhostPath | None:
