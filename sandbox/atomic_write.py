@@ -53,8 +53,8 @@ def temporary_path(folder: Path) -> Path:
         _searched.add(absolute)
         remove_stale(folder)
     pid = os.getpid()
-    _, start = _state_of(pid) or ("", 0)
-    return folder / f".sandbox-{_host()}-{pid}-{start}-{uuid4().hex[:8]}.tmp"
+    _, start = process_state(pid) or ("", 0)
+    return folder / f".sandbox-{host_name()}-{pid}-{start}-{uuid4().hex[:8]}.tmp"
 
 
 def remove_stale(folder: Path) -> None:
@@ -77,12 +77,12 @@ def _is_stale(entry: os.DirEntry[str]) -> bool:
     name = TEMPORARY.fullmatch(entry.name)
     if name is None or not entry.is_file(follow_symlinks=False):
         return False
-    if name["host"] == _host() and os.name != "nt":  # Windows has no signal that tests for a process
-        return not _is_alive(int(name["pid"]), int(name["start"]))
+    if name["host"] == host_name() and os.name != "nt":  # Windows has no signal that tests for a process
+        return not is_process_alive(int(name["pid"]), int(name["start"]))
     return entry.stat(follow_symlinks=False).st_mtime < time() - MAX_AGE
 
 
-def _is_alive(pid: int, start: int) -> bool:
+def is_process_alive(pid: int, start: int) -> bool:
     """Return whether a process of this host runs; a process that started at another time has only the same number."""
     try:
         os.kill(pid, 0)
@@ -90,14 +90,14 @@ def _is_alive(pid: int, start: int) -> bool:
         return False
     except PermissionError:  # another user's
         pass
-    found = _state_of(pid)
+    found = process_state(pid)
     if found is None:
         return True
     state, now = found
     return state not in ("Z", "X") and start in (0, now)
 
 
-def _state_of(pid: int) -> tuple[str, int] | None:
+def process_state(pid: int) -> tuple[str, int] | None:
     """Return state and start of a process, in ticks since the start of the system; None without /proc.
 
     Source: proc_pid_stat(5); the fields are counted from the end of the name, which may contain any character.
@@ -110,7 +110,7 @@ def _state_of(pid: int) -> tuple[str, int] | None:
 
 
 @cache
-def _host() -> str:
+def host_name() -> str:
     """Return 8 hex digits for the PID namespace: a host since it started, or a container.
 
     Hosts that share a folder may have one name, and their outermost namespaces have one number.

@@ -241,7 +241,8 @@ def _draw_ridge(surface: pygame.Surface, tops: FloatArray, colour: RgbColour) ->
     for y in range(height):
         strip.set_at((0, y), mix_colours(colour, MIST, 0.75 * (1.0 - math.exp(-3.0 * y / height))))
     surface.blits([(strip, (x, top)) for x, top in enumerate(np.floor(tops).astype(int).tolist())], doreturn=False)
-    pygame.draw.aalines(surface, mix_colours(colour, MIST, 0.3), False, list(enumerate(tops.tolist())))
+    if len(tops) > 1:
+        pygame.draw.aalines(surface, mix_colours(colour, MIST, 0.3), False, list(enumerate(tops.tolist())))
 
 
 SOIL: RgbColour = (122, 92, 62)

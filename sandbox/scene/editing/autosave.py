@@ -16,7 +16,7 @@ from pathlib import Path
 from stat import S_ISREG
 from time import time
 
-from sandbox.atomic_write import MAX_AGE, _host, _is_alive, _state_of, atomic_write
+from sandbox.atomic_write import MAX_AGE, atomic_write, host_name, is_process_alive, process_state
 from sandbox.scene.editing.draft import BYTE_ORDER_MARK, SceneDraft
 from sandbox.scene.files import shipped_scenes
 from sandbox.scene.files.load import too_large
@@ -50,9 +50,9 @@ class AutosaveHeader:
     def of(cls, draft: SceneDraft) -> "AutosaveHeader":
         """Return the header of a draft of this process."""
         saved, pid = draft.saved_text, os.getpid()
-        _, start = _state_of(pid) or ("", 0)
+        _, start = process_state(pid) or ("", 0)
         file = None if draft.path is None else str(draft.path.absolute())
-        return cls(file, None if saved is None else _sha256(saved.encode("utf-8")), _host(), pid, start)
+        return cls(file, None if saved is None else _sha256(saved.encode("utf-8")), host_name(), pid, start)
 
     @classmethod
     def read(cls, line: str) -> "AutosaveHeader | None":
@@ -75,7 +75,7 @@ class AutosaveHeader:
     @property
     def is_of_this_process(self) -> bool:
         """Whether this process has written the file."""
-        return self.host == _host() and self.pid == os.getpid() and _is_alive(self.pid, self.start)
+        return self.host == host_name() and self.pid == os.getpid() and is_process_alive(self.pid, self.start)
 
     def is_of(self, path: Path | None) -> bool:
         """Tell whether the autosave belongs to a scene file, whose folder may have been moved."""
@@ -245,8 +245,8 @@ def _is_live(file: Path, header: AutosaveHeader) -> bool:
     """Tell whether the editor that has written an autosave still runs; see `atomic_write.remove_stale`."""
     if header.is_of_this_process:
         return file in _in_use
-    if header.host == _host() and os.name != "nt":  # Windows has no signal that tests for a process
-        return _is_alive(header.pid, header.start)
+    if header.host == host_name() and os.name != "nt":  # Windows has no signal that tests for a process
+        return is_process_alive(header.pid, header.start)
     try:
         return file.stat().st_mtime >= time() - MAX_AGE
     except OSError:

@@ -27,7 +27,7 @@ from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection
 from sandbox.window.editor.snapping import grid_step
 from sandbox.window.editor.toolbar import Toolbar
-from sandbox.window.input.keymap import Command, _latin
+from sandbox.window.input.keymap import Command, latin_key
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
@@ -223,7 +223,7 @@ class EditView:
     def _press_key(self, event: pygame.event.Event) -> bool:
         if event.mod & (pygame.KMOD_ALT | pygame.KMOD_META | pygame.KMOD_MODE):
             return True  # Ctrl+Alt may be AltGr, which types characters
-        key = _latin(event)
+        key = latin_key(event)
         control, shift = bool(event.mod & pygame.KMOD_CTRL), bool(event.mod & pygame.KMOD_SHIFT)
         if control:
             self._press_control(key, shift)

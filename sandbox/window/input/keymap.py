@@ -163,7 +163,7 @@ def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset
     """
     if event.type != pygame.KEYDOWN:
         return None
-    key = _latin(event)
+    key = latin_key(event)
     modifiers = int(getattr(event, "mod", 0))
     control, alt = modifiers & pygame.KMOD_CTRL, modifiers & (pygame.KMOD_ALT | pygame.KMOD_MODE)
     character = str(getattr(event, "unicode", ""))
@@ -180,7 +180,7 @@ def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset
     return (shifted or _BY_KEY.get((key, 0))) if plain else None
 
 
-def _latin(event: pygame.event.Event) -> int:
+def latin_key(event: pygame.event.Event) -> int:
     """Return the key code; on a layout without Latin letters, the US key code of the scan code."""
     key = int(event.key)
     foreign = key > 0x24F and not key & _NAMED  # beyond the Latin blocks of Unicode

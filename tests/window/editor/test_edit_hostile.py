@@ -399,6 +399,8 @@ class MonkeyUser:
             window.start_editing()
             self.frame()
         assert window.editing is not None, window.app_state.messages.visible()
+        if window.editing.draft.scene.surface is not None:  # shadows of billiard balls take memory by their area in px
+            window.context.camera = window.context.camera.zoomed_to(min(window.context.camera.scale, 3e3))
 
     def frame(self) -> None:
         self.window.run_frame(0.02)

@@ -170,6 +170,8 @@ def _orthonormalised(matrices: FloatArray) -> FloatArray:
 
 MAX_MOVING_RADIUS, MAX_RESTING_RADIUS = 48.0, 160.0
 """px: largest radius at which sprites of moving and of resting balls are shaded; larger balls are scaled up"""
+MAX_SHADOWED_RADIUS = 1_000.0
+"""px: the shadow of a larger ball would cover the view"""
 OFFSETS = 4
 """subpixel positions of a sprite along each axis, so that slow balls move smoothly"""
 SINK_TIME = 0.18
@@ -215,7 +217,7 @@ class BallRenderer:
         visible = [k for k, number in enumerate(view.shown.tolist()) if sinking.get(number, 0.0) < 1.0]
         discs = [(k, int(view.shown[k]), *view.centre[k].tolist(), float(view.radius[k])) for k in visible]
         for _, number, x, y, radius in discs:
-            if number not in sinking and radius >= 2.0:
+            if number not in sinking and 2.0 <= radius <= MAX_SHADOWED_RADIUS:
                 shadow = _shadow(round(radius * 2.0))
                 half = shadow.get_width() / 2.0
                 view.surface.blit(shadow, (round(x + 0.20 * radius - half), round(y + 0.26 * radius - half)))
