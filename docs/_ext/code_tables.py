@@ -28,7 +28,7 @@ from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES
 from sandbox.scene.description.world import COMMON, Settings
 from sandbox.scene.validate.scene import MAX_SURFACES
 from sandbox.trajectory import Trajectory
-from sandbox.window.editor.edit_view import HELP_GROUPS
+from sandbox.window.editor.edit_keys import HELP_GROUPS
 from sandbox.window.input.bindings import control_help
 from sandbox.window.ui.help import help_groups
 

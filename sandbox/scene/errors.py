@@ -124,7 +124,7 @@ def _lines_of(text: str) -> dict[Location, int]:
         sign = token[0]
         if sign == "\n" or sign[0] == "#":
             if state == "heading":
-                table = _enter(_parsed(text[start : token.start()].rstrip()), counts)
+                table = enter(_parsed(text[start : token.start()].rstrip()), counts)
                 _note(lines, table, first_line)
             if not open_containers:
                 state = "key"
@@ -166,7 +166,7 @@ def _parsed(text: str) -> tuple[tuple[str, ...], bool]:
     return tuple(keys), isinstance(value, list)
 
 
-def _enter(heading: tuple[tuple[str, ...], bool], counts: dict[Location, int]) -> Location:
+def enter(heading: tuple[tuple[str, ...], bool], counts: dict[Location, int]) -> Location:
     """Return the location of the table that a heading opens."""
     keys, is_array = heading
     location: Location = ()

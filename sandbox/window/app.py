@@ -20,7 +20,8 @@ from sandbox.window.app_state import AppState
 from sandbox.window.commands import LOSE_DRAFT, CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
-from sandbox.window.editor.edit_view import HELP_GROUPS, EditView
+from sandbox.window.editor.edit_keys import HELP_GROUPS
+from sandbox.window.editor.edit_view import EditView
 from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.gamepad import Gamepads
 from sandbox.window.input.keymap import Command, Keyboard

@@ -19,6 +19,7 @@ from sandbox.scene.files.toml_changes import (
     TextEditError,
     changed_document,
     with_changes,
+    with_swapped_elements,
 )
 from sandbox.scene.files.toml_edit import statements
 from tests.strategies import Rendered, documents, names, numbers, pairs, rendered, solids
@@ -405,3 +406,42 @@ def test_added_element_removed_again_leaves_the_original_text(
             added = with_changes(text, [AddElement(table, values)])
             assert tomllib.loads(added)[table] == [*elements, values]
             assert with_changes(added, [RemoveElement(table, len(elements))]) == text
+
+
+@pytest.mark.parametrize("end", ["\n", ""])
+@pytest.mark.parametrize("ending", ["\n", "\r\n"])
+def test_swapped_elements_take_their_comments_with_them(end: str, ending: str) -> None:
+    text = (
+        '# file\n\n# one\n[[ball]]\nname = "a" # first\nradius = 1.0\n\n[[box]]\nsize = [1, 1]\n\n'
+        '# two\n[[ball]]\nname = "b"\n[ball.sub]\nx = 1' + end
+    ).replace("\n", ending)
+    swapped = (
+        '# file\n\n# two\n[[ball]]\nname = "b"\n[ball.sub]\nx = 1\n\n[[box]]\nsize = [1, 1]\n\n'
+        '# one\n[[ball]]\nname = "a" # first\nradius = 1.0' + end
+    ).replace("\n", ending)
+    assert with_swapped_elements(text, "ball", 0, 1) == swapped
+    assert with_swapped_elements(swapped, "ball", 1, 0) == text
+
+
+def test_swapped_elements_of_inline_arrays() -> None:
+    text = "plane = [{ a = 1 }, # one\n  { a = 2 }]\n"
+    assert with_swapped_elements(text, "plane", 0, 1) == "plane = [{ a = 2 }, # one\n  { a = 1 }]\n"
+
+
+@pytest.mark.full
+@settings(max_examples=60, deadline=None)
+@given(rendered(documents()), st.data())
+def test_swapping_twice_restores_any_text(case: tuple[dict[str, object], Rendered], data: st.DataObject) -> None:
+    document, text = case
+    tables = [key for key, value in document.items() if isinstance(value, list) and len(value) > 1]
+    if not tables:
+        return
+    table = data.draw(st.sampled_from(tables))
+    try:
+        swapped = with_swapped_elements(text.text, table, 0, 1)
+    except TextEditError:  # such as elements whose subtables are scattered
+        return
+    elements = document[table]
+    assert isinstance(elements, list)
+    assert tomllib.loads(swapped)[table] == [elements[1], elements[0], *elements[2:]]
+    assert with_swapped_elements(swapped, table, 0, 1) == text.text

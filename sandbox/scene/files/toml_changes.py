@@ -10,14 +10,14 @@ import json
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
-from sandbox.scene.errors import TOKEN, Location, _enter, path_of
-from sandbox.scene.files.toml_edit import Statement, statements, written
+from sandbox.scene.errors import Location, path_of
+from sandbox.scene.files.toml_edit import Statement, written
+from sandbox.scene.files.toml_index import BLANK_LINE, InlineContainer, TextEntry, TomlIndex
 
 
 class TextEditError(ValueError):
@@ -88,6 +88,35 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
         result = result.removesuffix("\n").removesuffix("\r")
     if _without_empty(_loaded(result)) != _without_empty(wanted):
         raise TextEditError("the layout of the file cannot be changed automatically; edit it by hand")
+    return result
+
+
+def with_swapped_elements(text: str, table: str, one: int, other: int) -> str:
+    """Return a TOML text in which two elements of a list have changed places, with the comments attached to them.
+
+    Raises:
+        TextEditError: the text cannot be changed in place.
+    """
+    index, document = TomlIndex(text), tomllib.loads(text)
+    spans = []
+    for number in sorted((one, other)):
+        entry, blocks = index.find((table, number)), index.blocks_in.get((table, number), [])
+        if entry is not None:
+            spans.append(entry.value)
+        elif blocks and all(block.stop == after.first for block, after in pairwise(blocks)):
+            spans.append((index.attached(blocks[0].first), index.content_end(blocks[-1])))
+        else:
+            raise TextEditError(f"{table}: the elements are not in one piece each; move them in a text editor")
+    (a, b), (c, d) = spans
+    first, second = text[a:b], text[c:d]
+    if not second.endswith("\n") and first.endswith("\n"):  # the last line of the file
+        ending = "\r\n" if first.endswith("\r\n") else "\n"
+        first, second = first.removesuffix(ending), second + ending
+    result = text[:a] + second + text[b:c] + first + text[d:]
+    elements = document[table]
+    elements[one], elements[other] = elements[other], elements[one]
+    if tomllib.loads(result) != document:
+        raise TextEditError(f"{table}: the elements cannot be exchanged; move them in a text editor")
     return result
 
 
@@ -236,162 +265,6 @@ def _key(key: str) -> str:
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _quoted(key)
 
 
-class TextEntry(NamedTuple):
-    """A key with its value, or an element of an inline array; positions are offsets in characters."""
-
-    location: Location
-    parts: int
-    """number of parts of its key; 0 for an element of an array"""
-    head: tuple[int, int]
-    """start and end of its key; for an element of an array, its start twice"""
-    value: tuple[int, int]
-    lines: tuple[int, int]
-    """start of its first line and end of its last, if it is a statement"""
-    holder: Location | None
-    """location of the inline table or array around it; None for a statement"""
-
-
-class InlineContainer(NamedTuple):
-    """An array or inline table in a text; positions are offsets in characters."""
-
-    begin: int
-    end: int
-    entries: list[TextEntry]
-    commas: list[int]
-    has_comments: bool
-
-
-class TextBlock(NamedTuple):
-    """A heading with the statements directly below it, as range of indices of statements."""
-
-    first: int
-    """index of the heading; −1 for the statements above the first heading"""
-    stop: int
-
-
-@lru_cache(maxsize=10_000)
-def _parts(key: str) -> tuple[str, ...]:
-    """Return the parts of a dotted key."""
-    (statement,) = statements(f"{key}=0")
-    return statement.keys
-
-
-class _TextIndex:
-    """Positions of the statements, blocks and values of a valid TOML text; inline values are parsed when needed."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.statements: list[Statement] = list(statements(text))
-        self.entries: dict[Location, TextEntry] = {}
-        self.dotted: dict[Location, list[TextEntry]] = {}  # entries whose dotted keys create a table
-        self.blocks: dict[Location, TextBlock] = {}  # of the heading of a table itself
-        self.blocks_in: dict[Location, list[TextBlock]] = {}  # of a table and of the tables in it
-        self.containers: dict[Location, InlineContainer] = {}
-        headings = [k for k, each in enumerate(self.statements) if each.heading]
-        counts: dict[Location, int] = {}
-        for first, stop in pairwise((-1, *headings, len(self.statements))):
-            table: Location = ()
-            if first >= 0:
-                heading = self.statements[first]
-                table = _enter((heading.keys, text.startswith("[[", heading.head[0])), counts)
-            block = self.blocks[table] = TextBlock(first, stop)
-            for length in range(1, len(table) + 1):
-                self.blocks_in.setdefault(table[:length], []).append(block)
-            for each in self.statements[first + 1 : stop]:
-                lines = each.begin, each.end
-                self._add(TextEntry((*table, *each.keys), len(each.keys), each.head, each.value, lines, None))
-
-    def _add(self, entry: TextEntry) -> None:
-        self.entries[entry.location] = entry
-        for length in range(len(entry.location) - entry.parts + 1, len(entry.location)):
-            self.dotted.setdefault(entry.location[:length], []).append(entry)
-
-    def find(self, location: Location) -> TextEntry | None:
-        """Return the entry of a location; None for a table made by headings or dotted keys."""
-        for length in range(1, len(location)):
-            self.container(location[:length])
-        return self.entries.get(location)
-
-    def container(self, location: Location) -> InlineContainer | None:
-        """Return the inline array or table at a location, if there is one."""
-        entry = self.entries.get(location)
-        if entry and location not in self.containers and self.text[entry.value[0]] in "[{":
-            tokens = TOKEN.finditer(self.text, *entry.value)
-            self._read(next(tokens), tokens, location)
-        return self.containers.get(location)
-
-    def _read(self, opening: re.Match[str], tokens: Iterator[re.Match[str]], location: Location) -> int:
-        """Store an inline array or table and what is in it, and return its end."""
-        is_table, has_comments, commas = opening[0] == "{", False, list[int]()
-        entries: list[TextEntry] = []
-        head, key_end, begin, end, here = -1, -1, -1, -1, location
-        for token in tokens:
-            sign = token[0]
-            if sign == "\n" or sign[0] == "#":
-                has_comments |= sign != "\n"
-            elif sign in (",", "]", "}"):
-                if head >= 0:
-                    heads = (head, key_end) if is_table else (head, head)
-                    parts = len(here) - len(location) if is_table else 0
-                    entries.append(TextEntry(here, parts, heads, (begin, end), (head, end), location))
-                    self._add(entries[-1])
-                head = key_end = begin = -1
-                if sign != ",":
-                    end = token.end()
-                    break
-                commas.append(token.start())
-            elif sign == "=" and is_table and key_end < 0:
-                key = self.text[head : token.start()].rstrip()
-                key_end, here = head + len(key), (*location, *_parts(key))
-            else:
-                head = token.start() if head < 0 else head
-                if begin < 0 and (key_end >= 0 or not is_table):
-                    begin = token.start()
-                    here = here if is_table else (*location, len(entries))
-                end = self._read(token, tokens, here) if sign in ("[", "{") else token.end()
-        self.containers[location] = InlineContainer(opening.start(), end, entries, commas, has_comments)
-        return end
-
-    def region(self, block: TextBlock) -> tuple[int, int]:
-        """Return the range of a block with the blank lines and attached comments above it and comments below it."""
-        return self.gap(block.first), self.content_end(block)
-
-    def gap(self, heading: int) -> int:
-        """Return the start of the blank lines above a heading and the comments attached to it."""
-        return self._above(heading, self._attached(heading), _BLANK)
-
-    def content_end(self, block: TextBlock) -> int:
-        """Return the end of the last statement of a block and of the comment lines directly below it."""
-        position = self.statements[block.stop - 1].end
-        limit = self._attached(block.stop) if block.stop < len(self.statements) else len(self.text)
-        while line := _COMMENT.match(self.text, position, limit):
-            position = line.end()
-        return position
-
-    def _attached(self, heading: int) -> int:
-        """Return the start of the comment lines directly above a heading; `#:schema` belongs to the file."""
-        begin = self.statements[heading].begin
-        position = self._above(heading, begin, _COMMENT)
-        return begin if position == 0 and self.text.startswith("#:schema") else position
-
-    def _above(self, heading: int, position: int, pattern: re.Pattern[str]) -> int:
-        """Return the start of the matching lines directly above a position, as far as the statement above."""
-        floor = self.statements[heading - 1].end if heading else 0
-        while position > floor:
-            line = max(self.text.rfind("\n", floor, position - 1) + 1, floor)
-            if not pattern.match(self.text, line, position):
-                break
-            position = line
-        return position
-
-    def end(self) -> int:
-        """Return the end of the last line that is not blank."""
-        content = len(self.text.rstrip())
-        return self.text.find("\n", content) + 1 if content else 0
-
-
-_COMMENT = re.compile(r"[ \t]*#[^\n]*\n")
-_BLANK = re.compile(r"[ \t]*\r?\n")
 _REST_OF_LINE = re.compile(r"[ \t]*(,?)[ \t]*(?:#[^\n]*|\r?)\n")
 
 
@@ -400,7 +273,7 @@ class _TextEditor:
 
     def __init__(self, text: str, before: dict[str, Any], after: dict[str, Any]) -> None:
         self._text, self._before, self._after = text, before, after
-        self._index = _TextIndex(text)
+        self._index = TomlIndex(text)
         self._edits: list[tuple[int, int, str]] = []
         self._cut: dict[Location, set[int]] = {}  # starts of removed entries of inline containers
         self._fresh: dict[Location, list[str]] = {}  # new entries of inline containers
@@ -520,7 +393,7 @@ class _TextEditor:
         """Return new groups of lines, with blank lines between them and around them."""
         ending = self._ending(position)
         above = ending if position else ""
-        is_blank_below = position == len(self._text) or _BLANK.match(self._text, position)
+        is_blank_below = position == len(self._text) or BLANK_LINE.match(self._text, position)
         below = "" if is_blank_below or position not in self._separated else ending
         return above + ending.join(pieces) + below
 
@@ -618,6 +491,6 @@ class _TextEditor:
             pieces += [self._text[position:begin], new]
             position = end
         result = "".join(pieces) + self._text[position:]
-        while (blank := _BLANK.match(result)) and not _BLANK.match(self._text):
+        while (blank := BLANK_LINE.match(result)) and not BLANK_LINE.match(self._text):
             result = result[blank.end() :]
         return result

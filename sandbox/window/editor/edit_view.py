@@ -1,6 +1,6 @@
 """Edit view: what the window shows and how it reacts while a scene is edited. Time stands at 0."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
 from time import monotonic
@@ -9,22 +9,22 @@ from typing import Any
 import pygame
 
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import Part
 from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import ElementKey, differ_in_places_only, element_at, name_of, table_values
-from sandbox.scene.editing.fields import fields_of
+from sandbox.scene.editing.elements import ElementKey, differ_in_places_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
-from sandbox.window.editor.editor import TOOLS, AlignmentSide, Editor, EditTool, ViewScale
+from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, TYPED
+from sandbox.window.editor.editor import TOOLS, Editor, EditTool, ViewScale
+from sandbox.window.editor.element_properties import property_sections
 from sandbox.window.editor.gestures import OutlineGesture
 from sandbox.window.editor.ghost_path import GhostPredictor
 from sandbox.window.editor.live_check import LiveCheck
 from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
 from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
-from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection
+from sandbox.window.editor.property_panel import PropertyPanel
 from sandbox.window.editor.snapping import grid_step
 from sandbox.window.editor.toolbar import Toolbar
 from sandbox.window.input.keymap import Command, latin_key
@@ -32,7 +32,6 @@ from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
-from sandbox.window.ui.help import HelpGroup
 from sandbox.window.ui.hud import draw_messages, draw_notice
 
 ACTIONS = (
@@ -41,73 +40,6 @@ ACTIONS = (
     EditTool("redo", "Ctrl+Shift+Z", "redo"),
     EditTool("save", "Ctrl+S", "save the scene file"),
 )
-ARROWS = {pygame.K_LEFT: (-1, 0), pygame.K_RIGHT: (1, 0), pygame.K_UP: (0, 1), pygame.K_DOWN: (0, -1)}
-ALIGNMENTS: dict[int, AlignmentSide] = {
-    pygame.K_LEFT: "left",
-    pygame.K_RIGHT: "right",
-    pygame.K_UP: "top",
-    pygame.K_DOWN: "bottom",
-}
-TYPED = "0123456789.,-x "
-"""Characters that are typed into the dimensions of a gesture"""
-DELEGATED = {
-    pygame.K_HOME: Command.HOME,
-    pygame.K_TAB: Command.PANEL,
-    pygame.K_F1: Command.HELP,
-    pygame.K_h: Command.HELP,
-    pygame.K_F11: Command.FULL_SCREEN,
-}
-DELEGATED_WITH_CONTROL = {
-    pygame.K_p: Command.SCREENSHOT,
-    pygame.K_r: Command.RECORD,
-    pygame.K_o: Command.PICKER,
-}
-HELP_GROUPS = (
-    HelpGroup("Tools", tuple((tool.key.upper(), tool.about) for tool in TOOLS)),
-    HelpGroup(
-        "Selection",
-        (
-            ("Click", "select; again: the element below"),
-            ("Shift+click", "add to the selection, or remove from it"),
-            ("Drag", "move; on empty ground: select all inside"),
-            ("Ctrl+drag", "without snapping"),
-            ("Digits", "while dragging: dimensions; Enter applies"),
-            ("Arrows", "move by the grid; with Shift: ten steps"),
-            ("M or Shift+M", "mirror left and right, up and down"),
-            ("Ctrl+arrows", "align sides; with Shift: middles"),
-            ("Delete", "delete"),
-            ("Ctrl+A", "select all"),
-            ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
-            ("Ctrl+D", "duplicate"),
-        ),
-    ),
-    HelpGroup(
-        "Scene",
-        (
-            ("Space or Ctrl+E", "run the scene; Ctrl+E returns"),
-            ("Ctrl+Z", "undo"),
-            ("Ctrl+Shift+Z", "redo"),
-            ("Ctrl+S", "save"),
-            ("Ctrl+Shift+S", "save as"),
-            ("Ctrl+Shift+X", "take a preset or generators apart"),
-            ("Ctrl+O", "open a scene"),
-            ("Ctrl+P", "screenshot"),
-            ("Esc", "cancel; select nothing; quit"),
-        ),
-    ),
-    HelpGroup(
-        "View",
-        (
-            ("Wheel", "zoom at the cursor"),
-            ("Right-drag", "pan"),
-            ("Home", "fit the scene"),
-            ("Tab", "show or hide the panel"),
-            ("F11", "full screen"),
-            ("F1 or H", "this help"),
-        ),
-    ),
-)
-"""Keys of edit mode, for the help page."""
 
 
 class EditView:
@@ -245,6 +177,8 @@ class EditView:
             self.editor.nudge((x * step, y * step))
         elif key in (pygame.K_DELETE, pygame.K_BACKSPACE):
             self.editor.delete()
+        elif key in (pygame.K_PAGEUP, pygame.K_PAGEDOWN):
+            self.editor.reorder(1 if key == pygame.K_PAGEUP else -1)
         elif key == pygame.K_m:
             self.editor.mirror(is_vertical=shift)
         else:
@@ -403,29 +337,10 @@ class EditView:
 
     # --- Properties ----------------------------------------------------------------------------------------------
 
-    def _sections(self) -> list[PropertySection]:
-        editor, scene = self.editor, self.draft.scene
-        if editor.selection:
-            tables = dict.fromkeys(key.table for key in editor.selection)
-            return [_section_of(scene, table, self._selected_in(table)) for table in tables]
-        sections = [
-            PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about"))),
-            PropertySection("world", "world", _rows(type(scene.world), [scene.world])),
-            PropertySection("solver", "solver", _rows(type(scene.solver), [scene.solver])),
-        ]
-        for k, material in enumerate(scene.materials):
-            rows = _rows(type(material), [material])
-            sections.append(PropertySection(f"material {material.name}", f"material:{k}", rows, is_open=False))
-        return sections
-
-    def _selected_in(self, table: str) -> list[ElementKey]:
-        """Return the selected elements of a table."""
-        return [key for key in self.editor.selection if key.table == table]
-
     def _set_property(self, section: str, field: str, value: Any) -> str | None:
         kind, _, which = section.partition(":")
         if kind == "selection":
-            found = self.editor.set_property(self._selected_in(which), field, value)
+            found = self.editor.set_property([key for key in self.editor.selection if key.table == which], field, value)
         elif kind == "material":
             found = self.editor.set_property([ElementKey("material", int(which))], field, value)
         else:
@@ -498,7 +413,7 @@ class EditView:
         note = ""
         if editor.is_locked:
             note = f"[{self.draft.preset}] makes this scene. Ctrl+Shift+X replaces it by its elements, to edit them."
-        self.panel.show(self._sections(), note)
+        self.panel.show(property_sections(self.draft.scene, editor.selection), note)
         self._note_unsaved()
 
     def _draw_status(self, surface: pygame.Surface, area: pygame.Rect) -> None:
@@ -527,24 +442,3 @@ class EditView:
         at = x + badge + 3 * pad, rect.top + 0.74 * rect.height
         draw_text(surface, detail, at, 0.85 * size, FAINT, "midleft", mono=True)
         self.actions.draw(surface, "", ui_scale)
-
-
-def _section_of(scene: Scene, table: str, keys: Sequence[ElementKey]) -> PropertySection:
-    """Return the section of the selected elements of a table."""
-    title = f"{table} {name_of(scene, keys[0])}" if len(keys) == 1 else f"{len(keys)} × {table}"
-    elements = [element_at(scene, key) for key in keys]
-    return PropertySection(title, f"selection:{table}", _rows(type(elements[0]), elements))
-
-
-def _rows(model: type[Part], parts: Sequence[Part], only: tuple[str, ...] = ()) -> tuple[PropertyRow, ...]:
-    """Return the rows of the fields that all parts have."""
-    values = [table_values(part) for part in parts]
-    common = set.intersection(*({spec.key for spec in fields_of(type(part))} for part in parts))
-    rows = []
-    for spec in fields_of(model):
-        if spec.key not in common or (only and spec.key not in only):
-            continue
-        found = [each.get(spec.key) for each in values]
-        is_mixed = any(value != found[0] for value in found)
-        rows.append(PropertyRow(spec, None if is_mixed else found[0], is_mixed))
-    return tuple(rows)

@@ -27,7 +27,14 @@ from sandbox.scene.editing.elements import (
 from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
 from sandbox.scene.editing.transforms import Similarity, transformation
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.toml_changes import AddElement, Change, RemoveValue, SetValue, TextEditError
+from sandbox.scene.files.toml_changes import (
+    AddElement,
+    Change,
+    RemoveValue,
+    SetValue,
+    TextEditError,
+    with_swapped_elements,
+)
 from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
 from sandbox.window.editor.gestures import (
     BoxGesture,
@@ -600,6 +607,27 @@ class Editor:
             if own is not None:
                 values |= transformation(self.draft.scene, [key], Similarity(shift=_alignment(own, box, side)))
         self.apply(set_values(values), f"align {_count(self.selection)}")
+
+    def reorder(self, step: Literal[-1, 1]) -> None:
+        """Exchange the selected element with the next (1) or the previous one (−1) of its table.
+
+        Later elements are drawn above earlier ones, and have higher numbers.
+        """
+        if len(self.selection) != 1:
+            self._notify("select one element to change its order", "warning")
+            return
+        key = self.selection[0]
+        other = ElementKey(key.table, key.index + step)
+        if not exists(self.draft.scene, other):
+            self._notify(f"it is the {'last' if step > 0 else 'first'} {key.table} already", "info")
+            return
+        try:
+            text = with_swapped_elements(self.draft.text, key.table, key.index, other.index)
+            self.draft.replace_text(text, f"move {name_of(self.draft.scene, key)} {'up' if step > 0 else 'down'}")
+        except (SceneError, TextEditError) as error:
+            self._notify(str(error), "error")
+            return
+        self.selection = [other]
 
     def undo(self) -> None:
         """Undo the last change."""

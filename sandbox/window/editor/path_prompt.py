@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pygame
 
-from sandbox.window.editor.property_panel import TextEdit
+from sandbox.window.editor.text_edit import TextEdit
 from sandbox.window.render.palette import FAINT, INK, PANEL_RAISED, SKY, WARNING
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
 

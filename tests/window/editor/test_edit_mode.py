@@ -542,3 +542,15 @@ def test_generators_are_taken_apart_on_request(open_on: Callable[[str], Hand]) -
     assert [ball.name for ball in hand.scene.balls] == ["a", "b", "atom-1", "atom-2", "atom-3"]
     hand.key(pygame.K_z, CTRL)
     assert len(hand.scene.grids) == 1
+
+
+def test_order_of_elements_is_changed(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    hand.key(pygame.K_PAGEUP)
+    assert [ball.name for ball in hand.scene.balls] == ["b", "a"]
+    assert hand.editor.selection == [ElementKey("ball", 1)]
+    assert "position = [0.0, 2.0]  # above" in hand.view.draft.text
+    hand.key(pygame.K_PAGEUP)  # it is the last one already
+    hand.key(pygame.K_PAGEDOWN)
+    assert hand.view.draft.text == BALL
