@@ -296,6 +296,7 @@ class App:
             return
         editing.panel.commit()
         editing.drop_gesture()
+        editing.reset_cursor()
         self.app_state.paused = False
         self.editing = None
         if not self.app_state.play_draft(editing.draft.scene, editing.draft.path):

@@ -1,5 +1,6 @@
 """Film of the editor: a car is drawn, gets wheels with motors, and drives over a heap of boxes."""
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -88,9 +89,15 @@ class _Hand:
 
 def make(path: Path) -> None:
     """Draw a car and a heap of boxes, run them, and film all of it."""
-    window = App(AppState(), size=SIZE, say=lambda _: None)
+    with tempfile.TemporaryDirectory() as folder:  # of autosaves
+        _make(path, Path(folder))
+
+
+def _make(path: Path, folder: Path) -> None:
+    window = App(AppState(), size=SIZE, folder=folder, say=lambda _: None)
     window.start_editing()
     window.app_state.messages = Messages()
+    window.run_frame(1.0 / FPS)  # lays out the toolbar
     hand = _Hand(window)
     hand.choose("box")
     hand.drag((-4.5, 0.6), (-2.5, 1.0))

@@ -1,6 +1,7 @@
 """Edit view: what the window shows and how it reacts while a scene is edited. Time stands at 0."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import date, datetime
 from pathlib import Path
 from time import monotonic
@@ -42,6 +43,13 @@ ACTIONS = (
 )
 
 
+HANDLE_CURSORS = {
+    ("scale", 0): pygame.SYSTEM_CURSOR_SIZENESW,
+    ("scale", 1): pygame.SYSTEM_CURSOR_SIZENWSE,
+}
+"""Cursors of the handles at the corners, by kind and parity of the corner"""
+
+
 class EditView:
     """Editing of a scene in the window.
 
@@ -74,6 +82,7 @@ class EditView:
         self.live_check, self.check_marks = LiveCheck(), CheckMarks()
         self._shown: tuple[object, ...] = ()
         self._button_held = False
+        self._cursor = pygame.SYSTEM_CURSOR_ARROW
 
     @property
     def draft(self) -> SceneDraft:
@@ -108,6 +117,12 @@ class EditView:
         if event.type == pygame.WINDOWFOCUSLOST:
             self.drop_gesture()
         return False
+
+    def reset_cursor(self) -> None:
+        """Show the arrow again, when the scene runs."""
+        self._cursor = pygame.SYSTEM_CURSOR_ARROW
+        with suppress(pygame.error):
+            pygame.mouse.set_cursor(self._cursor)
 
     def drop_gesture(self) -> None:
         """Cancel the gesture and the press of the button, whose release will not be seen."""
@@ -350,9 +365,33 @@ class EditView:
 
     # --- Drawing -------------------------------------------------------------------------------------------------
 
+    def cursor(self) -> int:
+        """Return the system cursor that shows what a press would do: `pygame.SYSTEM_CURSOR_…`."""
+        position, editor = pygame.mouse.get_pos(), self.editor
+        is_on_scene = self._context.gui.area.collidepoint(position) and self.prompt is None
+        bars = self.toolbar.rect.collidepoint(position) or self.actions.rect.collidepoint(position)
+        if not is_on_scene or bars or self.recovered is not None:
+            return pygame.SYSTEM_CURSOR_ARROW
+        if editor.is_locked:
+            return pygame.SYSTEM_CURSOR_NO
+        if editor.tool != "select":
+            return pygame.SYSTEM_CURSOR_CROSSHAIR
+        handle = editor.handle_at(self._context.camera.to_world(position), self._view)
+        if handle is not None:
+            return HANDLE_CURSORS.get((handle.kind, handle.index % 2), pygame.SYSTEM_CURSOR_HAND)
+        return pygame.SYSTEM_CURSOR_SIZEALL if editor.hovered is not None else pygame.SYSTEM_CURSOR_ARROW
+
+    def _update_cursor(self) -> None:
+        wanted = self.cursor()
+        if wanted != self._cursor:
+            self._cursor = wanted
+            with suppress(pygame.error):  # a driver without system cursors
+                pygame.mouse.set_cursor(wanted)
+
     def draw(self, surface: pygame.Surface) -> None:
         """Draw the scene, the overlay of the editor, its toolbar and the property panel."""
         context, gui, editor = self._context, self._context.gui, self.editor
+        self._update_cursor()
         scene = editor.scene
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
         # While bodies are dragged, only the frame differs, so that the renderer need not prepare the scene again.

@@ -223,9 +223,10 @@ class Gui:
     def _browse(self, browser: SceneBrowser, event: pygame.event.Event, app_state: AppState) -> None:
         """Pass an event to the scene browser, and open a chosen scene."""
         path = browser.handle_event(event)
-        unsaved = app_state.count_unsaved()
-        if path is not None and unsaved and browser.confirmed != path:
-            browser.ask(path, describe_loss(unsaved, "choose it again to open it anyway"))
+        unsaved, again = app_state.count_unsaved(), "choose it again to open it anyway"
+        if path is not None and (unsaved or app_state.has_unsaved_draft) and browser.confirmed != path:
+            draft = f"the edited scene is not saved: {again}"
+            browser.ask(path, draft if app_state.has_unsaved_draft else describe_loss(unsaved, again))
             return
         if path is not None:
             app_state.open_other(path)

@@ -9,7 +9,7 @@ from sandbox.window.input.keymap import BINDINGS, Binding
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 
-TEXT_SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0)
+TEXT_SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0)
 """px at UI scale 1: the largest size at which everything fits is used; at the smallest, the page can be scrolled"""
 
 TITLE_HEIGHT = 3.7

@@ -554,3 +554,24 @@ def test_order_of_elements_is_changed(open_on: Callable[[str], Hand]) -> None:
     hand.key(pygame.K_PAGEUP)  # it is the last one already
     hand.key(pygame.K_PAGEDOWN)
     assert hand.view.draft.text == BALL
+
+
+def test_cursor_shows_what_a_press_does(open_on: Callable[[str], Hand], monkeypatch: pytest.MonkeyPatch) -> None:
+    hand = open_on(BALL)
+
+    def cursor_at(x: float, y: float) -> int:
+        pixel = round(x), round(y)
+        monkeypatch.setattr(pygame.mouse, "get_pos", lambda: pixel)
+        hand.frame(move(*pixel))
+        return hand.view.cursor()
+
+    ball = hand.pixel((0.0, 2.0))
+    assert cursor_at(*hand.pixel((1.0, 3.0))) == pygame.SYSTEM_CURSOR_ARROW
+    assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_SIZEALL
+    hand.click((0.0, 2.0))
+    corner = next(each for each in hand.editor.handles(hand.view._view) if each.kind == "scale" and each.index == 1)
+    assert cursor_at(*hand.pixel(corner.point)) == pygame.SYSTEM_CURSOR_SIZENWSE
+    hand.key(pygame.K_b)
+    assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_CROSSHAIR
+    assert cursor_at(SIZE[0] - 50, 100) == pygame.SYSTEM_CURSOR_ARROW  # the panel
+    assert cursor_at(*hand.view.toolbar.rect_of("ball").center) == pygame.SYSTEM_CURSOR_ARROW
