@@ -19,7 +19,7 @@ from sandbox.scene.editing.elements import (
     table_values,
     unique_name,
 )
-from sandbox.scene.editing.transforms import Similarity, transformed
+from sandbox.scene.editing.transforms import Similarity, plain_value, transformed
 from sandbox.scene.files.toml_changes import AddElement, Change
 
 
@@ -75,7 +75,7 @@ def pasting(scene: Scene, elements: Sequence[CopiedElement], by: Similarity) -> 
         ):
             continue
         values = {"name": name} | table_values(each.element) | {"name": name}
-        values |= {key: _plain(value) for key, value in _world_values(each.element, by).items()}
+        values |= {key: plain_value(value) for key, value in _world_values(each.element, by).items()}
         changes.append(AddElement(each.table, _renamed(values, each.element, new_names)))
         keys.append(ElementKey(each.table, counts[each.table]))
         counts[each.table] += 1
@@ -108,12 +108,6 @@ def _renamed(values: dict[str, Any], element: Part, names: dict[str, str]) -> di
         if "tie" in found:
             found["tie"] = {end: names.get(name, name) for end, name in found["tie"].items()}
     return found
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, tuple | list):
-        return [_plain(each) for each in value]
-    return float(f"{value:.9g}") + 0.0 if isinstance(value, float) else value
 
 
 def paste_shift(step: float, times: int) -> Point:

@@ -16,7 +16,7 @@ from sandbox.scene.description.game_tables import PRESETS
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import SceneText, dumps, too_large
 from sandbox.scene.files.shipped_scenes import PACKAGE
-from sandbox.scene.files.toml_changes import Change, TextEditError, with_changes
+from sandbox.scene.files.toml_changes import Change, with_changes
 
 MAX_UNDO = 1_000
 """Changes that can be undone"""
@@ -263,6 +263,3 @@ def _reason_not_writable(path: Path) -> str | None:
     except (OSError, RuntimeError) as error:
         return f"cannot be written: {getattr(error, 'strerror', None) or error}"
     return None
-
-
-__all__ = ["MAX_UNDO", "NEW_SCENE", "DraftState", "SceneDraft", "TextEditError"]

@@ -9,7 +9,7 @@ from sandbox.scene.compile.bodies import Bodies, centre_of
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part
-from sandbox.scene.description.forces import Attraction, Thrust
+from sandbox.scene.description.forces import Attraction
 from sandbox.scene.description.joints import Joined
 from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.files.toml_changes import Change, RemoveElement, SetValue
@@ -236,8 +236,3 @@ def _reference_paths(element: Part, name: str, table: str) -> Iterator[tuple[str
 def table_values(element: Part) -> dict[str, Any]:
     """Return the values of an element's table, without defaults."""
     return element.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-
-
-def is_joint(element: Part) -> bool:
-    """Tell whether an element is a joint, a force or a drive: it is attached to bodies and has no place of its own."""
-    return isinstance(element, Joined | Thrust)

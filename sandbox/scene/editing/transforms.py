@@ -12,7 +12,7 @@ from typing import Any
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.bodies import Compound, Polygon
-from sandbox.scene.description.fixed import Plane, Zone
+from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.joints import Anchored, Groove, Pivot, Pulley
 from sandbox.scene.editing.elements import ElementKey, all_elements, body_names, element_at
@@ -185,20 +185,6 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
     return {}
 
 
-def place_of(element: Part) -> Point | None:
-    """Return a point that stands for the place of an element, m; None if it has none of its own."""
-    for key in PLACES:
-        value = getattr(element, key, None)
-        if isinstance(value, tuple) and len(value) == 2 and not isinstance(value[0], tuple):
-            return value[0], value[1]
-    points = getattr(element, "points", None)
-    if points and not isinstance(element, Zone | Polygon):
-        return points[0][0], points[0][1]
-    if points:
-        return points[0][0], points[0][1]
-    return None
-
-
 def _wrapped(angle: float) -> float:
     """Return an angle within ±π if it is beyond ±2π, rad."""
     return math.remainder(angle, math.tau) if abs(angle) > math.tau else angle
@@ -206,3 +192,15 @@ def _wrapped(angle: float) -> float:
 
 def _equal(before: Any, after: Any) -> bool:
     return bool(before == after)
+
+
+def round_value(value: float) -> float:
+    """Return a length or angle with 9 significant digits, so that 0.30000000000000004 is written as 0.3."""
+    return float(f"{value:.9g}") + 0.0
+
+
+def plain_value(value: Any) -> Any:
+    """Return a value of a key as TOML holds it: lists of rounded numbers in place of tuples."""
+    if isinstance(value, tuple | list):
+        return [plain_value(each) for each in value]
+    return round_value(value) if isinstance(value, float) else value

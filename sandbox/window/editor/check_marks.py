@@ -546,6 +546,3 @@ def _bounds(scene: Scene, key: ElementKey) -> tuple[Point, Point] | None:
     position, radius = scene.bodies.position[rows], scene.bodies.radius[rows, None]
     low, high = (position - radius).min(axis=0).tolist(), (position + radius).max(axis=0).tolist()
     return (low[0], low[1]), (high[0], high[1])
-
-
-__all__ = ["CheckMarks"]

@@ -413,6 +413,8 @@ class EditView:
         free.left = self.toolbar.rect.right + round(10 * gui.ui_scale)
         draw_messages(surface, messages, free, self.check_marks.plates, 13.0 * gui.ui_scale)
         self.toolbar.draw_hint(surface, gui.ui_scale)
+        labels = {"undo": self.draft.undo_label, "redo": self.draft.redo_label}
+        self.actions.notes = {name: f"{name}: {label or 'nothing'}" for name, label in labels.items()}
         self.actions.draw_hint(surface, gui.ui_scale)
         if self.prompt is not None:
             self.prompt.draw(surface, gui.ui_scale)

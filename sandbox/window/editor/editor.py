@@ -12,7 +12,6 @@ from sandbox.scene.description.bodies import Polygon
 from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import (
-    FIELD_OF,
     ElementKey,
     all_elements,
     all_names,
@@ -51,7 +50,6 @@ from sandbox.window.editor.gestures import (
     VelocityGesture,
     VertexGesture,
     default_size,
-    preview_of,
     set_values,
 )
 from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointGesture, PlacementError
@@ -748,6 +746,3 @@ def _count(keys: Sequence[ElementKey]) -> str:
     tables = {key.table for key in keys}
     word = tables.pop() if len(tables) == 1 else "element"
     return f"{'an' if word[0] in 'aeiou' else 'a'} {word}" if len(keys) == 1 else f"{len(keys)} {word}s"
-
-
-__all__ = ["FIELD_OF", "TOOLS", "EditHandle", "EditTool", "Editor", "ViewScale", "preview_of"]

@@ -23,7 +23,7 @@ from sandbox.scene.editing.elements import (
     with_moved_bodies,
 )
 from sandbox.scene.editing.outlines import simplified, simplified_loop
-from sandbox.scene.editing.transforms import Similarity, transformation
+from sandbox.scene.editing.transforms import Similarity, plain_value, round_value, transformation
 from sandbox.scene.files.toml_changes import AddElement, Change, SetValue
 from sandbox.window.editor.snapping import rounded
 
@@ -109,7 +109,7 @@ class TransformGesture(Gesture):
 def set_values(values: Mapping[ElementKey, Mapping[str, Any]]) -> list[Change]:
     """Return the changes that give elements new values."""
     return [
-        SetValue((*key.location, name), _plain(value))
+        SetValue((*key.location, name), plain_value(value))
         for key, changed in values.items()
         for name, value in changed.items()
     ]
@@ -127,18 +127,6 @@ def preview_of(scene: Scene, values: Mapping[ElementKey, Mapping[str, Any]]) -> 
     if bodies and all(changed.keys() <= {"position", "angle"} for key, changed in values.items() if key in bodies):
         scene, replaced = with_moved_bodies(with_elements(scene, others) if others else scene, bodies), {}
     return with_elements(scene, replaced) if replaced else scene
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as TOML holds it."""
-    if isinstance(value, tuple | list):
-        return [_plain(each) for each in value]
-    return round_value(value) if isinstance(value, float) else value
-
-
-def round_value(value: float) -> float:
-    """Return a length or angle with 9 significant digits, so that 0.30000000000000004 is written as 0.3."""
-    return float(f"{value:.9g}") + 0.0
 
 
 class MoveGesture(TransformGesture):
@@ -374,7 +362,7 @@ class DrawGesture(Gesture):
         values = self.values()
         if values is None:
             return []
-        return [AddElement(self.table, {"name": self.name, **{key: _plain(v) for key, v in values.items()}})]
+        return [AddElement(self.table, {"name": self.name, **{key: plain_value(v) for key, v in values.items()}})]
 
     @property
     def selects(self) -> list[ElementKey] | None:

@@ -7,8 +7,9 @@ from typing import Any
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.editing.elements import element_of_body, name_of, renaming
+from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
-from sandbox.window.editor.gestures import Gesture, round_value
+from sandbox.window.editor.gestures import Gesture
 from sandbox.window.editor.picking import bodies_at, to_body
 
 JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor")

@@ -435,6 +435,3 @@ class LiveCheck:
         except Exception as error:  # noqa: BLE001, it is shown, and later scenes are checked
             message = f"the check failed with {type(error).__name__}: {error}; please report this scene"
             return CheckResult((SceneMark(FAILED, message, (), ()),))
-
-
-__all__ = ["CHECK_DELAY", "CheckResult", "LiveCheck", "Remedy", "SceneMark", "check_scene"]

@@ -28,6 +28,8 @@ class Toolbar:
         self._hovered: EditTool | None = None
         self._pressed: EditTool | None = None
         self._pointer = (0, 0)
+        self.notes: dict[str, str] = {}
+        """descriptions of tools in their present state, in place of their own, by name"""
         self.rect = pygame.Rect(0, 0, 0, 0)
         """px, as last laid out"""
 
@@ -112,4 +114,4 @@ class Toolbar:
             tool = self._hovered
             at = self._pointer[0] + round(300 * ui_scale), self._pointer[1]
             key = tool.key.upper() if len(tool.key) == 1 else tool.key
-            draw_hint(surface, f"{tool.about} ({key})", at, ui_scale)
+            draw_hint(surface, f"{self.notes.get(tool.name, tool.about)} ({key})", at, ui_scale)
