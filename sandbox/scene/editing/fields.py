@@ -58,6 +58,8 @@ class FieldSpec:
     """regular expression of a text; "" without one"""
     max_length: int | None = None
     """largest number of characters of a text; None without a limit"""
+    rows: int = 0
+    """number of points, if the components of `numbers` are those of points, as of a pair of anchors; 0 for others"""
 
 
 @cache
@@ -81,6 +83,9 @@ def _spec(
     value = alternatives[0] if len(alternatives) == 1 else {}
     components = value.get("prefixItems", ())
     kind, choices = _kind(value)
+    rows = len(components) if kind == "numbers" and components[0]["type"] == "array" else 0
+    if rows:
+        components = [number for point in components for number in point["prefixItems"]]
     number = components[0] if kind == "numbers" else value if kind in ("number", "integer") else {}
     return FieldSpec(
         key,
@@ -98,6 +103,7 @@ def _spec(
         "exclusiveMaximum" in number,
         value.get("pattern", "") if kind in ("text", "name") else "",
         value.get("maxLength") if kind in ("text", "name") else None,
+        rows,
     )
 
 
@@ -127,7 +133,8 @@ def _kind(schema: dict[str, Any]) -> tuple[FieldKind, tuple[str, ...]]:
         case {"type": "string"}:
             return ("name" if schema.get("pattern") == _NAME_PATTERN else "text"), ()
         case {"type": "array", "prefixItems": [first, *others], "minItems": int(least), "maxItems": int(most)}:
-            if first.get("type") == "number" and all(each == first for each in others) and least == most:
+            is_uniform = all(each == first for each in others) and least == most
+            if is_uniform and (first.get("type") == "number" or _kind(first)[0] == "numbers"):
                 return "numbers", ()
     return "other", ()
 
@@ -191,14 +198,21 @@ def _parse_text(spec: FieldSpec, typed: str) -> str:
     return typed
 
 
-def _parse_numbers(spec: FieldSpec, typed: str) -> list[float]:
-    if typed.startswith("[") and typed.endswith("]"):
+def _parse_numbers(spec: FieldSpec, typed: str) -> list[Any]:
+    """Return a list of numbers, or of points, between which a semicolon may stand."""
+    if spec.rows:
+        typed = typed.replace(";", ",").replace("[", "").replace("]", "")
+    elif typed.startswith("[") and typed.endswith("]"):
         typed = typed[1:-1]
     parts = [part.strip() for part in typed.split(",")]
     if len(parts) != spec.length or not all(parts):
         given = sum(bool(part) for part in parts)
         raise ValueError(f"must be {spec.length} numbers with commas between them, has {given}")
-    return [_parse_number(spec, part) for part in parts]
+    numbers = [_parse_number(spec, part) for part in parts]
+    if not spec.rows:
+        return numbers
+    width = spec.length // spec.rows
+    return [numbers[k : k + width] for k in range(0, spec.length, width)]
 
 
 def _parse_number(spec: FieldSpec, typed: str) -> float:
@@ -321,6 +335,8 @@ def format_value(spec: FieldSpec, value: Any) -> str:
         case "number" | "integer":
             return format_number(value)
         case "numbers":
+            if spec.rows:
+                return "; ".join(", ".join(map(format_number, point)) for point in value)
             return ", ".join(map(format_number, value))
         case "flag":
             return "true" if value else "false"

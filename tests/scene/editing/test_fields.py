@@ -93,7 +93,7 @@ def test_fields_that_are_edited_have_a_description() -> None:
         (Zone, "gravity", "numbers"),
         (Rod, "between", "other"),
         (Rod, "kind", "choice"),
-        (World, "bounds", "other"),
+        (World, "bounds", "numbers"),
         (Settings, "continuous", "flag"),
         (Attraction, "toward", "other"),
         (PlungerDrive, "kind", "choice"),
@@ -178,7 +178,11 @@ def in_range(spec: FieldSpec) -> st.SearchStrategy[Any]:
         exclude_min=spec.is_low_excluded,
         exclude_max=spec.is_high_excluded,
     )
-    return number if spec.kind == "number" else st.lists(number, min_size=spec.length, max_size=spec.length)
+    if spec.kind == "number":
+        return number
+    width = spec.length // max(spec.rows, 1)
+    row = st.lists(number, min_size=width, max_size=width)
+    return st.lists(row, min_size=spec.rows, max_size=spec.rows) if spec.rows else row
 
 
 @given(st.data())
@@ -186,6 +190,15 @@ def test_text_of_a_number_is_read_as_the_same_value(data: st.DataObject) -> None
     spec = data.draw(st.sampled_from(NUMERIC))
     value = data.draw(in_range(spec))
     assert parse(spec, format_value(spec, value)) == value
+
+
+def test_pairs_of_points_are_typed_with_a_semicolon_or_brackets() -> None:
+    spec = next(spec for spec in fields_of(World) if spec.key == "bounds")
+    assert parse(spec, "-1, 0; 2*2, 3") == [[-1.0, 0.0], [4.0, 3.0]]
+    assert parse(spec, "[[-1, 0], [4, 3]]") == [[-1.0, 0.0], [4.0, 3.0]]
+    assert format_value(spec, ((-1.0, 0.0), (4.0, 3.0))) == "-1, 0; 4, 3"
+    with pytest.raises(ValueError, match="must be 4 numbers"):
+        parse(spec, "1, 2; 3")
 
 
 @given(st.data())

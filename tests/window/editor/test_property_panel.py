@@ -168,7 +168,7 @@ def test_tab_applies_and_visits_the_fields_in_order() -> None:
 
 def test_tab_leads_to_other_sections_but_not_into_folded_ones() -> None:
     edited = Edited(section(World, {}), section(Settings, {}, is_open=False), section(Ball, BALL))
-    edited.click("wind", "world")
+    edited.click("bounds", "world")
     edited.send(key(pygame.K_TAB))
     assert edited.panel.focused == ("ball", "name")
 
