@@ -213,6 +213,11 @@ def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
     return changes
 
 
+def material_users(scene: Scene, material: str) -> list[ElementKey]:
+    """Return the elements that are of a material, and the pairs that name it."""
+    return [key for key, each in all_elements(scene) if any(_reference_paths(each, material, "material"))]
+
+
 def _reference_paths(element: Part, name: str, table: str) -> Iterator[tuple[str | int, ...]]:
     """Yield the paths within an element at which it names an element of a table."""
     if table == "material":

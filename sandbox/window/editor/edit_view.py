@@ -74,6 +74,7 @@ class EditView:
         self.toolbar, self.actions = Toolbar(TOOLS), Toolbar(ACTIONS)
         self.panel = PropertyPanel(context.surface.get_size(), context.gui.ui_scale)
         self.panel.on_change = self._set_property
+        self.panel.on_remove = self._remove_section
         self.prompt: PathPrompt | None = None
         self.autosave, self._folder = Autosave(draft, folder), folder
         self.recovered: RecoveredText | None = recoverable(draft.path, folder)
@@ -356,12 +357,18 @@ class EditView:
         kind, _, which = section.partition(":")
         if kind == "selection":
             found = self.editor.set_property([key for key in self.editor.selection if key.table == which], field, value)
-        elif kind == "material":
-            found = self.editor.set_property([ElementKey("material", int(which))], field, value)
+        elif which:
+            found = self.editor.set_property([ElementKey(kind, int(which))], field, value)
         else:
             found = self.editor.set_property("" if section == "scene" else section, field, value)
         self._note_unsaved()
         return found
+
+    def _remove_section(self, section: str) -> None:
+        """Remove the material, or the pair of materials, of a section."""
+        table, _, index = section.partition(":")
+        self.editor.remove_material(ElementKey(table, int(index)))
+        self._note_unsaved()
 
     # --- Drawing -------------------------------------------------------------------------------------------------
 

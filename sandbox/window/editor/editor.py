@@ -18,6 +18,7 @@ from sandbox.scene.editing.elements import (
     bodies_of,
     element_at,
     exists,
+    material_users,
     name_of,
     removal,
     renaming,
@@ -29,6 +30,7 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.toml_changes import (
     AddElement,
     Change,
+    RemoveElement,
     RemoveValue,
     SetValue,
     TextEditError,
@@ -711,6 +713,17 @@ class Editor:
         self._drop_gesture()
         self.fault = None
         return None
+
+    def remove_material(self, key: ElementKey) -> None:
+        """Remove a material that no element has, or a pair of materials."""
+        scene = self.draft.scene
+        users = material_users(scene, name_of(scene, key)) if key.table == "material" else []
+        if users:
+            more = f" and {len(users) - 1} more" if len(users) > 1 else ""
+            user = f"{users[0].table} {name_of(scene, users[0])}"
+            self._notify(f"material {name_of(scene, key)} is used by {user}{more}", "warning")
+            return
+        self.apply([RemoveElement(key.table, key.index)], f"remove a {key.table}")
 
 
 def _anchor(element: Part, box: tuple[Point, Point] | None) -> Point | None:

@@ -12,7 +12,8 @@ from sandbox.window.editor.property_panel import PropertyRow, PropertySection
 def property_sections(scene: Scene, selection: Sequence[ElementKey]) -> list[PropertySection]:
     """Return a section for the selected elements of each table; without a selection, those of the scene.
 
-    The key of a section is `selection:TABLE`, `scene`, the heading of a single table, or `material:INDEX`.
+    The key of a section is `selection:TABLE`, `scene`, the heading of a single table, `material:INDEX` or
+    `pair:INDEX`.
     """
     if selection:
         tables = dict.fromkeys(key.table for key in selection)
@@ -24,7 +25,10 @@ def property_sections(scene: Scene, selection: Sequence[ElementKey]) -> list[Pro
     ]
     for k, material in enumerate(scene.materials):
         rows = _rows(type(material), [material])
-        sections.append(PropertySection(f"material {material.name}", f"material:{k}", rows, is_open=False))
+        sections.append(PropertySection(f"material {material.name}", f"material:{k}", rows, False, is_removable=True))
+    for k, pair in enumerate(scene.pairs):
+        title = " and ".join(pair.between)
+        sections.append(PropertySection(title, f"pair:{k}", _rows(type(pair), [pair]), False, is_removable=True))
     return sections
 
 

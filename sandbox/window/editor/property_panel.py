@@ -64,6 +64,8 @@ class PropertySection:
     rows: tuple[PropertyRow, ...]
     is_open: bool = True
     """whether it is initially unfolded"""
+    is_removable: bool = False
+    """whether its heading has a cross that removes what it shows"""
 
 
 class RowId(NamedTuple):
@@ -123,6 +125,8 @@ class PropertyPanel:
         """Create an empty panel for a window of a size in px."""
         self.on_change: Callable[[str, str, Any], str | None] = _accept
         """(section key, field key, value; None removes the key); returns an error to be shown at the field, or None"""
+        self.on_remove: Callable[[str], object] = _accept
+        """(section key) called by the cross of a heading"""
         self.size, self.ui_scale = size, ui_scale
         self._sections: tuple[PropertySection, ...] = ()
         self._note = ""
@@ -259,6 +263,22 @@ class PropertyPanel:
             return None
         left, width = self._column
         return pygame.Rect(self.size[0] - self.width + left, item.top - self._scroll, width, item.height)
+
+    def cross_of(self, section: str) -> pygame.Rect | None:
+        """Return the box of the cross of a heading in the window, px, which may be out of view; None without one."""
+        item = self._item_of(RowId(section, ""))
+        if item is None or not item.section.is_removable:
+            return None
+        return self._cross(item).move(self.size[0] - self.width, 0)
+
+    def _cross(self, item: PanelItem) -> pygame.Rect:
+        """Return the box of the cross of a heading on the sheet."""
+        left, width = self._column
+        side = min(self._px(BOX_HEIGHT), width)
+        return pygame.Rect(left + width - side, item.top - self._scroll + (item.height - side) // 2, side, side)
+
+    def _is_on_cross(self, item: PanelItem, at: tuple[int, int]) -> bool:
+        return item.row is None and item.section.is_removable and bool(self._cross(item).collidepoint(at))
 
     def _item_of(self, row_id: RowId) -> PanelItem | None:
         return next((item for item in self._items if item.row_id == row_id), None)
@@ -470,7 +490,10 @@ class PropertyPanel:
         item = None if target is None else self._item_of(target)
         if item is None:
             return
-        if item.row is None:
+        if self._is_on_cross(item, at):
+            if button == 1:
+                self.on_remove(item.section.key)
+        elif item.row is None:
             if button == 1:
                 self._is_open[item.section.key] = not self.is_open(item.section.key)
                 self._lay_out()
@@ -526,6 +549,8 @@ class PropertyPanel:
     def _hint(self, row_id: RowId, pointer: tuple[int, int]) -> str:
         """Return the tooltip: at a label the description, after a truncated key; at a truncated value the whole."""
         item = self._item_of(row_id)
+        if item is not None and self._is_on_cross(item, pointer):
+            return f"remove {item.section.title}"
         if item is None or item.row is None or row_id == self.focused:
             return ""
         spec, box = item.row.spec, self._box(item)
@@ -588,10 +613,19 @@ class PropertyPanel:
         # Titles contain names, which are case-sensitive, so that they are not in capitals as those of the side panel.
         start = left + self._px(13)
         size = 11.5 * ui_scale
+        if item.section.is_removable:
+            width -= self._cross(item).width
+            self._draw_cross(self._cross(item), colour)
         title = ellipsis(item.section.title, size, width - self._px(30), bold=True)
         word = draw_text(sheet, title, (start, y), size, colour, "midleft", bold=True)
         if word.right + self._px(8) < left + width:
             pygame.draw.line(sheet, LINE, (word.right + self._px(8), y), (left + width, y), max(self._px(1), 1))
+
+    def _draw_cross(self, box: pygame.Rect, colour: RgbColour) -> None:
+        x, y = box.center
+        arm, line_width = 3.5 * self.ui_scale, max(self._px(1.4), 1)
+        pygame.draw.line(self._sheet, colour, (x - arm, y - arm), (x + arm, y + arm), line_width)
+        pygame.draw.line(self._sheet, colour, (x - arm, y + arm), (x + arm, y - arm), line_width)
 
     def _draw_row(self, item: PanelItem, row: PropertyRow) -> None:
         sheet, left, box = self._sheet, self._column[0], self._box(item)

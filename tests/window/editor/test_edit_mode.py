@@ -519,8 +519,41 @@ def test_alignment_and_new_materials(open_on: Callable[[str], Hand]) -> None:
     assert [material.name for material in hand.scene.materials] == ["rubber"]
     hand.key(pygame.K_ESCAPE)
     hand.frame()
-    heading = hand.view.panel.heading_of("material:0")
-    assert heading is not None
+    assert hand.view.panel.heading_of("material:0") is not None
+
+
+def click_cross(hand: Hand, section: str) -> None:
+    cross = hand.view.panel.cross_of(section)
+    assert cross is not None
+    hand.frame(press(*cross.center), release(*cross.center))
+    hand.frame()
+
+
+def test_materials_and_pairs_are_removed_if_nothing_names_them(open_on: Callable[[str], Hand]) -> None:
+    materials = '[[material]]\nname = "wood"\n\n[[material]]\nname = "steel" # hard\n'
+    pair = '[[pair]]\nbetween = ["wood", "wood"]\nfriction = 0.3\n'
+    hand = open_on(materials + pair + BALL.replace('name = "b"', 'name = "b"\nmaterial = "steel"'))
+    text = hand.view.draft.text
+
+    def messages() -> list[str]:
+        return [text for level, text in hand.window.context.app_state.messages.visible() if level == "warning"]
+
+    hand.frame()
+    for section in ("world", "solver"):  # folded, so that the materials are in view
+        heading = hand.view.panel.heading_of(section)
+        assert heading is not None
+        hand.frame(press(*heading.center), release(*heading.center))
+    click_cross(hand, "material:1")
+    assert hand.view.draft.text == text and messages() == ["material steel is used by ball b"]
+    click_cross(hand, "material:0")
+    assert hand.view.draft.text == text and messages()[-1] == "material wood is used by pair pair-1"
+    click_cross(hand, "pair:0")
+    click_cross(hand, "material:0")
+    assert [material.name for material in hand.scene.materials] == ["steel"]
+    assert not hand.scene.pairs and "# hard" in hand.view.draft.text
+    hand.key(pygame.K_z, CTRL)
+    hand.key(pygame.K_z, CTRL)
+    assert hand.view.draft.text == text
 
 
 def test_ball_snaps_to_walls_and_other_balls(open_on: Callable[[str], Hand]) -> None:
