@@ -135,7 +135,7 @@ class RunRecord:
     def is_plain(self) -> bool:
         """Whether the run is ok, and neither a replay, nor a game, nor in the place of a damaged one."""
         is_usual = self.stored.status == "ok" and self.damaged is None and self.replay is None
-        has_no_game = '"game": {' not in (self.stored.details or "")
+        has_no_game = '"game": {' not in (self.stored.details or "")  # parsing it would take longer than the store
         return is_usual and has_no_game
 
     @property

@@ -168,9 +168,9 @@ class StartStates:
 
 def _is_state(value: Any, length: int) -> bool:
     """Tell whether a value can be one of a start state: a number, or an array of numbers."""
-    numbers = value if length and isinstance(value, list | tuple) and len(value) == length else [value]
-    if length and numbers is not value:
+    if length and not (isinstance(value, list | tuple) and len(value) == length):
         return False
+    numbers = value if length else [value]
     is_number = all(isinstance(each, int | float) and not isinstance(each, bool) for each in numbers)
     return is_number and all(abs(each) <= (MAX_POSITION if length else MAX_ANGLE_AND_RATE) for each in numbers)
 

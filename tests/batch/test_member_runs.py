@@ -74,7 +74,10 @@ def driven(
     found: list[Result] = []
     computed: set[str] = set()
     executor = executor or InProcessExecutor()
-    note = lambda _label, engine: computed.add(engine)  # noqa: E731
+
+    def note(_label: str, engine: str) -> None:
+        computed.add(engine)
+
     Driver(plan, len(plan), executor, options, store, found.append, computed=note).run()
     assert sorted(result.index for result in found) == list(range(len(plan)))
     return sorted(found, key=lambda result: result.index), computed

@@ -11,11 +11,11 @@ from typing import Any
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
-from sandbox.scene.description.bodies import Compound, Polygon
+from sandbox.scene.description.bodies import Attached, Compound, Polygon
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.joints import Anchored, Groove, Pivot, Pulley
-from sandbox.scene.editing.elements import ElementKey, all_elements, body_names, element_at
+from sandbox.scene.editing.elements import ElementKey, all_elements, body_names, element_at, table_values
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def transformed(element: Part, by: Similarity, *, is_whole: bool = True) -> dict
         values["normal"] = by.direction(element.normal)
     if is_whole:
         values |= _shape(element, by)
-    return {key: value for key, value in values.items() if not _equal(getattr(element, key, None), value)}
+    return {key: value for key, value in values.items() if getattr(element, key, None) != value}
 
 
 def _shape(element: Part, by: Similarity) -> dict[str, Any]:
@@ -125,16 +125,14 @@ def _parts(body: Compound, by: Similarity) -> dict[str, Any]:
         parts = getattr(body, name)
         if parts:
             alias = str(type(body).model_fields[name].alias)
-            found[alias] = [
-                each.model_dump(mode="json", by_alias=True, exclude_defaults=True) | _part(each, by) for each in parts
-            ]
+            found[alias] = [table_values(each) | _part(each, by) for each in parts]
     return found
 
 
-def _part(part: Part, by: Similarity) -> dict[str, Any]:
-    values: dict[str, Any] = {"position": list(by.vector(getattr(part, "position")))}  # noqa: B009, of four types
+def _part(part: Attached, by: Similarity) -> dict[str, Any]:
+    values: dict[str, Any] = {"position": list(by.vector(part.position))}
     if by.mirrored:
-        values["angle"] = -float(getattr(part, "angle"))  # noqa: B009
+        values["angle"] = -part.angle
     points = getattr(part, "points", None)
     if points is not None:
         values["points"] = [list(by.vector(each)) for each in points]
@@ -172,7 +170,7 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
     if isinstance(joint, Pivot) and joint.at is not None:
         return {"at": by.point(joint.at)} if are_all_moved or (is_selected and not moved) else {}
     is_to_world = len(between) == 1
-    if isinstance(joint, Pulley) and (is_selected or are_all_moved):
+    if isinstance(joint, Pulley):
         return {"wheels": tuple(by.point(each) for each in joint.wheels)} if is_selected else {}
     if not (is_to_world and is_selected):
         return {}
@@ -188,10 +186,6 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
 def _wrapped(angle: float) -> float:
     """Return an angle within ±π if it is beyond ±2π, rad."""
     return math.remainder(angle, math.tau) if abs(angle) > math.tau else angle
-
-
-def _equal(before: Any, after: Any) -> bool:
-    return bool(before == after)
 
 
 def round_value(value: float) -> float:

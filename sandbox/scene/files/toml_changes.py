@@ -17,7 +17,7 @@ from typing import Any
 
 from sandbox.scene.errors import Location, path_of
 from sandbox.scene.files.toml_edit import Statement, written
-from sandbox.scene.files.toml_index import BLANK_LINE, InlineContainer, TextEntry, TomlIndex
+from sandbox.scene.files.toml_index import BLANK_LINE, COMMENT_LINE, InlineContainer, TextEntry, TomlIndex
 
 
 class TextEditError(ValueError):
@@ -109,10 +109,15 @@ def with_swapped_elements(text: str, table: str, one: int, other: int) -> str:
             raise TextEditError(f"{table}: the elements are not in one piece each; move them in a text editor")
     (a, b), (c, d) = spans
     first, second = text[a:b], text[c:d]
+    ending = "\r\n" if first.endswith("\r\n") else "\n"
     if not second.endswith("\n") and first.endswith("\n"):  # the last line of the file
-        ending = "\r\n" if first.endswith("\r\n") else "\n"
         first, second = first.removesuffix(ending), second + ending
-    result = text[:a] + second + text[b:c] + first + text[d:]
+    below, end = text[b:c], text[d:]
+    if _ends_with_comment(second) and not BLANK_LINE.match(below):  # else the comment would go to the next element
+        below = ending + below
+    if _ends_with_comment(first) and end and not BLANK_LINE.match(end):
+        end = ending + end
+    result = text[:a] + second + below + first + end
     elements = document[table]
     elements[one], elements[other] = elements[other], elements[one]
     if tomllib.loads(result) != document:
@@ -120,15 +125,9 @@ def with_swapped_elements(text: str, table: str, one: int, other: int) -> str:
     return result
 
 
-def changed_document(document: dict[str, Any], changes: Sequence[Change]) -> dict[str, Any]:
-    """Return a copy of a document with changes; indices refer to the document before any of them.
-
-    Added elements are appended in order. A list of the document that becomes empty is dropped.
-
-    Raises:
-        TextEditError: a change refers to an element or table that does not exist or to a value that TOML cannot hold.
-    """
-    return _completed(_altered(document, changes), changes)
+def _ends_with_comment(text: str) -> bool:
+    """Tell whether the last line of a statement or block is a comment."""
+    return COMMENT_LINE.match(text, text.rfind("\n", 0, -1) + 1) is not None
 
 
 def _completed(altered: dict[str, Any], changes: Sequence[Change]) -> dict[str, Any]:

@@ -60,15 +60,16 @@ def statements(text: str) -> Iterator[Statement]:
 def _statement(text: str, first: int, equals: int, last: int, end: int) -> Statement:
     begin = text.rfind("\n", 0, first) + 1
     if text[first] == "[":
-        return Statement(_keys(text[first:last]), True, begin, (first, last), (last, last), end)
+        return Statement(keys_of(text[first:last]), True, begin, (first, last), (last, last), end)
     blank = re.compile(r"\s*").match(text, equals + 1)
     assert blank is not None  # it also matches the empty text
     head = first, first + len(text[first:equals].rstrip())
-    return Statement(_keys(text[slice(*head)] + "=0"), False, begin, head, (blank.end(), last), end)
+    return Statement(keys_of(text[slice(*head)] + "=0"), False, begin, head, (blank.end(), last), end)
 
 
 @lru_cache(maxsize=10_000)
-def _keys(text: str) -> tuple[str, ...]:
+def keys_of(text: str) -> tuple[str, ...]:
+    """Return the parts of the key of a statement, such as `a.b = 0`, or of a heading."""
     keys: list[str] = []
     value: Any = tomllib.loads(text)
     while isinstance(value, dict) and value:

@@ -5,12 +5,11 @@ Positions are offsets in characters. Inline arrays and tables are read when some
 
 import re
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
 from sandbox.scene.errors import TOKEN, Location, enter
-from sandbox.scene.files.toml_edit import Statement, statements
+from sandbox.scene.files.toml_edit import Statement, keys_of, statements
 
 COMMENT_LINE = re.compile(r"[ \t]*#[^\n]*\n")
 BLANK_LINE = re.compile(r"[ \t]*\r?\n")
@@ -47,13 +46,6 @@ class TextBlock(NamedTuple):
     first: int
     """index of the heading; −1 for the statements above the first heading"""
     stop: int
-
-
-@lru_cache(maxsize=10_000)
-def _parts(key: str) -> tuple[str, ...]:
-    """Return the parts of a dotted key."""
-    (statement,) = statements(f"{key}=0")
-    return statement.keys
 
 
 class TomlIndex:
@@ -122,7 +114,7 @@ class TomlIndex:
                 commas.append(token.start())
             elif sign == "=" and is_table and key_end < 0:
                 key = self.text[head : token.start()].rstrip()
-                key_end, here = head + len(key), (*location, *_parts(key))
+                key_end, here = head + len(key), (*location, *keys_of(f"{key}=0"))
             else:
                 head = token.start() if head < 0 else head
                 if begin < 0 and (key_end >= 0 or not is_table):
@@ -168,7 +160,3 @@ class TomlIndex:
         """Return the end of the last line that is not blank."""
         content = len(self.text.rstrip())
         return self.text.find("\n", content) + 1 if content else 0
-
-
-COMMENT_LINE = re.compile(r"[ \t]*#[^\n]*\n")
-BLANK_LINE = re.compile(r"[ \t]*\r?\n")

@@ -206,10 +206,6 @@ class Editor:
             self.cancel()
         self.tool = name
 
-    def selected(self) -> list[tuple[ElementKey, Part]]:
-        """Return the selected elements."""
-        return [(key, element_at(self.draft.scene, key)) for key in self.selection]
-
     def selection_bounds(self, scene: Scene | None = None) -> tuple[Point, Point] | None:
         """Return the corners of the box around the selection, m; None without bounded elements."""
         scene = scene or self.scene
@@ -331,14 +327,8 @@ class Editor:
             if not shift:
                 self.selection = []
         elif shift:
-            self.selection = (
-                [each for each in self.selection if each != key]
-                if key in self.selection
-                else [
-                    *self.selection,
-                    key,
-                ]
-            )
+            others = [each for each in self.selection if each != key]
+            self.selection = others if key in self.selection else [*others, key]
         elif key not in self.selection:
             self.selection = [key]
 

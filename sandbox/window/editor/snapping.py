@@ -3,13 +3,15 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import ElementKey, bodies_of, elements_of_table
+from sandbox.scene.editing.elements import ElementKey, bodies_of
+from sandbox.scene.geometry.vectors import nearest_fraction
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.hit_test import hulls_of
 
@@ -25,8 +27,8 @@ class SnappedPoint:
 
     point: Point
     """m"""
-    to: str = ""
-    """what it has snapped to: `grid`, `centre`, `corner`, `surface`, or nothing"""
+    to: Literal["grid", "centre", "corner"]
+    """what it has snapped to"""
 
 
 def grid_step(scale: float, ui_scale: float = 1.0) -> float:
@@ -40,11 +42,6 @@ def rounded(value: float, step: float) -> float:
     """Return the nearest multiple of a step, with the digits that the step needs: 0.30000000000000004 is 0.3."""
     digits = max(0, 2 - math.floor(math.log10(step)))
     return round(round(value / step) * step, min(digits, 15)) + 0.0
-
-
-def on_grid(point: Point, step: float) -> Point:
-    """Return the nearest point of the grid, m."""
-    return rounded(point[0], step), rounded(point[1], step)
 
 
 def snap_point(
@@ -67,21 +64,17 @@ def snap_point(
         if distance[nearest] <= reach:
             x, y = targets[0][nearest].tolist()
             return SnappedPoint((x, y), targets[1][nearest])
-    return SnappedPoint(on_grid(point, grid_step(scale, ui_scale)), "grid")
+    step = grid_step(scale, ui_scale)
+    return SnappedPoint((rounded(point[0], step), rounded(point[1], step)), "grid")
 
 
-def _targets(scene: Scene, without: Collection[ElementKey]) -> tuple[FloatArray, list[str]]:
+def _targets(scene: Scene, without: Collection[ElementKey]) -> tuple[FloatArray, list[Literal["centre", "corner"]]]:
     """Return the points to which others snap, (K, 2) m, and what each is."""
     hidden = {body for key in without for body in bodies_of(scene, key)}
     points = [position for k, position in enumerate(scene.bodies.position.tolist()) if k not in hidden]
-    kinds = ["centre"] * len(points)
-    for table, attribute, kind in (("post", "position", "centre"), ("pocket", "position", "centre")):
-        more = [
-            list(getattr(element, attribute))
-            for k, element in enumerate(elements_of_table(scene, table))
-            if ElementKey(table, k) not in without
-        ]
-        points, kinds = points + more, kinds + [kind] * len(more)
+    points += [list(post.position) for k, post in enumerate(scene.posts) if ElementKey("post", k) not in without]
+    points += [list(each.position) for k, each in enumerate(scene.pockets) if ElementKey("pocket", k) not in without]
+    kinds: list[Literal["centre", "corner"]] = ["centre"] * len(points)
     for k, wall in enumerate(scene.walls):
         if ElementKey("wall", k) not in without:
             points += [list(each) for each in wall.points]
@@ -156,7 +149,4 @@ def _ball_gaps(scene: Scene, keys: Collection[ElementKey], ball: int) -> Iterato
 
 def _nearest_on_segment(a: FloatArray, b: FloatArray, point: FloatArray) -> FloatArray:
     """Return the point of a segment that is nearest to another, (2,) m."""
-    along = b - a
-    squared = float(along @ along)
-    fraction = min(max(float((point - a) @ along) / squared, 0.0), 1.0) if squared else 0.0
-    return np.asarray(a + fraction * along)
+    return np.asarray(a + nearest_fraction(*a.tolist(), *b.tolist(), *point.tolist()) * (b - a))

@@ -44,7 +44,7 @@ class TextEdit:
             self.anchor = self.caret
 
     def press(self, key: int, mod: int) -> bool:
-        """Process a key; return whether it has a meaning here. Text comes as `TEXTINPUT` events."""
+        """Process a key; return whether it is used. Text comes as `TEXTINPUT` events."""
         is_selecting = bool(mod & pygame.KMOD_SHIFT)
         is_whole = bool(mod & (pygame.KMOD_CTRL | pygame.KMOD_META))
         start, end = self.selection

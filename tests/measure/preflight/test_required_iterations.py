@@ -35,8 +35,10 @@ def test_advised_dt_of_a_chain_is_enough_and_not_much_too_short() -> None:
     scene = loads(CHAIN)
     (found,) = [each for each in run_preflight(scene, cover=0).warnings if each.kind == "chain"]
     dt = float(found.details["safe_dt"])
-    kinds = lambda factor: {  # noqa: E731
-        each.kind for each in run_preflight(loads(CHAIN.replace("dt = 0.02", f"dt = {factor * dt}")), cover=0).warnings
-    }
+
+    def kinds(factor: float) -> set[str]:
+        varied = loads(CHAIN.replace("dt = 0.02", f"dt = {factor * dt}"))
+        return {each.kind for each in run_preflight(varied, cover=0).warnings}
+
     assert "chain" not in kinds(0.999)
     assert "chain" in kinds(1.2)

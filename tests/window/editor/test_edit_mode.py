@@ -15,7 +15,7 @@ from sandbox.scene.files.load import load, loads
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.editor.edit_view import EditView
-from sandbox.window.editor.editor import TOOLS, Editor
+from sandbox.window.editor.editor import TOOLS, Editor, EditTool
 from sandbox.window.playback.live import LiveView
 from tests.window.pressing import key, key_up, move, press, release, wheel
 
@@ -373,14 +373,13 @@ def test_editing_keys(open_on: Callable[[str], Hand]) -> None:
 
 
 @pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.name)
-def test_every_tool_has_a_key_and_a_button(hand: Hand, tool: object) -> None:
-    name, letter = getattr(tool, "name"), getattr(tool, "key")  # noqa: B009, of pytest's parameters
-    hand.key(pygame.key.key_code(letter))
-    assert hand.editor.tool == name
+def test_every_tool_has_a_key_and_a_button(hand: Hand, tool: EditTool) -> None:
+    hand.key(pygame.key.key_code(tool.key))
+    assert hand.editor.tool == tool.name
     hand.key(pygame.K_v)
-    rect = hand.view.toolbar.rect_of(name)
+    rect = hand.view.toolbar.rect_of(tool.name)
     hand.frame(press(*rect.center), release(*rect.center))
-    assert hand.editor.tool == name
+    assert hand.editor.tool == tool.name
     hand.click((0.0, 3.0))
     hand.key(pygame.K_ESCAPE)
     hand.key(pygame.K_ESCAPE)
