@@ -1,5 +1,6 @@
 """Copies of elements: what is copied with them, and the changes that add the copies with names of their own."""
 
+import copy
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +14,7 @@ from sandbox.scene.editing.elements import (
     bodies_of,
     bodies_referred_to,
     body_names,
+    body_references,
     element_at,
     elements_of_table,
     name_of,
@@ -98,15 +100,12 @@ def _world_values(element: Part, by: Similarity) -> dict[str, Any]:
 
 def _renamed(values: dict[str, Any], element: Part, names: dict[str, str]) -> dict[str, Any]:
     """Return values whose references to copied bodies are those to their copies."""
-    found = dict(values)
-    if bodies_referred_to(element):
-        for key in ("body", "ball", "toward"):
-            if isinstance(found.get(key), str):
-                found[key] = names.get(found[key], found[key])
-        if "between" in found:
-            found["between"] = [names.get(name, name) for name in found["between"]]
-        if "tie" in found:
-            found["tie"] = {end: names.get(name, name) for end, name in found["tie"].items()}
+    found = copy.deepcopy(values)
+    for path, name in body_references(element):
+        holder: Any = found
+        for key in path[:-1]:
+            holder = holder[key]
+        holder[path[-1]] = names.get(name, name)
     return found
 
 

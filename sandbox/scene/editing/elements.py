@@ -9,9 +9,12 @@ from sandbox.scene.compile.bodies import Bodies, centre_of
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part
+from sandbox.scene.description.bodies import Attached, Compound
 from sandbox.scene.description.forces import Attraction
 from sandbox.scene.description.joints import Joined
 from sandbox.scene.description.scene import SceneDescription, default_name
+from sandbox.scene.description.world import Pair
+from sandbox.scene.errors import Location
 from sandbox.scene.files.toml_changes import Change, RemoveElement, SetValue
 
 FIELD_OF = {str(field.alias): name for name, field in Scene.model_fields.items() if field.alias is not None}
@@ -176,17 +179,41 @@ def unique_name(stem: str, taken: Collection[str]) -> str:
     return f"{base} {k}"
 
 
+def body_references(element: Part) -> Iterator[tuple[Location, str]]:
+    """Yield where an element names a body, as a path within its table, and the name."""
+    if isinstance(element, Joined):
+        yield from ((("between", k), name) for k, name in enumerate(element.between))
+    if isinstance(element, Attraction) and isinstance(element.toward, str):
+        yield ("toward",), element.toward
+    for key in ("body", "ball"):
+        name = getattr(element, key, None)
+        if isinstance(name, str):
+            yield (key,), name
+    tie = getattr(element, "tie", None)
+    for end in () if tie is None else ("start", "end"):
+        if getattr(tie, end) is not None:
+            yield ("tie", end), getattr(tie, end)
+
+
 def bodies_referred_to(element: Part) -> tuple[str, ...]:
     """Return the names of the bodies that an element refers to."""
-    if isinstance(element, Joined):
-        return element.between
-    if isinstance(element, Attraction):
-        return (element.toward,) if isinstance(element.toward, str) else ()
-    body = getattr(element, "body", None) or getattr(element, "ball", None)
-    if isinstance(body, str):
-        return (body,)
-    tie = getattr(element, "tie", None)
-    return () if tie is None else tuple(name for name in (tie.start, tie.end) if name is not None)
+    return tuple(name for _, name in body_references(element))
+
+
+def _material_references(element: Part) -> Iterator[tuple[Location, str]]:
+    """Yield where an element names a material, as `body_references` does."""
+    material = getattr(element, "material", None)
+    if material is not None:
+        yield ("material",), material
+    if isinstance(element, Compound):
+        for kind in ("balls", "boxes", "capsules", "polygons"):
+            heading = str(Compound.model_fields[kind].alias)
+            parts: Sequence[Attached] = getattr(element, kind)
+            yield from (
+                ((heading, k, "material"), part.material) for k, part in enumerate(parts) if part.material is not None
+            )
+    if isinstance(element, Pair):
+        yield from ((("between", k), name) for k, name in enumerate(element.between))
 
 
 def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
@@ -206,36 +233,29 @@ def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
 
 def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
     """Return the changes that rename an element, and the references to it."""
-    before = name_of(scene, key)
+    before, references = name_of(scene, key), _material_references if key.table == "material" else body_references
     changes: list[Change] = [SetValue((*key.location, "name"), name)]
     for other, element in all_elements(scene):
-        changes += [SetValue((*other.location, *path), name) for path in _reference_paths(element, before, key.table)]
+        changes += [SetValue((*other.location, *path), name) for path, found in references(element) if found == before]
     return changes
+
+
+def naming(scene: Scene, body: int) -> list[Change]:
+    """Return the changes that write the name of a body, for a new reference to it; empty if the file has its name.
+
+    Default names change with the order of elements.
+    """
+    key = element_of_body(scene, body)
+    is_default = getattr(element_at(scene, key), "name", None) is None
+    name = scene.bodies.names[body]
+    return renaming(scene, key, name) if is_default and name == name_of(scene, key) else []
 
 
 def material_users(scene: Scene, material: str) -> list[ElementKey]:
     """Return the elements that are of a material, and the pairs that name it."""
-    return [key for key, each in all_elements(scene) if any(_reference_paths(each, material, "material"))]
-
-
-def _reference_paths(element: Part, name: str, table: str) -> Iterator[tuple[str | int, ...]]:
-    """Yield the paths within an element at which it names an element of a table."""
-    if table == "material":
-        if getattr(element, "material", None) == name:
-            yield ("material",)
-        between = getattr(element, "between", ()) if not isinstance(element, Joined) else ()
-        yield from (("between", k) for k, each in enumerate(between) if each == name)
-        return
-    if isinstance(element, Joined):
-        yield from (("between", k) for k, each in enumerate(element.between) if each == name)
-    if isinstance(element, Attraction) and element.toward == name:
-        yield ("toward",)
-    for attribute in ("body", "ball"):
-        if isinstance(getattr(element, attribute, None), str) and getattr(element, attribute) == name:
-            yield (attribute,)
-    tie = getattr(element, "tie", None)
-    if tie is not None:
-        yield from (("tie", end) for end in ("start", "end") if getattr(tie, end) == name)
+    return [
+        key for key, element in all_elements(scene) if material in (name for _, name in _material_references(element))
+    ]
 
 
 def table_values(element: Part) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import Any
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import element_of_body, name_of, renaming
+from sandbox.scene.editing.elements import naming
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture, typed_numbers
@@ -60,19 +60,15 @@ class ThrustGesture(Gesture):
         force, body = self.force(), self.scene.bodies.names[self._body]
         if force == (0.0, 0.0):
             return []
-        key = element_of_body(self.scene, self._body)
         pose = body_pose(self.scene, body)
         angle = 0.0 if pose is None else pose[1]
         cos, sin = math.cos(angle), math.sin(angle)
         own = float(f"{cos * force[0] + sin * force[1]:.4g}"), float(f"{cos * force[1] - sin * force[0]:.4g}")
-        changes: list[Change] = []
-        if getattr(self.scene.kinds[key.table][key.index], "name", None) is None and name_of(self.scene, key) == body:
-            changes = renaming(self.scene, key, body)  # default names change with the order of elements
         point = [round_value(x) for x in to_body(self.scene, body, self.begin)]
         values: dict[str, Any] = {"name": self.name, "body": body, "force": [x + 0.0 for x in own]}
         if any(point):
             values["point"] = point
-        return [*changes, AddElement("thrust", values)]
+        return [*naming(self.scene, self._body), AddElement("thrust", values)]
 
     def dimensions(self) -> str:
         """Return the magnitude of the force."""
@@ -95,9 +91,6 @@ def attraction_changes(scene: Scene, name: str, point: Point, click: Point, view
     toward: Any = [round_value(x) for x in point]
     changes: list[Change] = []
     if found:
-        toward = scene.bodies.names[found[0]]
-        key = element_of_body(scene, found[0])
-        if getattr(scene.kinds[key.table][key.index], "name", None) is None and name_of(scene, key) == toward:
-            changes = renaming(scene, key, toward)
+        toward, changes = scene.bodies.names[found[0]], naming(scene, found[0])
     values = {"name": name, "toward": toward, "strength": strength, "softening": softening}
     return [*changes, AddElement("attraction", values)]

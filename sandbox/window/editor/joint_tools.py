@@ -6,7 +6,7 @@ from typing import Any
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import element_of_body, name_of, renaming
+from sandbox.scene.editing.elements import naming
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
@@ -111,12 +111,8 @@ def _names(scene: Scene, bodies: list[int]) -> tuple[list[str], list[Change]]:
     """Return the names of bodies, and the changes that write those that the file does not have yet."""
     names, changes = [], list[Change]()
     for body in bodies:
-        name = scene.bodies.names[body]
-        key = element_of_body(scene, body)
-        element = getattr(scene, "kinds", {})[key.table][key.index]
-        if element.name is None and name == name_of(scene, key):  # default names change with the order of elements
-            changes += [change for change in renaming(scene, key, name) if change not in changes]
-        names.append(name)
+        names.append(scene.bodies.names[body])
+        changes += [change for change in naming(scene, body) if change not in changes]
     return names, changes
 
 

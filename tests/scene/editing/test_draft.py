@@ -13,7 +13,7 @@ from sandbox.scene.description.base import Point
 from sandbox.scene.description.joints import Pivot
 from sandbox.scene.editing.clipboard import copied, pasting
 from sandbox.scene.editing.draft import NEW_SCENE, SceneDraft
-from sandbox.scene.editing.elements import ElementKey, all_elements, removal, renaming
+from sandbox.scene.editing.elements import ElementKey, all_elements, material_users, removal, renaming
 from sandbox.scene.editing.transforms import Similarity, transformation
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load, loads
@@ -136,6 +136,15 @@ def pivot_of(draft: SceneDraft, joint: int) -> Point | None:
 def test_renaming_follows_references(draft: SceneDraft) -> None:
     draft.change(renaming(draft.scene, ElementKey("box", 0), 'body "one"'), "rename")
     assert [joint.between[0] for joint in draft.scene.joints] == ['body "one"'] * 2
+
+
+def test_material_of_a_part_is_renamed_with_it() -> None:
+    draft = SceneDraft(
+        '[[material]]\nname = "a"\n[[body]]\nposition = [0, 0]\nball = [{ radius = 1, material = "a" }]\n'
+    )
+    assert material_users(draft.scene, "a") == [ElementKey("body", 0)]
+    draft.change(renaming(draft.scene, ElementKey("material", 0), "b"), "rename")
+    assert draft.text.count('"b"') == 2 and draft.scene.compounds[0].balls[0].material == "b"
 
 
 def test_copies_have_names_and_joints_of_their_own(draft: SceneDraft) -> None:
