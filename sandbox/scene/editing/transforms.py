@@ -7,7 +7,7 @@ corners in the world), to its angle, and to its lengths. Joints that name a poin
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
@@ -61,6 +61,8 @@ class Similarity:
         return (-angle if self.mirrored else angle) + self.angle
 
 
+AlignmentSide = Literal["left", "right", "top", "bottom", "middle", "centre"]
+"""Sides of boxes; `middle` is half of the height, `centre` half of the width."""
 LENGTHS = (
     "radius", "length", "size", "spacing", "jitter", "gap", "thickness", "height", "softening", "rest_length"
 )  # fmt: skip
@@ -181,6 +183,23 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
         assert anchors is not None
         return {"anchors": (anchors[0], by.point(anchors[1]))}
     return {}
+
+
+def alignment(own: tuple[Point, Point], box: tuple[Point, Point], side: AlignmentSide) -> Point:
+    """Return the way that aligns a side of an element's box, given by two corners, with that of another box, m."""
+    match side:
+        case "left":
+            return box[0][0] - own[0][0], 0.0
+        case "right":
+            return box[1][0] - own[1][0], 0.0
+        case "bottom":
+            return 0.0, box[0][1] - own[0][1]
+        case "top":
+            return 0.0, box[1][1] - own[1][1]
+        case "middle":
+            return 0.0, 0.5 * (box[0][1] + box[1][1] - own[0][1] - own[1][1])
+        case "centre":
+            return 0.5 * (box[0][0] + box[1][0] - own[0][0] - own[1][0]), 0.0
 
 
 def _wrapped(angle: float) -> float:

@@ -2,7 +2,8 @@
 
 import pygame
 
-from sandbox.window.editor.editor import TOOLS, AlignmentSide
+from sandbox.scene.editing.transforms import AlignmentSide
+from sandbox.window.editor.toolbar import TOOLS
 from sandbox.window.input.keymap import Command
 from sandbox.window.ui.help import HelpGroup
 

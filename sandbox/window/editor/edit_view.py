@@ -16,10 +16,11 @@ from sandbox.scene.editing.elements import ElementKey, differ_in_places_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
+from sandbox.window.editor.draw_gestures import OutlineGesture
 from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, TYPED
-from sandbox.window.editor.editor import TOOLS, Editor, EditTool, ViewScale
+from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import property_sections
-from sandbox.window.editor.gestures import OutlineGesture
+from sandbox.window.editor.gestures import ViewScale
 from sandbox.window.editor.ghost_path import GhostPredictor
 from sandbox.window.editor.live_check import LiveCheck
 from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
@@ -27,7 +28,7 @@ from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel
 from sandbox.window.editor.snapping import grid_step
-from sandbox.window.editor.toolbar import Toolbar
+from sandbox.window.editor.toolbar import TOOLS, EditTool, Toolbar
 from sandbox.window.input.keymap import Command, latin_key
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import FAINT, INK, ORANGE

@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BodySpec, Part, Point
-from sandbox.scene.description.bodies import Polygon
+from sandbox.scene.description.base import Point
 from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import (
@@ -16,7 +14,6 @@ from sandbox.scene.editing.elements import (
     all_elements,
     all_names,
     bodies_of,
-    element_at,
     exists,
     material_users,
     name_of,
@@ -25,7 +22,7 @@ from sandbox.scene.editing.elements import (
     unique_name,
 )
 from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
-from sandbox.scene.editing.transforms import Similarity, transformation
+from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, transformation
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.toml_changes import (
     AddElement,
@@ -36,106 +33,38 @@ from sandbox.scene.files.toml_changes import (
     TextEditError,
     with_swapped_elements,
 )
-from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
-from sandbox.window.editor.gestures import (
+from sandbox.window.editor.draw_gestures import (
     BoxGesture,
     CapsuleGesture,
     DiscGesture,
     DrawGesture,
-    Gesture,
-    MoveGesture,
     OutlineGesture,
     PlaneGesture,
+    default_size,
+)
+from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
+from sandbox.window.editor.gestures import (
+    Gesture,
+    MoveGesture,
     RotateGesture,
-    ScaleGesture,
     SelectGesture,
     VelocityGesture,
-    VertexGesture,
-    default_size,
+    ViewScale,
     set_values,
 )
+from sandbox.window.editor.handles import EditHandle, gesture_of_handle, handle_at, handles_of
 from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointGesture, PlacementError
-from sandbox.window.editor.picking import bounds_of, elements_at, pick_element
-from sandbox.window.editor.snapping import REACH, grid_step, snap_point, surface_shift
+from sandbox.window.editor.picking import bounds_of, bounds_of_elements, elements_at, pick_element
+from sandbox.window.editor.snapping import REACH, anchor_of, grid_step, snap_point, surface_shift
 
 MessageCallback = Callable[[str, str], None]
 """Callback with a text and a level, `info`, `warning` or `error`."""
-AlignmentSide = Literal["left", "right", "top", "bottom", "middle", "centre"]
-"""Sides of boxes; `middle` is half of the height, `centre` half of the width."""
-HandleKind = Literal["scale", "rotate", "vertex", "velocity"]
-ROTATE_DISTANCE = 26.0
-"""px at UI scale 1 of the handle for rotation above the selection"""
-HANDLE_REACH = 9.0
-"""px at UI scale 1 within which a handle is picked"""
 PICK_REACH = 6.0
 """px at UI scale 1 beside an element within which it is picked"""
 FREEHAND_TOLERANCE = 2.5
 """px at UI scale 1 by which a freehand outline may be simplified"""
 DRAG_REACH = 4.0
 """px at UI scale 1 that the pointer moves before a press becomes a drag"""
-VELOCITY_TIME = 0.25
-"""s: the arrow of a velocity is as long as the way in this time"""
-VELOCITY_DISTANCE = 22.0
-"""px at UI scale 1 from the selection to the handle of a velocity of 0"""
-MAX_VERTICES = 200
-"""Corners of an element that have handles"""
-
-
-@dataclass(frozen=True)
-class EditTool:
-    """Tool of the editor."""
-
-    name: str
-    key: str
-    """letter or digit that chooses it"""
-    about: str
-
-
-TOOLS = (
-    EditTool("select", "v", "select, move, rotate, scale"),
-    EditTool("ball", "b", "ball: drag from its centre"),
-    EditTool("box", "x", "box: drag from corner to corner"),
-    EditTool("capsule", "c", "capsule: drag from end to end"),
-    EditTool("polygon", "y", "polygon: click its corners"),
-    EditTool("plane", "l", "plane: drag along its surface; solid to the right"),
-    EditTool("wall", "w", "wall: click its corners; Enter ends it"),
-    EditTool("post", "t", "post: drag from its centre"),
-    EditTool("zone", "z", "zone: click its corners"),
-    EditTool("rod", "1", "rod: click two bodies, or a body and the world"),
-    EditTool("pivot", "2", "pivot: click one or two bodies"),
-    EditTool("rope", "3", "rope: click two bodies, or a body and the world"),
-    EditTool("spring", "4", "spring: click two bodies, or a body and the world"),
-    EditTool("motor", "5", "motor with its pivot: click one or two bodies"),
-    EditTool("thrust", "f", "thrust: drag the arrow of a force from a body"),
-    EditTool("attraction", "g", "attraction: click a point or a body"),
-    EditTool("eraser", "e", "eraser: click or drag over elements"),
-)
-"""All tools, in the order of the toolbar."""
-
-
-@dataclass(frozen=True)
-class EditHandle:
-    """Handle of the selection."""
-
-    kind: HandleKind
-    index: int
-    """of the corner"""
-    point: Point
-    """m"""
-
-
-class ViewScale(NamedTuple):
-    """What gestures need to know of the camera."""
-
-    scale: float
-    """px/m"""
-    ui_scale: float
-    size: float
-    """m, shorter side of the visible area"""
-
-    def metres(self, pixels: float) -> float:
-        """Return a length of pixels at UI scale 1, m."""
-        return pixels * self.ui_scale / self.scale
 
 
 class Editor:
@@ -208,56 +137,14 @@ class Editor:
 
     def selection_bounds(self, scene: Scene | None = None) -> tuple[Point, Point] | None:
         """Return the corners of the box around the selection, m; None without bounded elements."""
-        scene = scene or self.scene
-        boxes = [bounds_of(scene, key) for key in self.selection if exists(scene, key)]
-        found = [box for box in boxes if box is not None]
-        if not found:
-            return None
-        return (
-            (min(low[0] for low, _ in found), min(low[1] for low, _ in found)),
-            (max(high[0] for _, high in found), max(high[1] for _, high in found)),
-        )
+        return bounds_of_elements(scene or self.scene, self.selection)
 
     def handles(self, view: ViewScale) -> list[EditHandle]:
         """Return the handles of the selection."""
         scene = self.scene
         if self.tool != "select" or not self.selection or isinstance(self.gesture, SelectGesture):
             return []
-        found = self._vertex_handles(scene)
-        box = self.selection_bounds(scene)
-        if box is None or all(key.table in ("joint", "thrust", "attraction", "drive") for key in self.selection):
-            return found
-        (left, bottom), (right, top) = box
-        margin = view.metres(7.0)
-        left, bottom, right, top = left - margin, bottom - margin, right + margin, top + margin
-        corners = (left, bottom), (right, bottom), (right, top), (left, top)
-        found += [EditHandle("scale", k, corner) for k, corner in enumerate(corners)]
-        found += self._velocity_handle(scene, right, view)
-        return [*found, EditHandle("rotate", 0, (0.5 * (left + right), top + view.metres(ROTATE_DISTANCE)))]
-
-    def _vertex_handles(self, scene: Scene) -> list[EditHandle]:
-        if len(self.selection) != 1 or not exists(scene, self.selection[0]):
-            return []
-        element = element_at(scene, self.selection[0])
-        points = getattr(element, "points", None)
-        if not points or len(points) > MAX_VERTICES:
-            return []
-        dx, dy = element.position if isinstance(element, Polygon) else (0.0, 0.0)
-        if isinstance(element, Polygon) and element.angle:
-            return []
-        return [EditHandle("vertex", k, (x + dx, y + dy)) for k, (x, y) in enumerate(points)]
-
-    def _velocity_handle(self, scene: Scene, right: float, view: ViewScale) -> list[EditHandle]:
-        """Return the handle at the tip of the velocity of a single body; at its right side if it is at rest."""
-        body = self.single_body
-        element = None if body is None or not exists(scene, self.selection[0]) else element_at(scene, self.selection[0])
-        if body is None or not isinstance(element, BodySpec) or element.fixed:
-            return []
-        (x, y), (vx, vy) = scene.bodies.position[body].tolist(), element.velocity
-        tip = x + VELOCITY_TIME * vx, y + VELOCITY_TIME * vy
-        if not (vx or vy):
-            tip = right + view.metres(VELOCITY_DISTANCE), y
-        return [EditHandle("velocity", body, tip)]
+        return handles_of(scene, self.selection, view)
 
     @property
     def single_body(self) -> int | None:
@@ -277,9 +164,7 @@ class Editor:
 
     def handle_at(self, point: Point, view: ViewScale) -> EditHandle | None:
         """Return the handle at a point."""
-        reach = view.metres(HANDLE_REACH)
-        near = [handle for handle in self.handles(view) if math.dist(handle.point, point) <= reach]
-        return min(near, key=lambda handle: math.dist(handle.point, point), default=None)
+        return handle_at(self.handles(view), point, view)
 
     def press(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
         """Press the left button at a point."""
@@ -317,7 +202,7 @@ class Editor:
         scene, handle = self.draft.scene, self.handle_at(point, view)
         self._pressed_key = None
         if handle is not None:
-            self.gesture = self._handle_gesture(handle)
+            self.gesture = gesture_of_handle(scene, self.selection, handle)
             return
         found = elements_at(scene, point, view.metres(PICK_REACH))
         key = next((each for each in found if self.selection == [each]), found[0] if found else None)
@@ -331,21 +216,6 @@ class Editor:
             self.selection = others if key in self.selection else [*others, key]
         elif key not in self.selection:
             self.selection = [key]
-
-    def _handle_gesture(self, handle: EditHandle) -> Gesture:
-        scene, box = self.draft.scene, self.selection_bounds(self.draft.scene)
-        if handle.kind == "velocity":
-            return VelocityGesture(scene, self.selection[0], handle.index, VELOCITY_TIME)
-        if handle.kind == "vertex":
-            element = element_at(scene, self.selection[0])
-            offset = element.position if isinstance(element, Polygon) else (0.0, 0.0)
-            return VertexGesture(scene, self.selection[0], handle.index, offset)
-        assert box is not None
-        (left, bottom), (right, top) = box
-        if handle.kind == "rotate":
-            return RotateGesture(scene, self.selection, (0.5 * (left + right), 0.5 * (bottom + top)), handle.point)
-        corners = (left, bottom), (right, bottom), (right, top), (left, top)
-        return ScaleGesture(scene, self.selection, corners[(handle.index + 2) % 4], corners[handle.index])
 
     def _new_gesture(self, point: Point, view: ViewScale, control: bool) -> Gesture:
         """Return the gesture that a press of a drawing tool begins."""
@@ -404,8 +274,7 @@ class Editor:
         self.snapped = None
         if control:
             return
-        first = gesture.keys[0]
-        anchor = _anchor(element_at(self.draft.scene, first), bounds_of(self.draft.scene, first))
+        anchor = anchor_of(self.draft.scene, gesture.keys[0])
         if anchor is not None:
             target = anchor[0] + way[0], anchor[1] + way[1]
             found = snap_point(self.draft.scene, target, view.scale, view.ui_scale, gesture.keys)
@@ -595,7 +464,7 @@ class Editor:
         for key in self.selection:
             own = bounds_of(self.draft.scene, key)
             if own is not None:
-                values |= transformation(self.draft.scene, [key], Similarity(shift=_alignment(own, box, side)))
+                values |= transformation(self.draft.scene, [key], Similarity(shift=alignment(own, box, side)))
         self.apply(set_values(values), f"align {_count(self.selection)}")
 
     def reorder(self, step: Literal[-1, 1]) -> None:
@@ -714,34 +583,6 @@ class Editor:
             self._notify(f"material {name_of(scene, key)} is used by {user}{more}", "warning")
             return
         self.apply([RemoveElement(key.table, key.index)], f"remove a {key.table}")
-
-
-def _anchor(element: Part, box: tuple[Point, Point] | None) -> Point | None:
-    """Return the point of an element that lies on the grid when it is moved, m."""
-    for name in ("position", "origin", "base", "start", "corner", "point", "lower"):
-        value = getattr(element, name, None)
-        if isinstance(value, tuple):
-            return value[0], value[1]
-    points = getattr(element, "points", None)
-    if points:
-        return points[0][0], points[0][1]
-    return None if box is None else box[0]
-
-
-def _alignment(own: tuple[Point, Point], box: tuple[Point, Point], side: str) -> Point:
-    match side:
-        case "left":
-            return box[0][0] - own[0][0], 0.0
-        case "right":
-            return box[1][0] - own[1][0], 0.0
-        case "bottom":
-            return 0.0, box[0][1] - own[0][1]
-        case "top":
-            return 0.0, box[1][1] - own[1][1]
-        case "middle":
-            return 0.0, 0.5 * (box[0][1] + box[1][1] - own[0][1] - own[1][1])
-        case _:
-            return 0.5 * (box[0][0] + box[1][0] - own[0][0] - own[1][0]), 0.0
 
 
 def _count(keys: Sequence[ElementKey]) -> str:

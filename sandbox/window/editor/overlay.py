@@ -14,10 +14,12 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.description.surface import Pocket
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at, exists
 from sandbox.window.camera import Camera
-from sandbox.window.editor.editor import EditHandle, Editor, ViewScale
+from sandbox.window.editor.draw_gestures import OutlineGesture
+from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.force_tools import ACCELERATION_PER_METRE, ThrustGesture
-from sandbox.window.editor.gestures import OutlineGesture, SelectGesture
+from sandbox.window.editor.gestures import SelectGesture, ViewScale
 from sandbox.window.editor.ghost_path import GhostPath
+from sandbox.window.editor.handles import EditHandle
 from sandbox.window.editor.joint_tools import JointGesture
 from sandbox.window.editor.picking import attachment_lines, start_frame, to_world
 from sandbox.window.hit_test import hulls_of, rounded_hull

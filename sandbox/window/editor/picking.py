@@ -1,7 +1,7 @@
 """Picking of elements in the editor: which element is at a point or within a rectangle, and where joints end."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from sandbox.scene.editing.elements import (
     element_at,
     element_of_body,
     elements_of_table,
+    exists,
 )
 from sandbox.trajectory import Frame
 from sandbox.window.hit_test import hulls_of, segment_distance, signed_distance
@@ -101,6 +102,18 @@ def bounds_of(scene: Scene, key: ElementKey) -> tuple[Point, Point] | None:
         return None
     low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
     return (low[0], low[1]), (high[0], high[1])
+
+
+def bounds_of_elements(scene: Scene, keys: Iterable[ElementKey]) -> tuple[Point, Point] | None:
+    """Return the corners of the box around elements, as `bounds_of` does; those that do not exist are left out."""
+    boxes = [bounds_of(scene, key) for key in keys if exists(scene, key)]
+    found = [box for box in boxes if box is not None]
+    if not found:
+        return None
+    return (
+        (min(low[0] for low, _ in found), min(low[1] for low, _ in found)),
+        (max(high[0] for _, high in found), max(high[1] for _, high in found)),
+    )
 
 
 def _outline(scene: Scene, key: ElementKey, element: Part) -> FloatArray | None:

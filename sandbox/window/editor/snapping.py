@@ -10,9 +10,9 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import ElementKey, bodies_of
+from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at
 from sandbox.scene.geometry.vectors import nearest_fraction
-from sandbox.window.editor.picking import start_frame
+from sandbox.window.editor.picking import bounds_of, start_frame
 from sandbox.window.hit_test import hulls_of
 
 MIN_GRID = 6.0
@@ -66,6 +66,20 @@ def snap_point(
             return SnappedPoint((x, y), targets[1][nearest])
     step = grid_step(scale, ui_scale)
     return SnappedPoint((rounded(point[0], step), rounded(point[1], step)), "grid")
+
+
+def anchor_of(scene: Scene, key: ElementKey) -> Point | None:
+    """Return the point of an element that lies on the grid when it is moved, m; None if it has no place."""
+    element = element_at(scene, key)
+    for name in ("position", "origin", "base", "start", "corner", "point", "lower"):
+        value = getattr(element, name, None)
+        if isinstance(value, tuple):
+            return value[0], value[1]
+    points = getattr(element, "points", None)
+    if points:
+        return points[0][0], points[0][1]
+    box = bounds_of(scene, key)
+    return None if box is None else box[0]
 
 
 def _targets(scene: Scene, without: Collection[ElementKey]) -> tuple[FloatArray, list[Literal["centre", "corner"]]]:

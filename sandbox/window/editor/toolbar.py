@@ -1,11 +1,11 @@
-"""Toolbar of the editor: a column of tool buttons at the left of the window, each with its key."""
+"""Tools of the editor, and its toolbar: a column of tool buttons at the left of the window, each with its key."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import pygame
 
-from sandbox.window.editor.editor import TOOLS, EditTool
 from sandbox.window.editor.tool_icons import tool_icon
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_hint, draw_text
@@ -17,6 +17,38 @@ GAP = 3
 MAX_COLUMNS = 4
 GROUP_STARTS = ("ball", "plane", "rod", "thrust", "eraser")
 """Tools before which there is a wider gap"""
+
+
+@dataclass(frozen=True)
+class EditTool:
+    """Tool of the editor."""
+
+    name: str
+    key: str
+    """letter or digit that chooses it"""
+    about: str
+
+
+TOOLS = (
+    EditTool("select", "v", "select, move, rotate, scale"),
+    EditTool("ball", "b", "ball: drag from its centre"),
+    EditTool("box", "x", "box: drag from corner to corner"),
+    EditTool("capsule", "c", "capsule: drag from end to end"),
+    EditTool("polygon", "y", "polygon: click its corners"),
+    EditTool("plane", "l", "plane: drag along its surface; solid to the right"),
+    EditTool("wall", "w", "wall: click its corners; Enter ends it"),
+    EditTool("post", "t", "post: drag from its centre"),
+    EditTool("zone", "z", "zone: click its corners"),
+    EditTool("rod", "1", "rod: click two bodies, or a body and the world"),
+    EditTool("pivot", "2", "pivot: click one or two bodies"),
+    EditTool("rope", "3", "rope: click two bodies, or a body and the world"),
+    EditTool("spring", "4", "spring: click two bodies, or a body and the world"),
+    EditTool("motor", "5", "motor with its pivot: click one or two bodies"),
+    EditTool("thrust", "f", "thrust: drag the arrow of a force from a body"),
+    EditTool("attraction", "g", "attraction: click a point or a body"),
+    EditTool("eraser", "e", "eraser: click or drag over elements"),
+)
+"""All tools, in the order of the toolbar."""
 
 
 class Toolbar:

@@ -17,7 +17,7 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.editor.edit_view import EditView
-from sandbox.window.editor.editor import TOOLS
+from sandbox.window.editor.toolbar import TOOLS
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from tests.window.pressing import FOCUS_LOST, key, key_up, move, press, release, wheel
 

@@ -15,7 +15,8 @@ from sandbox.scene.files.load import load, loads
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.editor.edit_view import EditView
-from sandbox.window.editor.editor import TOOLS, Editor, EditTool
+from sandbox.window.editor.editor import Editor
+from sandbox.window.editor.toolbar import TOOLS, EditTool
 from sandbox.window.playback.live import LiveView
 from tests.window.pressing import key, key_up, move, press, release, wheel
 
