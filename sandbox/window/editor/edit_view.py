@@ -321,6 +321,7 @@ class EditView:
             is_lost: whether the user has confirmed that unsaved changes are lost; otherwise they are offered again.
         """
         self.live_check.close()
+        self._ghost.close()
         if is_lost:
             self.autosave.discard()
             return

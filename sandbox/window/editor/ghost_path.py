@@ -1,6 +1,5 @@
 """Ghost path: where a body will be in the next seconds, predicted in a background thread while it is being edited."""
 
-import threading
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -10,6 +9,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import USUAL, able, start
 from sandbox.scene.compile.scene import Scene
+from sandbox.window.editor.latest_job import LatestJob
 
 SECONDS = 2.0
 """s of motion that are predicted"""
@@ -76,54 +76,38 @@ def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath
 
 
 class GhostPredictor:
-    """Predicts the path of the latest scene that was submitted, in a thread of its own."""
+    """Predicts the path of the body that was submitted last, in a thread of its own."""
 
     def __init__(self) -> None:
-        self._condition = threading.Condition()
-        self._next: tuple[Scene, int] | None = None
+        self._job: LatestJob[tuple[Scene, int], GhostPath | None] = LatestJob(self._predicted, "sandbox ghost path")
         self._submitted: tuple[Scene, int] | None = None
-        self._is_closed = False
-        self._thread: threading.Thread | None = None
-        self.path: GhostPath | None = None
-        """latest path; it may be of an earlier scene for a moment"""
         self.fault: str | None = None
         """an unexpected error of the prediction, to be reported once"""
+
+    @property
+    def path(self) -> GhostPath | None:
+        """Latest path; it may be of an earlier scene for a moment."""
+        return self._job.result
 
     def submit(self, scene: Scene, body: int | None) -> None:
         """Predict the path of a body, unless that was submitted last; without a body there is no path."""
         if body is None:
-            self.path = self._submitted = None
-            return
-        if self._submitted is not None and self._submitted[0] is scene and self._submitted[1] == body:
-            return
-        self._submitted = scene, body
-        with self._condition:
-            self._next = self._submitted
-            self._condition.notify()
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._work, name="sandbox ghost path", daemon=True)
-            self._thread.start()
+            if self._submitted is not None:
+                self._job.forget()
+            self._submitted = None
+        elif self._submitted is None or self._submitted[0] is not scene or self._submitted[1] != body:
+            self._submitted = scene, body
+            self._job.submit(self._submitted)
 
     def close(self) -> None:
         """End the thread, after the present prediction."""
-        with self._condition:
-            self._is_closed = True
-            self._condition.notify()
+        self._job.close()
 
-    def _work(self) -> None:
-        while True:
-            with self._condition:
-                while self._next is None and not self._is_closed:
-                    self._condition.wait()
-                if self._is_closed:
-                    return
-                assert self._next is not None
-                (scene, body), self._next = self._next, None
-            try:
-                path = predict_path(scene, body)
-            except (ArithmeticError, ValueError):  # a preview that is not a valid scene
-                path = None
-            except Exception as error:  # noqa: BLE001, reported by the owner
-                path, self.fault = None, f"the path cannot be predicted: {type(error).__name__}: {error}"
-            if self._submitted is not None:
-                self.path = path
+    def _predicted(self, submitted: tuple[Scene, int]) -> GhostPath | None:
+        try:
+            return predict_path(*submitted)
+        except (ArithmeticError, ValueError):  # a preview that is not a valid scene
+            return None
+        except Exception as error:  # noqa: BLE001, reported by the owner
+            self.fault = f"the path cannot be predicted: {type(error).__name__}: {error}"
+            return None

@@ -6,11 +6,9 @@ higher speed, can remain.
 """
 
 import math
-import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -39,6 +37,7 @@ from sandbox.scene.editing.elements import (
 )
 from sandbox.scene.editing.transforms import Similarity, transformed
 from sandbox.scene.files.toml_changes import Change, RemoveValue, SetValue
+from sandbox.window.editor.latest_job import LatestJob
 
 CHECK_DELAY = 0.15
 """s without a change after which a scene is checked"""
@@ -364,7 +363,7 @@ def _is_free_at(scene: Scene, name: str, shift: Point) -> bool:
 # --- Thread ----------------------------------------------------------------------------------------------------------
 
 
-class LiveCheck:
+class LiveCheck(LatestJob[Scene, CheckResult]):
     """Checks the latest scene in a background thread, a moment after it has last changed.
 
     Args:
@@ -373,63 +372,10 @@ class LiveCheck:
     """
 
     def __init__(self, check: Callable[[Scene], CheckResult] = check_scene, delay: float = CHECK_DELAY) -> None:
-        self._check, self._delay = check, delay
-        self._condition = threading.Condition()
-        self._thread: threading.Thread | None = None
-        self._scene: Scene | None = None
-        self._changed_at = -math.inf
-        self._checked: Scene | None = None
-        self._result: CheckResult | None = None
-        self._is_closed = False
+        super().__init__(self._checked, "sandbox check", delay)
+        self._check = check
 
-    def submit(self, scene: Scene) -> None:
-        """Have a scene checked, unless it is the one that was submitted last. Cheap: for every frame."""
-        if scene is self._scene or self._is_closed:
-            return
-        with self._condition:
-            self._scene, self._changed_at = scene, monotonic()
-            self._condition.notify()
-        if self._thread is None:
-            # A daemon, so that a second Ctrl+C ends the process without waiting for it.
-            self._thread = threading.Thread(target=self._work, name="sandbox check", daemon=True)
-            self._thread.start()
-
-    @property
-    def result(self) -> CheckResult | None:
-        """Result of the latest finished check, also of a former scene (`is_current`); None before the first."""
-        return self._result
-
-    @property
-    def is_current(self) -> bool:
-        """Whether the result is that of the scene that was submitted last."""
-        return self._result is not None and self._checked is self._scene
-
-    def close(self) -> None:
-        """End the thread after the check that is running; the result stays."""
-        with self._condition:
-            self._is_closed = True
-            self._condition.notify()
-
-    def _work(self) -> None:
-        while (scene := self._next_scene()) is not None:
-            result = self._checked_result(scene)
-            with self._condition:
-                self._checked, self._result = scene, result
-
-    def _next_scene(self) -> Scene | None:
-        """Wait for a scene that has not changed for a moment, and return it; None after `close`."""
-        with self._condition:
-            while not self._is_closed:
-                if self._scene is self._checked:
-                    self._condition.wait()
-                    continue
-                remaining = self._changed_at + self._delay - monotonic()
-                if remaining <= 0.0:
-                    return self._scene
-                self._condition.wait(remaining)
-        return None
-
-    def _checked_result(self, scene: Scene) -> CheckResult:
+    def _checked(self, scene: Scene) -> CheckResult:
         try:
             return self._check(scene)
         except Exception as error:  # noqa: BLE001, it is shown, and later scenes are checked

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pygame
 
-from sandbox.window.editor.text_edit import TextEdit
+from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import FAINT, INK, PANEL_RAISED, SKY, WARNING
-from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
+from sandbox.window.render.text import draw_box, draw_text, wrap_text
 
 WIDTH = 520
 """px at UI scale 1"""
@@ -20,6 +20,7 @@ class PathPrompt:
         stem = len(str(path)) - len(path.suffix)
         self._edit.anchor, self._edit.caret = stem - len(path.stem), stem  # typing replaces the name
         self._asked: Path | None = None
+        self._shift = 0  # px by which the text is moved to the left
         self.note = ""
         """question or fault that is shown below the field"""
         self.is_closed = False
@@ -78,24 +79,7 @@ class PathPrompt:
             round(left), round(top + 26 * ui_scale), round(rect.width - 36 * ui_scale), round(28 * ui_scale)
         )
         pygame.draw.rect(surface, PANEL_RAISED, field, border_radius=round(4 * ui_scale))
-        self._draw_text(surface, field, size)
+        inner = field.inflate(-round(0.8 * size), 0)
+        self._shift = draw_text_edit(surface, self._edit, inner, size, self._shift)
         for k, line in enumerate(lines):
             draw_text(surface, line, (left, field.bottom + (8 + 20 * k) * ui_scale), size, WARNING)
-
-    def _draw_text(self, surface: pygame.Surface, field: pygame.Rect, size: float) -> None:
-        """Draw the text with its selection and caret, scrolled so that the caret is visible."""
-        text, caret = self._edit.text, self._edit.caret
-        begin, end = self._edit.selection
-        before = text_size(text[:caret], size, mono=True)[0]
-        shift = min(0, field.width - round(1.2 * size) - before)
-        inner = field.inflate(-round(0.8 * size), 0)
-        clip = surface.get_clip()
-        surface.set_clip(inner)
-        if begin != end:
-            x = inner.left + shift + text_size(text[:begin], size, mono=True)[0]
-            marked = text_size(text[begin:end], size, mono=True)[0]
-            pygame.draw.rect(surface, SKY, pygame.Rect(x, inner.top + 4, marked, inner.height - 8))
-        draw_text(surface, text, (inner.left + shift, inner.centery), size, INK, "midleft", mono=True)
-        x = inner.left + shift + before
-        pygame.draw.line(surface, INK, (x, inner.top + 5), (x, inner.bottom - 6), 1)
-        surface.set_clip(clip)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import pygame
 
 from sandbox.scene.editing.fields import FieldSpec, format_value, parse
-from sandbox.window.editor.text_edit import TextEdit
+from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import (
     BACKGROUND,
     FAINT,
@@ -34,7 +34,6 @@ ROW_HEIGHT, BOX_HEIGHT, HEADING_HEIGHT, SECTION_GAP = 24, 20, 26, 8
 MAX_ERROR_LINES, MAX_NOTE_LINES = 5, 8
 LEFT_OUT, MIXED = "–", "…"
 """Text of a field without a value, and of one whose values differ."""
-SELECTED: RgbColour = mix_colours(PANEL_RAISED, SKY, 0.45)
 DIMMED: RgbColour = mix_colours(FAINT, BACKGROUND, 0.15)
 """Colour of defaults and units."""
 TYPED_KINDS = frozenset({"number", "integer", "text", "numbers", "name"})
@@ -690,27 +689,12 @@ class PropertyPanel:
             pygame.draw.rect(self._sheet, edge, box, max(self._px(1), 1), border_radius=self._px(3))
 
     def _draw_edit(self, placeholder: str, area: pygame.Rect) -> None:
-        """Draw the edited text in an area, with selection and caret, moved so that the caret is in view."""
-        editing = self._editing
+        """Draw the edited text in an area; before anything is typed, a placeholder if it is empty."""
+        editing, size = self._editing, VALUE_SIZE * self.ui_scale
         assert editing is not None
-        sheet, size, edit = self._sheet, VALUE_SIZE * self.ui_scale, editing.edit
-        caret = self._value_width(edit.text[: edit.caret])
-        room = max(area.width - self._px(1), 1)
-        editing.shift = min(max(editing.shift, caret - room), caret)
-        editing.shift = min(editing.shift, max(self._value_width(edit.text) - room, 0))
-        left = area.left - editing.shift
-        sheet.set_clip(area.inflate(2, 0))
-        start, end = (self._value_width(edit.text[:position]) for position in edit.selection)
-        height = self._px(15)
-        if start != end:
-            pygame.draw.rect(sheet, SELECTED, (left + start, area.centery - height // 2, end - start, height))
-        if edit.text:
-            draw_text(sheet, edit.text, (left, area.centery), size, INK, "midleft", mono=True)
-        elif not editing.is_touched:
-            draw_text(sheet, placeholder, (left, area.centery), size, DIMMED, "midleft", mono=True)
-        line = pygame.Rect(left + caret, area.centery - height // 2, max(self._px(1), 1), height)
-        pygame.draw.rect(sheet, INK, line)
-        sheet.set_clip(None)
+        if not editing.edit.text and not editing.is_touched:
+            draw_text(self._sheet, placeholder, (area.left, area.centery), size, DIMMED, "midleft", mono=True)
+        editing.shift = draw_text_edit(self._sheet, editing.edit, area, size, editing.shift)
 
     def _draw_check_box(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
         sheet, side = self._sheet, self._px(14)

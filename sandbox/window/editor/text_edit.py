@@ -1,9 +1,14 @@
-"""Text of one line with a caret and a selection, edited by keys."""
+"""Text of one line with a caret and a selection, edited by keys, and how it is drawn."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 import pygame
+
+from sandbox.window.render.palette import INK, PANEL_RAISED, SKY, RgbColour, mix_colours
+from sandbox.window.render.text import draw_text, text_size
+
+SELECTED: RgbColour = mix_colours(PANEL_RAISED, SKY, 0.45)
 
 
 @dataclass
@@ -67,3 +72,36 @@ class TextEdit:
             case _:
                 return False
         return True
+
+
+def draw_text_edit(surface: pygame.Surface, edit: TextEdit, area: pygame.Rect, size: float, shift: int = 0) -> int:
+    """Draw a text with its selection and caret in an area, moved to the left so that the caret is in view.
+
+    Args:
+        surface: to draw on.
+        edit: the text.
+        area: px.
+        size: of the font, px.
+        shift: px by which the text was moved before; it stays if possible.
+
+    Returns:
+        px by which the text is moved.
+    """
+
+    def width(text: str) -> int:
+        return text_size(text, size, mono=True)[0]
+
+    line_width, caret = max(round(size / 12), 1), width(edit.text[: edit.caret])
+    room = max(area.width - line_width, 1)
+    shift = min(max(shift, caret - room), caret)
+    shift = min(shift, max(width(edit.text) - room, 0))
+    left, height, clip = area.left - shift, round(1.3 * size), surface.get_clip()
+    surface.set_clip(area.inflate(2, 0).clip(clip))
+    start, end = (width(edit.text[:position]) for position in edit.selection)
+    top = area.centery - height // 2
+    if start != end:
+        pygame.draw.rect(surface, SELECTED, (left + start, top, end - start, height))
+    draw_text(surface, edit.text, (left, area.centery), size, INK, "midleft", mono=True)
+    pygame.draw.rect(surface, INK, (left + caret, top, line_width, height))
+    surface.set_clip(clip)
+    return shift

@@ -1,6 +1,7 @@
 """Edit mode of the window, with events as SDL sends them: scenes built from nothing, saved, and run headless."""
 
 import math
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -386,6 +387,20 @@ def test_every_tool_has_a_key_and_a_button(hand: Hand, tool: EditTool) -> None:
     hand.key(pygame.K_ESCAPE)
     hand.key(pygame.K_ESCAPE)
     assert hand.editor.tool == "select"
+
+
+def test_closing_ends_the_threads_of_the_editor(open_on: Callable[[str], Hand]) -> None:
+    before = set(threading.enumerate())
+    hand = open_on(BALL)
+    hand.click((0.0, 2.0))
+    hand.frame()
+    begun = set(threading.enumerate()) - before
+    assert {"sandbox check", "sandbox ghost path"} <= {thread.name for thread in begun}
+    hand.view.close(is_lost=True)
+    for thread in begun:
+        if thread.name in ("sandbox check", "sandbox ghost path"):
+            thread.join(20.0)
+            assert not thread.is_alive()
 
 
 def test_saving_a_file_that_changed_on_disk_asks(open_on: Callable[[str], Hand], tmp_path: Path) -> None:
