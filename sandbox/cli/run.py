@@ -3,10 +3,9 @@
 import json
 import shlex
 import sys
-from collections import Counter
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -19,19 +18,16 @@ from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor
 from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
-from sandbox.batch.run_row import RunRow
 from sandbox.batch.sampling import Sampling
 from sandbox.batch.store import DATABASE, Store, StoreError
 from sandbox.batch.study import MAX_SEEDS, Study, is_study, key_of
 from sandbox.batch.sweep import repeated_keys
 from sandbox.cli.common import (
     collect_errors,
-    engine_advice,
     exit_with_errors,
     expand_folders,
     only_engine,
     parse_engines,
-    print_faults,
     require_plot_file,
     scene_paths,
     suggest_names,
@@ -51,6 +47,7 @@ from sandbox.cli.options import (
     workers_option,
 )
 from sandbox.cli.progress import RunMonitor, status_line
+from sandbox.cli.run_batch import MAX_PROBLEMS, RunBatch, report_problems
 from sandbox.cli.run_tables import MAX_TIMED, RunsDocument, print_ledgers, print_runs, print_scores, score_rows
 from sandbox.cli.streams import JsonSpool, print_json
 from sandbox.echo import short_repr
@@ -62,10 +59,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError
 
-MAX_TABLE = 1_000
-"""Runs in a table; of more runs, only their number is printed."""
-MAX_PROBLEMS = 100
-"""Runs that are not ok and have a line each"""
 MAX_STATED = 5
 """Swept values that a message states"""
 MAX_MISSED = 3
@@ -95,68 +88,6 @@ class _Options(OutputOptions):
     audit: bool | None
     ledger: bool | None
     verbose: bool
-
-
-@dataclass
-class _Batch:
-    """Runs of the command: what was asked for, and the completed runs."""
-
-    plan: Plan
-    study: Study
-    count: int
-    """number of runs; an upper bound in a large plan"""
-    scene: Scene | None = None
-    """of the run, if there is only one"""
-    rows: dict[int, RunRow] = field(default_factory=dict)
-    """rows of completed runs by their number, if there are few; without those that only JSON prints"""
-    spool: JsonSpool | None = None
-    """rows of completed runs as JSON, if there are many and --json is given"""
-    statuses: Counter[str] = field(default_factory=Counter)
-    """number of completed runs by status"""
-    problems: dict[int, str] = field(default_factory=dict)
-    """lines about the first runs that are not ok, by their number"""
-    games: dict[int, RunRow] = field(default_factory=dict)
-    """rows of games over several seeds, whose scores are summarised"""
-    faults: list[Fault] = field(default_factory=list)
-    """of scenes that were not checked before"""
-    record: RunRecord | None = None
-    """the run, if there is only one"""
-    status: int = 0
-    """exit status: 130 interrupted, 2 a job could not be run, 1 no worker could be started"""
-
-    @property
-    def is_large(self) -> bool:
-        """Whether there are too many runs for a table."""
-        return self.count > MAX_TABLE
-
-    @property
-    def done(self) -> int:
-        """Number of completed runs."""
-        return self.statuses.total()
-
-    def add(self, result: Result, is_engine_chosen: bool) -> None:
-        """Add a completed run."""
-        index, record = result.index, result.record
-        self.statuses[record.stored.status] += 1
-        if self.is_large and self.spool is None and record.is_plain:
-            return
-        row = result.row
-        problem = _problem(row, self, is_engine_chosen)
-        if problem and len(self.problems) < MAX_PROBLEMS:
-            self.problems[index] = problem
-        if not self.is_large:
-            self.rows[index] = row
-        elif self.spool is not None:
-            self.spool.add(index, to_json(row))
-        if self.is_large and self.study.seeds is not None and row.game is not None:
-            self.games[index] = replace(row, final=None, settings={}, work={})
-        if self.count == 1 and record.has_trajectory:
-            self.record = record
-
-    @property
-    def ordered_rows(self) -> list[RunRow]:
-        """Rows of completed runs in the order of the plan."""
-        return [self.rows[index] for index in sorted(self.rows)]
 
 
 @click.command(name="run")
@@ -243,7 +174,7 @@ def run_command(**given: Any) -> int:
     finally:
         if store is not None:
             store.close()
-    status = _report_problems(batch)
+    status = report_problems(batch)
     _print_results(batch, options, status)
     return _draw(batch, options, status)
 
@@ -317,7 +248,7 @@ def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
 
 def _checked_batch(
     plan: Plan, study: Study, options: _Options, store: Store | None, faults: list[Fault]
-) -> _Batch | None:
+) -> RunBatch | None:
     """Check the plan before its first run; add its errors to the faults, and return None if there are any."""
     memory: dict[Fault, None] = {}
     scenes: list[Scene] = []
@@ -346,10 +277,10 @@ def _checked_batch(
         with collect_errors(faults):
             _check_drawing(options.plot, options.bodies, count, scene)
     faults += memory
-    return None if faults else _Batch(plan, study, count, scene)
+    return None if faults else RunBatch(plan, study, count, scene)
 
 
-def _run_options(batch: _Batch, options: _Options) -> RunOptions:
+def _run_options(batch: RunBatch, options: _Options) -> RunOptions:
     study = batch.study
     return RunOptions(
         audit=study.audit is not False and study.keep != "end",
@@ -361,7 +292,7 @@ def _run_options(batch: _Batch, options: _Options) -> RunOptions:
     )
 
 
-def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
+def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
     """Run all jobs, and add each run to the batch when it completes; an interrupt or error ends the batch."""
     kept = f"of {batch.count} runs are complete and kept"
     if batch.is_large and options.as_json:
@@ -409,7 +340,7 @@ def _report_members(label: str, engine: str, reported: set[tuple[str, str]], opt
     reported.add((label, engine))
 
 
-def _executor(batch: _Batch, options: _Options, monitor: RunMonitor) -> Executor:
+def _executor(batch: RunBatch, options: _Options, monitor: RunMonitor) -> Executor:
     """Return the executor of the command.
 
     Raises:
@@ -429,44 +360,7 @@ def _name(scene: str, engine: str, values: Mapping[str, Any]) -> str:
     return " ".join((scene, engine, *(f"{key}={value}" for key, value in values.items())))
 
 
-def _problem(row: RunRow, batch: _Batch, is_engine_chosen: bool) -> str:
-    """Return the lines about a run that is not ok, was damaged, or ended otherwise than its recording; or nothing."""
-    lines = []
-    if row.status != "ok":
-        advice = ""
-        if row.status == "refused":
-            with suppress(SceneError):  # of a scene that is stored and was changed since
-                advice = engine_advice(batch.scene or batch.plan.scene_of(row.scene), is_engine_chosen)
-        lines.append(f"{row.scene}: {row.status}: {row.reason}{advice}")
-    if row.damaged is not None:
-        lines.append(f"{row.damaged}; the run was repeated")
-    if _is_different_replay(row):
-        otherwise = None if row.game is None else row.game.otherwise
-        subject = "state" if otherwise is None else f"game, from {otherwise:g} s on,"
-        lines.append(
-            f"{row.scene}: ended in a different {subject} than the session; a possible cause is another version of an "
-            "engine"
-        )
-    return "\n".join(lines)
-
-
-def _is_different_replay(row: RunRow) -> bool:
-    return row.replay is not None and row.replay.replayed is False
-
-
-def _report_problems(batch: _Batch) -> int:
-    """Print the lines about runs that are not ok, and return the exit status."""
-    for _, problem in sorted(batch.problems.items()):
-        click.echo(problem, err=True)
-    print_faults(list(dict.fromkeys(batch.faults)))
-    not_ok = batch.done - batch.statuses["ok"]
-    if not_ok > len(batch.problems):
-        click.echo(f"… and {not_ok - len(batch.problems):,} more runs that are not ok", err=True)
-    is_wrong = not_ok or batch.faults or any(map(_is_different_replay, batch.rows.values()))
-    return batch.status or int(bool(is_wrong))
-
-
-def _print_results(batch: _Batch, options: _Options, status: int) -> None:
+def _print_results(batch: RunBatch, options: _Options, status: int) -> None:
     """Print the JSON document, or the tables."""
     rows = batch.ordered_rows
     scores = [] if batch.study.seeds is None else score_rows(rows or [batch.games[k] for k in sorted(batch.games)])
@@ -493,13 +387,13 @@ def _print_results(batch: _Batch, options: _Options, status: int) -> None:
             _suggest_next(rows[0].scene)
 
 
-def _print_summary(batch: _Batch) -> None:
+def _print_summary(batch: RunBatch) -> None:
     """Print the number of runs by status, for more runs than a table shows."""
     counts = ", ".join(f"{count:,} {status}" for status, count in batch.statuses.most_common())
     click.echo(f"{batch.done:,} runs: {counts}; `sandbox runs DIR` lists and summarises the stored ones")
 
 
-def _draw(batch: _Batch, options: _Options, status: int) -> int:
+def _draw(batch: RunBatch, options: _Options, status: int) -> int:
     """Draw the single run to the file of `--plot`, and return the exit status."""
     if options.plot is None or batch.status or batch.record is None or batch.scene is None:
         return status
@@ -568,7 +462,7 @@ def _choose_engines(plan: Plan, study: Study, quiet: bool) -> None:
 
 def _print_missed(record: RunRecord, scene: Scene | None) -> None:
     """Print the first contacts that the engine missed, and the number of the others."""
-    if scene is None or not record.stored.missed_contacts or (record.computed is None and record.path is None):
+    if scene is None or not record.stored.missed_contacts or not record.has_trajectory:
         return
     run, fixed = record.trajectory, scene.fixed_names
     missed = list(zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True))

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sandbox.cli import progress
-from sandbox.cli import run as module
+from sandbox.cli import run_batch as module
 from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # command lines that run long
