@@ -6,11 +6,11 @@ from collections.abc import Callable
 from time import monotonic
 from typing import Generic, TypeVar
 
-Input = TypeVar("Input")
-Result = TypeVar("Result")
+InputT = TypeVar("InputT")
+ResultT = TypeVar("ResultT")
 
 
-class LatestJob(Generic[Input, Result]):
+class LatestJob(Generic[InputT, ResultT]):
     """Computes the result of the latest input in a thread; inputs that are replaced before it begins are skipped.
 
     Args:
@@ -19,17 +19,17 @@ class LatestJob(Generic[Input, Result]):
         delay: s without another input after which the computation begins.
     """
 
-    def __init__(self, compute: Callable[[Input], Result], name: str, delay: float = 0.0) -> None:
+    def __init__(self, compute: Callable[[InputT], ResultT], name: str, delay: float = 0.0) -> None:
         self._compute, self._name, self._delay = compute, name, delay
         self._condition = threading.Condition()
         self._thread: threading.Thread | None = None
-        self._input: Input | None = None
+        self._input: InputT | None = None
         self._changed_at = -math.inf
-        self._computed: Input | None = None
-        self._result: Result | None = None
+        self._computed: InputT | None = None
+        self._result: ResultT | None = None
         self._is_closed = False
 
-    def submit(self, given: Input) -> None:
+    def submit(self, given: InputT) -> None:
         """Have a result computed, unless this object was submitted last. Cheap: for every frame."""
         if given is self._input or self._is_closed:
             return
@@ -47,7 +47,7 @@ class LatestJob(Generic[Input, Result]):
             self._input = self._computed = self._result = None
 
     @property
-    def result(self) -> Result | None:
+    def result(self) -> ResultT | None:
         """Latest result, also of a former input (`is_current`); None before the first."""
         return self._result
 
@@ -69,7 +69,7 @@ class LatestJob(Generic[Input, Result]):
                 if self._input is not None:
                     self._computed, self._result = given, result
 
-    def _next_input(self) -> Input | None:
+    def _next_input(self) -> InputT | None:
         """Wait for an input that has not changed for the delay, and return it; None after `close`."""
         with self._condition:
             while not self._is_closed:
