@@ -5,14 +5,17 @@ draft is a valid scene at all times: a change that would give faults is refused 
 before, to the byte.
 """
 
+import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from sandbox.atomic_write import atomic_write
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.game_tables import PRESETS
+from sandbox.scene.description.base import Part
+from sandbox.scene.description.game_tables import PRESETS, game_table
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import SceneText, dumps, too_large
 from sandbox.scene.files.shipped_scenes import PACKAGE
@@ -46,6 +49,8 @@ class DraftState:
 
     text: str
     scene: Scene
+    document: dict[str, Any]
+    """the text as parsed TOML"""
     preset: str | None
     """heading of the preset that makes the scene"""
     label: str = ""
@@ -60,7 +65,7 @@ class DraftState:
         """
         source = SceneText.of(text, "<scene>" if path is None else path.name)
         preset = next((key for key in PRESETS if key in source.document), None)
-        return cls(text, source.scene(), preset, label)
+        return cls(text, source.scene(), source.document, preset, label)
 
 
 class SceneDraft:
@@ -116,6 +121,19 @@ class SceneDraft:
     def scene(self) -> Scene:
         """The present scene."""
         return self._now.scene
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The present text as parsed TOML; must not be changed in place."""
+        return self._now.document
+
+    @property
+    def preset_table(self) -> tuple[str, Part] | None:
+        """Heading of the preset that makes the scene, and its table; None without one."""
+        heading = self.preset
+        if heading is None:
+            return None
+        return heading, game_table(heading).model.model_validate_json(json.dumps(self.document[heading]), by_alias=True)
 
     @property
     def saved_text(self) -> str | None:

@@ -4,21 +4,23 @@ Text typed by a user may be an expression, such as `2*pi`, `1/60` or `45 deg`; i
 """
 
 import ast
+import json
 import math
 import operator
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from types import NoneType
 from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, StringConstraints
+from pydantic.fields import FieldInfo
 
 from sandbox.scene.description.base import Colour, Name
 from sandbox.scene.files.json_schema import described
 
-FieldKind = Literal["number", "integer", "text", "choice", "flag", "numbers", "name", "other"]
+FieldKind = Literal["number", "integer", "text", "choice", "flag", "numbers", "name", "list", "either", "other"]
 
 MAX_TYPED = 200
 """Largest length of the text of a number or of each component; also limits the depth of expressions."""
@@ -31,9 +33,10 @@ class FieldSpec:
     """A key of a table of a scene file."""
 
     key: str
-    """key in the file"""
+    """key in the file; of a table within the table with a dot, such as `kick.speed`"""
     kind: FieldKind
-    """`numbers`: array of a fixed length; `name`: name of an element, material or layer; `other`: no kind of text"""
+    """`numbers`: array of a fixed length; `name`: name of an element, material or layer; `list`: texts or points;
+    `either`: one of several kinds, as a point or a name; `other`: no kind of text, as lists of tables"""
     length: int
     """number of components of `numbers`; 0 for others"""
     choices: tuple[str, ...]
@@ -58,52 +61,78 @@ class FieldSpec:
     """regular expression of a text; "" without one"""
     max_length: int | None = None
     """largest number of characters of a text; None without a limit"""
-    rows: int = 0
-    """number of points, if the components of `numbers` are those of points, as of a pair of anchors; 0 for others"""
+    item: "FieldSpec | None" = None
+    """spec of each item of a `list` or of `numbers`"""
+    min_items: int = 0
+    """smallest length of a `list`"""
+    max_items: int | None = None
+    """largest length of a `list`; None without a limit"""
+    alternatives: tuple["FieldSpec", ...] = ()
+    """specs of the kinds of an `either`"""
 
 
 @cache
 def fields_of(model: type[BaseModel]) -> tuple[FieldSpec, ...]:
-    """Return the fields of a model of a table, in the order of the model."""
+    """Return the fields of a model of a table, in the order of the model, those of tables within it in their place."""
     properties = model.model_json_schema(by_alias=True)["properties"]
     descriptions = {name: " ".join(text.split()) for name, text in described(model).items()}
-    found = []
+    found: list[FieldSpec] = []
     for name, field in model.model_fields.items():
         key = field.alias or name
+        inner = inner_model(field)
+        if inner is not None:
+            found += [replace(spec, key=f"{key}.{spec.key}", is_required=False) for spec in fields_of(inner)]
+            continue
         default = None if field.is_required() else field.get_default(call_default_factory=True)
         is_optional = not field.is_required() and (default is None or NoneType in get_args(field.annotation))
-        found.append(_spec(key, properties[key], default, descriptions.get(name, ""), is_optional, field.is_required()))
+        spec = _spec(key, properties[key], descriptions.get(name, ""))
+        found.append(replace(spec, default=default, is_optional=is_optional, is_required=field.is_required()))
     return tuple(found)
 
 
-def _spec(
-    key: str, schema: dict[str, Any], default: Any, description: str, is_optional: bool, is_required: bool
-) -> FieldSpec:
+def inner_model(field: FieldInfo) -> type[BaseModel] | None:
+    """Return the model of a field that is a table, which may be left out; None for other fields."""
+    types = [each for each in get_args(field.annotation) or (field.annotation,) if each is not NoneType]
+    is_table = len(types) == 1 and isinstance(types[0], type) and issubclass(types[0], BaseModel)
+    return types[0] if is_table else None
+
+
+def _spec(key: str, schema: dict[str, Any], description: str) -> FieldSpec:
+    """Return the spec of a required field with a JSON schema."""
     alternatives = [each for each in schema.get("anyOf", [schema]) if each.get("type") != "null"]
-    value = alternatives[0] if len(alternatives) == 1 else {}
-    components = value.get("prefixItems", ())
+    specs = [_spec_of_kind(key, each, description) for each in alternatives]
+    if len(specs) == 1:
+        return specs[0]
+    kind: FieldKind = "other" if any(spec.kind == "other" for spec in specs) else "either"
+    return FieldSpec(key, kind, 0, (), False, None, True, None, None, "", description, alternatives=tuple(specs))
+
+
+def _spec_of_kind(key: str, value: dict[str, Any], description: str) -> FieldSpec:
+    """Return the spec of a field with a single kind of values."""
     kind, choices = _kind(value)
-    rows = len(components) if kind == "numbers" and components[0]["type"] == "array" else 0
-    if rows:
-        components = [number for point in components for number in point["prefixItems"]]
+    components = value.get("prefixItems", ())
     number = components[0] if kind == "numbers" else value if kind in ("number", "integer") else {}
+    is_array = kind in ("list", "numbers")
+    item = _spec_of_kind(key, value.get("items") or components[0], description) if is_array else None
     return FieldSpec(
         key,
         kind,
         len(components) if kind == "numbers" else 0,
         choices,
-        is_optional,
-        default,
-        is_required,
+        False,
+        None,
+        True,
         number.get("minimum", number.get("exclusiveMinimum")),
         number.get("maximum", number.get("exclusiveMaximum")),
-        unit_of(description) if number else "",
+        unit_of(description) if number else item.unit if item else "",
         description,
         "exclusiveMinimum" in number,
         "exclusiveMaximum" in number,
         value.get("pattern", "") if kind in ("text", "name") else "",
         value.get("maxLength") if kind in ("text", "name") else None,
-        rows,
+        item,
+        value.get("minItems", 0) if kind == "list" else 0,
+        value.get("maxItems") if kind == "list" else None,
     )
 
 
@@ -114,6 +143,8 @@ def _pattern_of(annotated: Any) -> str | None:
     return str(constraints.pattern)
 
 
+_ITEM_KINDS = ("text", "name", "choice", "number", "numbers", "list")
+"""Kinds of the items of a `list`"""
 _NAME_PATTERN, _COLOUR_PATTERN = _pattern_of(Name), _pattern_of(Colour)
 
 
@@ -133,9 +164,11 @@ def _kind(schema: dict[str, Any]) -> tuple[FieldKind, tuple[str, ...]]:
         case {"type": "string"}:
             return ("name" if schema.get("pattern") == _NAME_PATTERN else "text"), ()
         case {"type": "array", "prefixItems": [first, *others], "minItems": int(least), "maxItems": int(most)}:
-            is_uniform = all(each == first for each in others) and least == most
-            if is_uniform and (first.get("type") == "number" or _kind(first)[0] == "numbers"):
-                return "numbers", ()
+            if least == most and all(each == first for each in others):
+                kind = _kind(first)[0]
+                return "numbers" if kind in ("number", "integer") else "list" if kind in _ITEM_KINDS else "other", ()
+        case {"type": "array", "items": dict(item)} if _kind(item)[0] in _ITEM_KINDS:
+            return "list", ()
     return "other", ()
 
 
@@ -159,8 +192,9 @@ def parse(spec: FieldSpec, text: str) -> Any:
     """Return the value for the file of a text typed by the user; None if the key is to be left out.
 
     Empty text leaves out a key that is not required. Numbers may be expressions of + - * / ** and brackets, with `pi`,
-    `tau`, `deg` (π/180), `sqrt`, `sin` and `cos`. Arrays may be in square brackets. Numbers in a `number` or `numbers`
-    are floats, arrays are lists.
+    `tau`, `deg` (π/180), `sqrt`, `sin` and `cos`. Arrays may be in square brackets; `[]` is an empty list. Semicolons
+    stand between points, commas between texts; a text with a comma is in double quotes. Numbers in a `number` or
+    `numbers` are floats, unless the model wants integers; arrays are lists.
 
     Raises:
         ValueError: the text is no valid value; the message says what would be right. Values of kind `other` have no
@@ -186,6 +220,10 @@ def parse(spec: FieldSpec, text: str) -> Any:
             if typed not in ("true", "false"):
                 raise ValueError(f"must be true or false, is {_shortened(typed)}")
             return typed == "true"
+        case "list":
+            return _parse_list(spec, typed)
+        case "either":
+            return _parse_either(spec, typed)
     return _parse_text(spec, typed)
 
 
@@ -198,21 +236,67 @@ def _parse_text(spec: FieldSpec, typed: str) -> str:
     return typed
 
 
-def _parse_numbers(spec: FieldSpec, typed: str) -> list[Any]:
-    """Return a list of numbers, or of points, between which a semicolon may stand."""
-    if spec.rows:
-        typed = typed.replace(";", ",").replace("[", "").replace("]", "")
-    elif typed.startswith("[") and typed.endswith("]"):
+def _parse_numbers(spec: FieldSpec, typed: str) -> list[float]:
+    if typed.startswith("[") and typed.endswith("]"):
         typed = typed[1:-1]
     parts = [part.strip() for part in typed.split(",")]
     if len(parts) != spec.length or not all(parts):
         given = sum(bool(part) for part in parts)
         raise ValueError(f"must be {spec.length} numbers with commas between them, has {given}")
-    numbers = [_parse_number(spec, part) for part in parts]
-    if not spec.rows:
-        return numbers
-    width = spec.length // spec.rows
-    return [numbers[k : k + width] for k in range(0, spec.length, width)]
+    assert spec.item is not None
+    return [_parse_number(spec.item, part) for part in parts]
+
+
+def _parse_list(spec: FieldSpec, typed: str) -> list[Any]:
+    """Return a list of points, with semicolons or brackets between them, or of texts."""
+    assert spec.item is not None
+    is_of_arrays = spec.item.kind in ("numbers", "list")
+    parts = [] if typed == "[]" else _points(typed) if is_of_arrays else _texts(typed)
+    items = [parse(spec.item, part) for part in parts]
+    is_fixed = spec.min_items == spec.max_items
+    if len(items) < spec.min_items or (spec.max_items is not None and len(items) > spec.max_items):
+        noun = "points, with semicolons between them" if is_of_arrays else "of them, with commas between"
+        is_short = len(items) < spec.min_items
+        bound = "" if is_fixed else "at least " if is_short else "at most "
+        raise ValueError(f"must have {bound}{spec.min_items if is_short else spec.max_items} {noun}, has {len(items)}")
+    return items
+
+
+def _points(typed: str) -> list[str]:
+    """Return the texts of points: `0, 0; 1, 2` or `[[0, 0], [1, 2]]`."""
+    joined = re.sub(r"\]\s*,?\s*\[", ";", typed)
+    return [part for each in joined.split(";") if (part := each.strip("[] \t"))]
+
+
+_TEXT_ITEM = re.compile(r'\s*(?:("(?:[^"\\]|\\.)*")\s*|([^,"][^,]*))(?:,|$)')
+
+
+def _texts(typed: str) -> list[str]:
+    """Return texts with commas between them; those in double quotes may contain commas."""
+    if typed.startswith("[") and typed.endswith("]"):
+        typed = typed[1:-1]
+    found, position = [], 0
+    while position < len(typed):
+        match = _TEXT_ITEM.match(typed, position)
+        if match is None:
+            raise ValueError("must be texts with commas between them; one with a comma is in double quotes")
+        try:
+            found.append(json.loads(match[1]) if match[1] else match[2].strip())
+        except ValueError:
+            raise ValueError(f"must be a text in double quotes, is {_shortened(match[1])}") from None
+        position = match.end()
+    return found
+
+
+def _parse_either(spec: FieldSpec, typed: str) -> Any:
+    """Return the value of the first kind whose text it is."""
+    errors = []
+    for alternative in spec.alternatives:
+        try:
+            return parse(alternative, typed)
+        except ValueError as error:
+            errors.append(str(error))
+    raise ValueError(", or ".join(dict.fromkeys(errors)))
 
 
 def _parse_number(spec: FieldSpec, typed: str) -> float:
@@ -335,14 +419,36 @@ def format_value(spec: FieldSpec, value: Any) -> str:
         case "number" | "integer":
             return format_number(value)
         case "numbers":
-            if spec.rows:
-                return "; ".join(", ".join(map(format_number, point)) for point in value)
             return ", ".join(map(format_number, value))
         case "flag":
             return "true" if value else "false"
+        case "list":
+            return _format_list(spec, value)
+        case "either":
+            return format_value(_alternative_of(spec, value), value)
         case "other":
             return summary(value)
     return str(value)
+
+
+def _format_list(spec: FieldSpec, items: Sequence[Any]) -> str:
+    assert spec.item is not None
+    if not items:
+        return "[]"
+    if spec.item.kind in ("numbers", "list"):
+        return "; ".join(format_value(spec.item, item) for item in items)
+    if spec.item.kind == "number":
+        return ", ".join(map(format_number, items))
+    return ", ".join(
+        json.dumps(item, ensure_ascii=False) if item != item.strip() or re.search(r'[,"\[\]]', item) else item
+        for item in items
+    )
+
+
+def _alternative_of(spec: FieldSpec, value: Any) -> FieldSpec:
+    """Return the kind of an `either` that a value has."""
+    kinds = ("text", "name", "choice") if isinstance(value, str) else ("list", "numbers")
+    return next(each for each in spec.alternatives if each.kind in kinds)
 
 
 def format_number(value: float) -> str:

@@ -12,14 +12,14 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import ElementKey, differ_in_places_only
+from sandbox.scene.editing.elements import differ_in_places_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
 from sandbox.window.editor.draw_gestures import OutlineGesture
 from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, TYPED
 from sandbox.window.editor.editor import Editor
-from sandbox.window.editor.element_properties import property_sections
+from sandbox.window.editor.element_properties import location_of, property_sections
 from sandbox.window.editor.gestures import ViewScale
 from sandbox.window.editor.ghost_path import GhostPredictor
 from sandbox.window.editor.live_check import LiveCheck
@@ -75,7 +75,7 @@ class EditView:
         self.toolbar, self.actions = Toolbar(TOOLS), Toolbar(ACTIONS)
         self.panel = PropertyPanel(context.surface.get_size(), context.gui.ui_scale)
         self.panel.on_change = self._set_property
-        self.panel.on_remove = self._remove_section
+        self.panel.on_remove, self.panel.on_add = self._remove_section, self._add_section
         self.prompt: PathPrompt | None = None
         self.autosave, self._folder = Autosave(draft, folder), folder
         self.recovered: RecoveredText | None = recoverable(draft.path, folder)
@@ -359,17 +359,17 @@ class EditView:
         kind, _, which = section.partition(":")
         if kind == "selection":
             found = self.editor.set_property([key for key in self.editor.selection if key.table == which], field, value)
-        elif which:
-            found = self.editor.set_property([ElementKey(kind, int(which))], field, value)
         else:
-            found = self.editor.set_property("" if section == "scene" else section, field, value)
+            found = self.editor.set_value(location_of(section), field, value)
         self._note_unsaved()
         return found
 
     def _remove_section(self, section: str) -> None:
-        """Remove the material, or the pair of materials, of a section."""
-        table, _, index = section.partition(":")
-        self.editor.remove_material(ElementKey(table, int(index)))
+        self.editor.remove_table(location_of(section))
+        self._note_unsaved()
+
+    def _add_section(self, section: str) -> None:
+        self.editor.add_material() if section == "material" else self.editor.add_pair()
         self._note_unsaved()
 
     # --- Drawing -------------------------------------------------------------------------------------------------
@@ -463,7 +463,7 @@ class EditView:
         note = ""
         if editor.is_locked:
             note = f"[{self.draft.preset}] makes this scene. Ctrl+Shift+X replaces it by its elements, to edit them."
-        self.panel.show(property_sections(self.draft.scene, editor.selection), note)
+        self.panel.show(property_sections(self.draft.scene, editor.selection, self.draft.preset_table), note)
         self._note_unsaved()
 
     def _draw_status(self, surface: pygame.Surface, area: pygame.Rect) -> None:

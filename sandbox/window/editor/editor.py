@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from itertools import combinations_with_replacement
 from typing import Any, Literal
 
 from sandbox.scene.compile.generators import GeneratorError
@@ -14,6 +15,7 @@ from sandbox.scene.editing.elements import (
     all_elements,
     all_names,
     bodies_of,
+    element_of_body,
     exists,
     material_users,
     name_of,
@@ -23,7 +25,7 @@ from sandbox.scene.editing.elements import (
 )
 from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
 from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, transformation
-from sandbox.scene.errors import SceneError
+from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import (
     AddElement,
     Change,
@@ -42,6 +44,7 @@ from sandbox.window.editor.draw_gestures import (
     PlaneGesture,
     default_size,
 )
+from sandbox.window.editor.drive_tools import PlungerGesture, flipper_changes
 from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
 from sandbox.window.editor.gestures import (
     Gesture,
@@ -182,6 +185,8 @@ class Editor:
             self._erase(point, view)
         elif self.tool == "attraction":
             self._add_attraction(point, view, control)
+        elif self.tool == "flipper":
+            self._add_flipper(point, view, control)
         else:
             try:
                 self.gesture = self._new_gesture(point, view, control)
@@ -197,6 +202,24 @@ class Editor:
         if self.apply(attraction_changes(scene, name, at, point, view.size), "add an attraction"):
             self.selection = [ElementKey("attraction", count)]
         self._pressed = self.snapped = None
+
+    def _add_flipper(self, point: Point, view: ViewScale, control: bool) -> None:
+        scene, tolerance = self.draft.scene, view.metres(PICK_REACH)
+        name, hinge = unique_name("flipper", all_names(scene)), self._snap(point, view, control)
+        try:
+            changes = flipper_changes(scene, name, hinge, point, tolerance)
+        except PlacementError as error:
+            self._notify(str(error), "warning")
+        else:
+            if self.apply(changes, "add a flipper"):
+                self._select_driven(name)
+        self._pressed = self.snapped = None
+
+    def _select_driven(self, drive: str) -> None:
+        """Select the body of a drive, whose properties then show both."""
+        scene = self.draft.scene
+        body = next(each.body for each in scene.drives if each.name == drive)
+        self.selection = [element_of_body(scene, scene.bodies.number_of[body])]
 
     def _press_select(self, point: Point, view: ViewScale, shift: bool) -> None:
         scene, handle = self.draft.scene, self.handle_at(point, view)
@@ -224,6 +247,9 @@ class Editor:
         if tool in JOINT_KINDS:
             end = JointEnd(point, self._snap(point, view, control))
             return JointGesture(scene, tool, unique_name(tool, all_names(scene)), end, tolerance)
+        if tool == "plunger":
+            start = self._snap(point, view, control)
+            return PlungerGesture(scene, unique_name(tool, all_names(scene)), point, start, tolerance)
         if tool == "thrust":
             return ThrustGesture(scene, unique_name(tool, all_names(scene)), point, tolerance)
         point = self._snap(point, view, control)
@@ -344,6 +370,8 @@ class Editor:
             return True
         if not changes or not self.apply(changes, gesture.label):
             return False
+        if isinstance(gesture, PlungerGesture):
+            self._select_driven(gesture.name)
         if selects is not None:
             self.selection = [key for key in selects if exists(self.draft.scene, key)]
         return True
@@ -538,31 +566,44 @@ class Editor:
 
     # --- Properties ----------------------------------------------------------------------------------------------
 
-    def set_property(self, keys: Collection[ElementKey] | str, name: str, value: Any) -> str | None:
-        """Set a key of elements, or of a single table; return the message of a fault, or None.
+    def set_property(self, keys: Collection[ElementKey], name: str, value: Any) -> str | None:
+        """Set a key of elements; return the message of a fault, or None.
 
         Args:
-            keys: the elements, or the heading of a single table, such as `world`.
-            name: the key.
+            keys: the elements.
+            name: the key; of a table within the element with a dot, such as `kick.speed`.
             value: the new value; None removes the key.
         """
         scene = self.draft.scene
         changes: list[Change] = []
-        if isinstance(keys, str):
-            location: tuple[str | int, ...] = (keys, name) if keys else (name,)
-            changes = [RemoveValue(location) if value is None else SetValue(location, value)]
-            label = f"set {name}"
-        else:
-            label = f"set {name} of {_count(list(keys))}"
-            for key in keys:
-                if name == "material" and value is not None and value not in {m.name for m in scene.materials}:
-                    changes += [] if changes else [AddElement("material", {"name": value})]  # a new one
-                if name == "name" and value is not None:
-                    changes += renaming(scene, key, value if len(keys) == 1 else unique_name(value, all_names(scene)))
-                else:
-                    changes.append(
-                        RemoveValue((*key.location, name)) if value is None else SetValue((*key.location, name), value)
-                    )
+        for key in keys:
+            if name == "material" and value is not None and value not in {m.name for m in scene.materials}:
+                changes += [] if changes else [AddElement("material", {"name": value})]  # a new one
+            if name == "name" and value is not None:
+                changes += renaming(scene, key, value if len(keys) == 1 else unique_name(value, all_names(scene)))
+            else:
+                changes.append(self._setting(key.location, name, value))
+        return self._change_property(changes, f"set {name} of {_count(list(keys))}")
+
+    def set_value(self, location: Location, name: str, value: Any) -> str | None:
+        """Set a key of a table at a location, as `set_property` does; an empty location is the scene itself."""
+        if len(location) == 2 and isinstance(location[1], int):
+            return self.set_property([ElementKey(str(location[0]), location[1])], name, value)
+        return self._change_property([self._setting(location, name, value)], f"set {name}")
+
+    def _setting(self, location: Location, name: str, value: Any) -> Change:
+        """Return the change that sets a key, or removes it, with a table within the table that has no other key."""
+        path = (*location, *name.split("."))
+        if value is not None:
+            return SetValue(path, value)
+        table: Any = self.draft.document
+        for key in path[:-1]:
+            table = table.get(key, {}) if isinstance(table, dict) else table[key]
+        is_last = len(path) > len(location) + 1 and set(table) <= {path[-1]}
+        return RemoveValue(path[:-1] if is_last else path)
+
+    def _change_property(self, changes: Sequence[Change], label: str) -> str | None:
+        """Apply the changes of a property; return the message of a fault, or None."""
         try:
             self.draft.change(changes, label)
         except SceneError as error:
@@ -573,9 +614,13 @@ class Editor:
         self.fault = None
         return None
 
-    def remove_material(self, key: ElementKey) -> None:
-        """Remove a material that no element has, or a pair of materials."""
+    def remove_table(self, location: Location) -> None:
+        """Remove a table, such as `[surface]`, a part of a rigid body, or a material that no element has."""
         scene = self.draft.scene
+        if len(location) != 2 or not isinstance(location[1], int):
+            self.apply([RemoveValue(location)], f"remove {location[-2] if len(location) > 2 else location[-1]}")
+            return
+        key = ElementKey(str(location[0]), location[1])
         users = material_users(scene, name_of(scene, key)) if key.table == "material" else []
         if users:
             more = f" and {len(users) - 1} more" if len(users) > 1 else ""
@@ -583,6 +628,25 @@ class Editor:
             self._notify(f"material {name_of(scene, key)} is used by {user}{more}", "warning")
             return
         self.apply([RemoveElement(key.table, key.index)], f"remove a {key.table}")
+
+    def add_material(self) -> None:
+        """Add a material with a new name."""
+        self.apply(
+            [AddElement("material", {"name": unique_name("material", all_names(self.draft.scene))})], "add a material"
+        )
+
+    def add_pair(self) -> None:
+        """Add coefficients of the first two materials, or of one with itself, that have none yet."""
+        scene = self.draft.scene
+        known = {frozenset(pair.between) for pair in scene.pairs}
+        names = sorted(
+            combinations_with_replacement([each.name for each in scene.materials], 2), key=lambda two: two[0] == two[1]
+        )
+        free = next((list(two) for two in names if frozenset(two) not in known), None)
+        if free is None:
+            self._notify("all pairs of materials have coefficients", "info")
+            return
+        self.apply([AddElement("pair", {"between": free})], "add a pair")
 
 
 def _count(keys: Sequence[ElementKey]) -> str:

@@ -1,53 +1,124 @@
 """Sections of the property panel: the fields of the selected elements, or of the scene."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
-from sandbox.scene.editing.elements import ElementKey, element_at, name_of, table_values
+from sandbox.scene.description.surface import Floor
+from sandbox.scene.editing.elements import ElementKey, body_names, element_at, elements_of_table, name_of, table_values
 from sandbox.scene.editing.fields import fields_of
+from sandbox.scene.errors import Location
 from sandbox.window.editor.property_panel import PropertyRow, PropertySection
 
+ATTACHED_TABLES = ("drive", "shot")
+"""Elements without a place of their own, which are shown with their body"""
 
-def property_sections(scene: Scene, selection: Sequence[ElementKey]) -> list[PropertySection]:
+
+def property_sections(
+    scene: Scene, selection: Sequence[ElementKey], preset: tuple[str, Part] | None = None
+) -> list[PropertySection]:
     """Return a section for the selected elements of each table; without a selection, those of the scene.
 
-    The key of a section is `selection:TABLE`, `scene`, the heading of a single table, `material:INDEX` or
-    `pair:INDEX`.
+    The key of a section is `selection:TABLE`, `scene`, or the location of a table, such as `world` or `material:3`.
+    Tables within tables, such as the parts of a rigid body, have sections of their own.
+
+    Args:
+        scene: the scene.
+        selection: the selected elements.
+        preset: heading of the preset that makes the scene, and its table.
     """
     if selection:
-        tables = dict.fromkeys(key.table for key in selection)
-        return [_section_of(scene, table, [key for key in selection if key.table == table]) for table in tables]
-    sections = [
-        PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about"))),
-        PropertySection("world", "world", _rows(type(scene.world), [scene.world])),
-        PropertySection("solver", "solver", _rows(type(scene.solver), [scene.solver])),
-    ]
+        return list(_sections_of_selection(scene, selection))
+    return list(_sections_of_scene(scene, preset))
+
+
+def location_of(section: str) -> Location:
+    """Return the location of the table that a section shows; empty for the scene itself."""
+    return tuple(int(key) if key.isdecimal() else key for key in section.split(":") if section != "scene")
+
+
+def _sections_of_selection(scene: Scene, selection: Sequence[ElementKey]) -> Iterator[PropertySection]:
+    for table in dict.fromkeys(key.table for key in selection):
+        keys = [key for key in selection if key.table == table]
+        title = f"{table} {name_of(scene, keys[0])}" if len(keys) == 1 else f"{len(keys)} × {table}"
+        elements = [element_at(scene, key) for key in keys]
+        yield PropertySection(title, f"selection:{table}", _rows(type(elements[0]), elements))
+    if len(selection) != 1:
+        return
+    (key,) = selection
+    yield from _sections_within(key.location, element_at(scene, key), is_open=True)
+    names = body_names(scene, key)
+    for table in ATTACHED_TABLES:
+        for index, element in enumerate(elements_of_table(scene, table)):
+            if getattr(element, "body", None) in names or getattr(element, "ball", None) in names:
+                other = ElementKey(table, index)
+                yield _section(other.location, f"{table} {name_of(scene, other)}", element, True, is_removable=True)
+
+
+def _sections_of_scene(scene: Scene, preset: tuple[str, Part] | None) -> Iterator[PropertySection]:
+    yield PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about")))
+    if preset is not None:
+        heading, table = preset
+        yield _section((heading,), heading, table, True)
+        yield from _sections_within((heading,), table)
+    yield _section(("world",), "world", scene.world, True)
+    yield _section(("solver",), "solver", scene.solver, True)
+    if preset is not None:
+        return  # it makes the other tables
+    if scene.surface is None:
+        yield PropertySection("surface (none)", "surface", _rows(Floor, []), False)
+    else:
+        yield _section(("surface",), "surface", scene.surface, False, is_removable=True)
+        yield _section(("contact_models",), "contact models", scene.contact_models, False)
+    yield _section(("play",), "play", scene.play, False)
+    yield from _sections_within(("play",), scene.play)
+    yield PropertySection("materials", "material", (), button="add")
     for k, material in enumerate(scene.materials):
-        rows = _rows(type(material), [material])
-        sections.append(PropertySection(f"material {material.name}", f"material:{k}", rows, False, is_removable=True))
+        yield _section(("material", k), f"material {material.name}", material, False, is_removable=True)
+    if scene.materials:
+        yield PropertySection("pairs of materials", "pair", (), button="add")
     for k, pair in enumerate(scene.pairs):
-        title = " and ".join(pair.between)
-        sections.append(PropertySection(title, f"pair:{k}", _rows(type(pair), [pair]), False, is_removable=True))
-    return sections
+        yield _section(("pair", k), " and ".join(pair.between), pair, False, is_removable=True)
 
 
-def _section_of(scene: Scene, table: str, keys: Sequence[ElementKey]) -> PropertySection:
-    """Return the section of the selected elements of a table."""
-    title = f"{table} {name_of(scene, keys[0])}" if len(keys) == 1 else f"{len(keys)} × {table}"
-    elements = [element_at(scene, key) for key in keys]
-    return PropertySection(title, f"selection:{table}", _rows(type(elements[0]), elements))
+def _section(
+    location: Location, title: str, part: Part, is_open: bool, *, is_removable: bool = False
+) -> PropertySection:
+    """Return the section of a single table."""
+    key, rows = ":".join(map(str, location)), _rows(type(part), [part])
+    return PropertySection(title, key, rows, is_open, "remove" if is_removable else "")
+
+
+def _sections_within(location: Location, part: Part, is_open: bool = False) -> Iterator[PropertySection]:
+    """Yield the sections of the tables within a table that are in lists, or of a game."""
+    for name, field in type(part).model_fields.items():
+        key, value = field.alias or name, getattr(part, name)
+        if isinstance(value, tuple) and value and isinstance(value[0], Part):
+            for k, each in enumerate(cast("tuple[Part, ...]", value)):
+                title = f"{key} {getattr(each, 'name', None) or k + 1}"
+                yield _section((*location, key, k), title, each, is_open, is_removable=True)
+        elif isinstance(value, Part) and not any(spec.key.startswith(f"{key}.") for spec in fields_of(type(part))):
+            yield _section((*location, key), key, value, is_open, is_removable=True)
 
 
 def _rows(model: type[Part], parts: Sequence[Part], only: tuple[str, ...] = ()) -> tuple[PropertyRow, ...]:
-    """Return the rows of the fields that all parts have."""
+    """Return the rows of the fields that all parts have; of the model without parts. Lists of tables have none."""
     values = [table_values(part) for part in parts]
-    common = set.intersection(*({spec.key for spec in fields_of(type(part))} for part in parts))
     rows = []
     for spec in fields_of(model):
-        if spec.key not in common or (only and spec.key not in only):
+        is_list = spec.kind == "other" and not spec.default and not isinstance(spec.default, dict)
+        if is_list or (only and spec.key not in only):
             continue
-        found = [each.get(spec.key) for each in values]
-        is_mixed = any(value != found[0] for value in found)
-        rows.append(PropertyRow(spec, None if is_mixed else found[0], is_mixed))
+        if all(any(spec.key == other.key for other in fields_of(type(part))) for part in parts):
+            found = [_value_of(each, spec.key) for each in values]
+            is_mixed = any(value != found[0] for value in found)
+            rows.append(PropertyRow(spec, None if is_mixed or not found else found[0], is_mixed))
     return tuple(rows)
+
+
+def _value_of(values: dict[str, Any], key: str) -> Any:
+    """Return the value of a field, which may be in a table within the table; None if it is left out."""
+    outer, _, inner = key.partition(".")
+    value = values.get(outer)
+    return value if not inner else value.get(inner) if isinstance(value, dict) else None

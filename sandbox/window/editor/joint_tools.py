@@ -12,12 +12,16 @@ from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
 from sandbox.window.editor.picking import bodies_at, to_body
 
-JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor")
+JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor", "slide", "groove", "gear")
 """Joints that have a tool; a rope is a `slide` whose lower limit is 0"""
 ONE_CLICK = ("pivot", "motor")
 """Joints of the bodies that lie on each other at one point"""
 SPRING_FREQUENCY, SPRING_DAMPING_RATIO = 2.0, 0.1
 """Hz and fraction of critical damping of a new spring with its lighter body"""
+SLIDE_FRACTION = 0.5
+"""Lower limit of a new slide, as a fraction of its length"""
+MESHING_REACH = 1.1
+"""Gears whose distance is at most this multiple of the sum of their radii mesh; others are joined by a belt"""
 MOTOR_RATE = 2.0 * math.pi
 """rad/s of a new motor: a revolution per second"""
 MOTOR_TORQUE_FACTOR = 20.0
@@ -56,6 +60,8 @@ def joint_changes(
     """
     if kind in ONE_CLICK:
         return _at_one_point(scene, kind, first, tolerance, name)
+    if kind == "groove":
+        return _groove(scene, first, second, tolerance, name)
     one, other = (next(iter(bodies_at(scene, end.click, tolerance)), None) for end in (first, second))
     if one is None and other is None:
         raise PlacementError("a joint needs a body: click a body, and then another one or the world")
@@ -66,17 +72,54 @@ def joint_changes(
         raise PlacementError("both ends are on the same body; click another body or the world")
     if other is None and scene.bodies.fixed[one]:
         raise PlacementError("a fixed body needs no joint to the world; click a body that moves")
+    if kind == "gear":
+        return _gear(scene, one, other, name)
     names, changes = _names(scene, [one] if other is None else [one, other])
     anchors = [to_body(scene, scene.bodies.names[one], first.anchor)]
     anchors.append(second.anchor if other is None else to_body(scene, scene.bodies.names[other], second.anchor))
     values: dict[str, Any] = {"name": name, "kind": "slide" if kind == "rope" else kind, "between": names}
     values["anchors"] = [[round_value(x) for x in anchor] for anchor in anchors]
     distance = round_value(math.dist(first.anchor, second.anchor))
-    if kind == "rope":
+    if kind == "slide":
+        values["least"] = round_value(SLIDE_FRACTION * distance)
+    if kind in ("slide", "rope"):
         values["most"] = distance
     if kind == "spring":
         stiffness, damping = _spring(scene, [one] if other is None else [one, other])
         values |= {"stiffness": stiffness, "damping": damping}
+    return [*changes, AddElement("joint", values)]
+
+
+def _gear(scene: Scene, one: int, other: int | None, name: str) -> list[Change]:
+    """Return the changes that join the rotation of two bodies: gears that mesh if they are near, or else a belt."""
+    if other is None:
+        raise PlacementError("a gear needs two bodies: click one, and then the other")
+    names, changes = _names(scene, [one, other])
+    radii = float(scene.bodies.radius[one]), float(scene.bodies.radius[other])
+    distance = math.dist(scene.bodies.position[one], scene.bodies.position[other])
+    ratio = radii[1] / radii[0] if min(radii) > 0.0 else 1.0
+    if distance <= MESHING_REACH * sum(radii):
+        ratio = -ratio
+    values = {"name": name, "kind": "gear", "between": names, "ratio": round_value(ratio)}
+    return [*changes, AddElement("joint", values)]
+
+
+def _groove(scene: Scene, first: JointEnd, second: JointEnd, tolerance: float, name: str) -> list[Change]:
+    """Return the changes that let a body slide along a line, which belongs to the body below it or to the world."""
+    found = bodies_at(scene, first.click, tolerance)[:2]
+    if not found:
+        raise PlacementError("a groove needs a body that slides: click it, and then the other end of its groove")
+    slider, carrier = found[0], found[1] if len(found) == 2 else None
+    if scene.bodies.fixed[slider]:
+        raise PlacementError("a fixed body cannot slide; click a body that moves")
+    if math.dist(first.anchor, second.anchor) == 0.0:
+        raise PlacementError("a groove needs a length: click its other end")
+    bodies = [slider] if carrier is None else [carrier, slider]
+    names, changes = _names(scene, bodies)
+    ends = [end if carrier is None else to_body(scene, names[0], end) for end in (first.anchor, second.anchor)]
+    values: dict[str, Any] = {"name": name, "kind": "groove", "between": names}
+    values["groove"] = [[round_value(x) for x in end] for end in ends]
+    values["anchor"] = [round_value(x) for x in to_body(scene, scene.bodies.names[slider], first.anchor)]
     return [*changes, AddElement("joint", values)]
 
 

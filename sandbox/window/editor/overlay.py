@@ -15,6 +15,7 @@ from sandbox.scene.description.surface import Pocket
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at, exists
 from sandbox.window.camera import Camera
 from sandbox.window.editor.draw_gestures import OutlineGesture
+from sandbox.window.editor.drive_tools import PlungerGesture
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.force_tools import ACCELERATION_PER_METRE, ThrustGesture
 from sandbox.window.editor.gestures import SelectGesture, ViewScale
@@ -183,7 +184,7 @@ def _draw_gesture(surface: pygame.Surface, camera: Camera, editor: Editor, view:
         for x, y in pixels[:-1]:
             _draw_dot(surface, (x, y), 4 * unit, SKY)
         _draw_dot(surface, (pixels[0][0], pixels[0][1]), 6 * unit, INK, 4 * unit)
-    elif isinstance(gesture, ThrustGesture):
+    elif isinstance(gesture, ThrustGesture | PlungerGesture):
         a, b = camera.to_screen(np.asarray((gesture.begin, gesture.end))).tolist()
         draw_arrow(surface, (a[0], a[1]), (b[0], b[1]), ORANGE, 3.0 * unit, edge=BACKGROUND)
     elif isinstance(gesture, JointGesture):

@@ -6,11 +6,11 @@ Rows are positions and values, not widgets: a scene has hundreds of them, and on
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import pygame
 
-from sandbox.scene.editing.fields import FieldSpec, format_value, parse
+from sandbox.scene.editing.fields import FieldSpec, format_value, parse, summary
 from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import (
     BACKGROUND,
@@ -36,8 +36,10 @@ LEFT_OUT, MIXED = "–", "…"
 """Text of a field without a value, and of one whose values differ."""
 DIMMED: RgbColour = mix_colours(FAINT, BACKGROUND, 0.15)
 """Colour of defaults and units."""
-TYPED_KINDS = frozenset({"number", "integer", "text", "numbers", "name"})
+TYPED_KINDS = frozenset({"number", "integer", "text", "numbers", "name", "list", "either"})
 """Kinds of fields that are edited as text."""
+MAX_SHOWN_ITEMS, MAX_EDITED_ITEMS = 8, 200
+"""Longer lists are shown by their length, or are edited in the file or by their corners only."""
 _ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
 _MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
 
@@ -63,8 +65,8 @@ class PropertySection:
     rows: tuple[PropertyRow, ...]
     is_open: bool = True
     """whether it is initially unfolded"""
-    is_removable: bool = False
-    """whether its heading has a cross that removes what it shows"""
+    button: Literal["", "add", "remove"] = ""
+    """button of its heading: a plus that adds a table of its kind, or a cross that removes what it shows"""
 
 
 class RowId(NamedTuple):
@@ -126,6 +128,8 @@ class PropertyPanel:
         """(section key, field key, value; None removes the key); returns an error to be shown at the field, or None"""
         self.on_remove: Callable[[str], object] = _accept
         """(section key) called by the cross of a heading"""
+        self.on_add: Callable[[str], object] = _accept
+        """(section key) called by the plus of a heading"""
         self.size, self.ui_scale = size, ui_scale
         self._sections: tuple[PropertySection, ...] = ()
         self._note = ""
@@ -178,7 +182,7 @@ class PropertyPanel:
         rows = {RowId(section.key, row.spec.key): row for section in shown for row in section.rows}
         if self._editing is not None:
             row = rows.get(self._editing.row)
-            if row is None or row.spec.kind not in TYPED_KINDS:
+            if row is None or not _is_typed(row):
                 self._end_editing()
         self._rejected = {
             key: rejected
@@ -263,21 +267,21 @@ class PropertyPanel:
         left, width = self._column
         return pygame.Rect(self.size[0] - self.width + left, item.top - self._scroll, width, item.height)
 
-    def cross_of(self, section: str) -> pygame.Rect | None:
-        """Return the box of the cross of a heading in the window, px, which may be out of view; None without one."""
+    def button_of(self, section: str) -> pygame.Rect | None:
+        """Return the box of the button of a heading in the window, px, which may be out of view; None without one."""
         item = self._item_of(RowId(section, ""))
-        if item is None or not item.section.is_removable:
+        if item is None or not item.section.button:
             return None
-        return self._cross(item).move(self.size[0] - self.width, 0)
+        return self._button(item).move(self.size[0] - self.width, 0)
 
-    def _cross(self, item: PanelItem) -> pygame.Rect:
-        """Return the box of the cross of a heading on the sheet."""
+    def _button(self, item: PanelItem) -> pygame.Rect:
+        """Return the box of the button of a heading on the sheet."""
         left, width = self._column
         side = min(self._px(BOX_HEIGHT), width)
         return pygame.Rect(left + width - side, item.top - self._scroll + (item.height - side) // 2, side, side)
 
-    def _is_on_cross(self, item: PanelItem, at: tuple[int, int]) -> bool:
-        return item.row is None and item.section.is_removable and bool(self._cross(item).collidepoint(at))
+    def _is_on_button(self, item: PanelItem, at: tuple[int, int]) -> bool:
+        return item.row is None and bool(item.section.button) and bool(self._button(item).collidepoint(at))
 
     def _item_of(self, row_id: RowId) -> PanelItem | None:
         return next((item for item in self._items if item.row_id == row_id), None)
@@ -362,7 +366,7 @@ class PropertyPanel:
         here = self.focused
         if here is None or not self._apply():
             return
-        typed = [item for item in self._items if item.row is not None and item.row.spec.kind in TYPED_KINDS]
+        typed = [item for item in self._items if item.row is not None and _is_typed(item.row)]
         self._end_editing()
         index = next((k for k, item in enumerate(typed) if item.row_id == here), None)
         if index is not None:
@@ -489,9 +493,9 @@ class PropertyPanel:
         item = None if target is None else self._item_of(target)
         if item is None:
             return
-        if self._is_on_cross(item, at):
+        if self._is_on_button(item, at):
             if button == 1:
-                self.on_remove(item.section.key)
+                (self.on_add if item.section.button == "add" else self.on_remove)(item.section.key)
         elif item.row is None:
             if button == 1:
                 self._is_open[item.section.key] = not self.is_open(item.section.key)
@@ -499,7 +503,7 @@ class PropertyPanel:
         elif is_on_box and item.row.spec.kind in ("flag", "choice"):
             if button in (1, 3):
                 self._cycle(item, 1 if button == 1 else -1)
-        elif is_on_box and button == 1 and item.row.spec.kind in TYPED_KINDS:
+        elif is_on_box and button == 1 and _is_typed(item.row):
             self._start_editing(item)
 
     def _drag(self, at: tuple[int, int]) -> None:
@@ -548,8 +552,9 @@ class PropertyPanel:
     def _hint(self, row_id: RowId, pointer: tuple[int, int]) -> str:
         """Return the tooltip: at a label the description, after a truncated key; at a truncated value the whole."""
         item = self._item_of(row_id)
-        if item is not None and self._is_on_cross(item, pointer):
-            return f"remove {item.section.title}"
+        if item is not None and self._is_on_button(item, pointer):
+            is_add = item.section.button == "add"
+            return f"add a {item.section.key}" if is_add else f"remove {item.section.title}"
         if item is None or item.row is None or row_id == self.focused:
             return ""
         spec, box = item.row.spec, self._box(item)
@@ -604,25 +609,33 @@ class PropertyPanel:
         colour = INK if item.row_id == self._hovered else FAINT
         r = 3.5 * ui_scale
         x = left + r
-        if self.is_open(item.section.key):
+        if not item.section.rows:
+            corners = []
+        elif self.is_open(item.section.key):
             corners = [(x - r, y - 0.6 * r), (x + r, y - 0.6 * r), (x, y + 0.8 * r)]
         else:
             corners = [(x - 0.6 * r, y - r), (x - 0.6 * r, y + r), (x + 0.8 * r, y)]
-        pygame.draw.polygon(sheet, colour, corners)
+        if corners:
+            pygame.draw.polygon(sheet, colour, corners)
         # Titles contain names, which are case-sensitive, so that they are not in capitals as those of the side panel.
-        start = left + self._px(13)
+        start = left + (self._px(13) if corners else 0)
         size = 11.5 * ui_scale
-        if item.section.is_removable:
-            width -= self._cross(item).width
-            self._draw_cross(self._cross(item), colour)
+        if item.section.button:
+            width -= self._button(item).width
+            self._draw_button(self._button(item), item.section.button == "add", colour)
         title = ellipsis(item.section.title, size, width - self._px(30), bold=True)
         word = draw_text(sheet, title, (start, y), size, colour, "midleft", bold=True)
         if word.right + self._px(8) < left + width:
             pygame.draw.line(sheet, LINE, (word.right + self._px(8), y), (left + width, y), max(self._px(1), 1))
 
-    def _draw_cross(self, box: pygame.Rect, colour: RgbColour) -> None:
+    def _draw_button(self, box: pygame.Rect, is_plus: bool, colour: RgbColour) -> None:
+        """Draw a plus or a cross."""
         x, y = box.center
         arm, line_width = 3.5 * self.ui_scale, max(self._px(1.4), 1)
+        if is_plus:
+            pygame.draw.line(self._sheet, colour, (x - 1.3 * arm, y), (x + 1.3 * arm, y), line_width)
+            pygame.draw.line(self._sheet, colour, (x, y - 1.3 * arm), (x, y + 1.3 * arm), line_width)
+            return
         pygame.draw.line(self._sheet, colour, (x - arm, y - arm), (x + arm, y + arm), line_width)
         pygame.draw.line(self._sheet, colour, (x - arm, y + arm), (x + arm, y - arm), line_width)
 
@@ -630,7 +643,7 @@ class PropertyPanel:
         sheet, left, box = self._sheet, self._column[0], self._box(item)
         rejected = self._rejected.get(item.row_id)
         is_set = row.value is not None or row.is_mixed or row.spec.is_required
-        colour = INK if is_set and row.spec.kind != "other" else FAINT
+        colour = INK if is_set else FAINT
         draw_text(sheet, self._label(row.spec.key), (left, box.centery), LABEL_SIZE * self.ui_scale, colour, "midleft")
         if row.spec.kind == "flag":
             self._draw_check_box(item, row, box)
@@ -649,7 +662,9 @@ class PropertyPanel:
         if row.is_mixed:
             return MIXED, INK
         if row.value is not None:
-            return format_value(row.spec, row.value) or LEFT_OUT, INK if row.spec.kind != "other" else FAINT
+            if isinstance(row.value, list) and len(row.value) > MAX_SHOWN_ITEMS:
+                return summary(row.value), INK if _is_typed(row) else FAINT
+            return format_value(row.spec, row.value) or LEFT_OUT, INK
         return format_value(row.spec, row.spec.default) or LEFT_OUT, DIMMED
 
     def _draw_value(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
@@ -659,7 +674,7 @@ class PropertyPanel:
         text, colour = self._shown_text(row)
         if rejected is not None and rejected.text is not None:
             text, colour = rejected.text, INK
-        if row.spec.kind == "other":
+        if not _is_typed(row):
             text = ellipsis(text, size, self._room(row, box))
             draw_text(sheet, text, (box.left + pad, box.centery), size, colour, "midleft")
             return
@@ -735,6 +750,12 @@ class PropertyPanel:
         sample = pygame.Rect(box.left + self._px(6), box.centery - side // 2, side, side)
         pygame.draw.rect(self._sheet, pygame.Color(colour), sample, border_radius=self._px(2))
         return side + self._px(6)
+
+
+def _is_typed(row: PropertyRow) -> bool:
+    """Return whether the value of a row can be edited as text."""
+    is_long = isinstance(row.value, list) and len(row.value) > MAX_EDITED_ITEMS
+    return row.spec.kind in TYPED_KINDS and not is_long
 
 
 def _accept(*_: object) -> None:

@@ -124,6 +124,49 @@ def _motor(canvas: IconCanvas) -> None:
     canvas.disc(12, 12, 2.4)
 
 
+def _slide(canvas: IconCanvas) -> None:
+    canvas.line((3.5, 12), (9, 12), width=2.2)
+    canvas.line((15, 12), (20.5, 12), width=2.2)
+    canvas.line((7, 8), (15, 8), width=1.8)
+    canvas.line((7, 16), (15, 16), width=1.8)
+    canvas.line((15, 8), (15, 16), width=1.8)
+    canvas.disc(3.5, 12, 2.4)
+    canvas.disc(20.5, 12, 2.4)
+
+
+def _groove(canvas: IconCanvas) -> None:
+    canvas.line((7, 8), (17, 8), width=1.8)
+    canvas.line((7, 16), (17, 16), width=1.8)
+    canvas.arc(7, 12, 4, 90, 270, width=1.8)
+    canvas.arc(17, 12, 4, -90, 90, width=1.8)
+    canvas.disc(9, 12, 2.3)
+
+
+def _gear(canvas: IconCanvas) -> None:
+    canvas.ring(12, 12, 5.2, width=2.2)
+    canvas.disc(12, 12, 1.6)
+    for k in range(8):
+        cos, sin = math.cos(math.radians(45 * k)), math.sin(math.radians(45 * k))
+        canvas.line((12 + 6.6 * cos, 12 + 6.6 * sin), (12 + 9 * cos, 12 + 9 * sin), width=2.6)
+
+
+def _flipper(canvas: IconCanvas) -> None:
+    canvas.polygon((5.6, 10.6), (18.6, 17.6), (17.4, 19.8), (3.2, 16.6))
+    canvas.disc(5.4, 13.8, 3.4)
+    canvas.disc(18, 18.7, 1.6)
+    canvas.arc(5.4, 13.8, 13, -4, 36, width=1.8)
+    canvas.polygon((17.4, 3.6), (18.8, 8.4), (13.6, 8))
+
+
+def _plunger(canvas: IconCanvas) -> None:
+    canvas.line((12, 3), (12, 17), width=2.6)
+    canvas.line((8, 3.5), (16, 3.5), width=2.6)
+    for y in (8, 11, 14):
+        canvas.line((8, y + 1), (16, y - 1), width=1.5)
+    canvas.line((6.5, 17), (17.5, 17), width=2)
+    canvas.disc(12, 20, 2.2)
+
+
 def _thrust(canvas: IconCanvas) -> None:
     canvas.line((4, 20), (14, 10), width=2.6)
     canvas.polygon((20, 4), (17.6, 13), (11, 6.4))
@@ -177,6 +220,11 @@ _DRAWINGS: Mapping[str, Callable[[IconCanvas], None]] = {
     "rope": _rope,
     "spring": _spring,
     "motor": _motor,
+    "slide": _slide,
+    "groove": _groove,
+    "gear": _gear,
+    "flipper": _flipper,
+    "plunger": _plunger,
     "thrust": _thrust,
     "attraction": _attraction,
     "eraser": _eraser,

@@ -2,7 +2,7 @@
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,144 +10,17 @@ import pygame
 import pytest
 
 from sandbox.measure.run.runner import run
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.toml_changes import SetValue
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
-from sandbox.window.editor.edit_view import EditView
-from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.toolbar import TOOLS, EditTool
 from sandbox.window.playback.live import LiveView
-from tests.window.pressing import key, key_up, move, press, release, wheel
+from tests.window.editor.hand import BALL, CTRL, SHIFT, SIZE, Hand
+from tests.window.pressing import move, press, release, wheel
 
 pytestmark = pytest.mark.full  # a window
-
-SIZE = (1280, 720)
-CTRL, SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
-Point = tuple[float, float]
-
-
-class Hand:
-    """Mouse and keyboard of a user in the editor; points in metres."""
-
-    def __init__(self, window: App) -> None:
-        self.window = window
-
-    @property
-    def view(self) -> EditView:
-        assert self.window.editing is not None
-        return self.window.editing
-
-    @property
-    def editor(self) -> Editor:
-        return self.view.editor
-
-    @property
-    def scene(self) -> Scene:
-        return self.view.draft.scene
-
-    def frame(self, *events: pygame.event.Event) -> None:
-        for event in events:
-            pygame.event.post(event)
-        self.window.run_frame(0.02)
-
-    def pixel(self, point: Point) -> tuple[float, float]:
-        x, y = self.window.context.camera.to_screen(np.asarray(point)).tolist()
-        return x, y
-
-    def key(self, code: int, mod: int = 0, text: str = "") -> None:
-        text_event = [pygame.event.Event(pygame.TEXTINPUT, text=text)] if text else []
-        self.frame(key(code, mod), *text_event, key_up(code))
-
-    def type(self, text: str) -> None:
-        for letter in text:
-            self.key(pygame.key.key_code(letter), 0, letter)
-
-    def click(self, *points: Point) -> None:
-        for point in points:
-            self.frame(move(*self.pixel(point)))
-            self.frame(press(*self.pixel(point)), release(*self.pixel(point)))
-
-    def drag(self, begin: Point, end: Point, steps: int = 3, is_released: bool = True) -> None:
-        self.frame(move(*self.pixel(begin)), press(*self.pixel(begin)))
-        for k in range(1, steps + 1):
-            point = tuple(a + (b - a) * k / steps for a, b in zip(begin, end, strict=True))
-            self.frame(move(*self.pixel((point[0], point[1])), held=True))
-        if is_released:
-            self.frame(release(*self.pixel(end)))
-
-    def set_field(self, section: str, field: str, text: str) -> None:
-        """Click a field of the property panel, type a value and press Enter."""
-        self.frame()
-        box = self.view.panel.box_of(section, field)
-        assert box is not None, (section, field, self.editor.selection)
-        self.frame(press(*box.center), release(*box.center))
-        self.key(pygame.K_a, CTRL)
-        for letter in text:
-            self.frame(pygame.event.Event(pygame.TEXTINPUT, text=letter))
-        self.key(pygame.K_RETURN)
-
-
-@pytest.fixture
-def hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
-    """A window without a scene, in which a new one is edited."""
-    monkeypatch.chdir(tmp_path)
-    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
-    pygame.event.clear()
-    window.start_editing()
-    found = Hand(window)
-    found.frame()
-    yield found
-    window.close()
-
-
-@pytest.fixture
-def open_on(tmp_path: Path) -> Iterator[Callable[[str], Hand]]:
-    """Return a function that opens a window on a scene and edits it."""
-    windows: list[App] = []
-
-    def edit(text: str) -> Hand:
-        path = tmp_path / "scene.toml"
-        path.write_text(text)
-        window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
-        windows.append(window)
-        assert window.app_state.open(path)
-        pygame.event.clear()
-        found = Hand(window)
-        found.key(pygame.K_e, CTRL)
-        found.frame()
-        return found
-
-    yield edit
-    for window in windows:
-        window.close()
-
-
-BALL = """# two balls
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[ball]]
-name = "a"
-position = [0.0, 2.0]  # above
-radius = 0.5
-[[ball]]
-name = "b"
-position = [2.0, 2.0]
-radius = 0.5
-"""
-
-
-def save_as(hand: Hand, path: Path) -> None:
-    """Save a new scene, typing its name."""
-    hand.key(pygame.K_s, CTRL)
-    assert hand.view.prompt is not None
-    hand.key(pygame.K_a, CTRL)
-    for letter in str(path):
-        hand.frame(pygame.event.Event(pygame.TEXTINPUT, text=letter))
-    hand.key(pygame.K_RETURN)
-    assert hand.view.prompt is None
 
 
 def test_newtons_cradle_is_built_saved_and_run(hand: Hand, tmp_path: Path) -> None:
@@ -167,7 +40,7 @@ def test_newtons_cradle_is_built_saved_and_run(hand: Hand, tmp_path: Path) -> No
     hand.set_field("selection:ball", "restitution", "1")
     hand.click((-1.0, 1.0))
     hand.set_field("selection:ball", "velocity", "-2, 0")
-    save_as(hand, tmp_path / "cradle.toml")
+    hand.save_as(tmp_path / "cradle.toml")
     scene = load(tmp_path / "cradle.toml")
     written = loads(
         """
@@ -214,7 +87,7 @@ def test_car_with_motor_wheels_and_spring_drives(hand: Hand, tmp_path: Path) -> 
     joints = hand.scene.joints
     assert [joint.kind for joint in joints] == ["pivot", "motor", "pivot"]
     assert all(len(joint.between) == 2 for joint in joints)
-    save_as(hand, tmp_path / "car.toml")
+    hand.save_as(tmp_path / "car.toml")
     found = run(load(tmp_path / "car.toml", ["world.duration=3"]), "pymunk")
     assert found.status == "ok"
     names = found.names.tolist()
@@ -228,7 +101,7 @@ def test_bridge_of_planks_and_pivots_holds(hand: Hand, tmp_path: Path) -> None:
     hand.key(pygame.K_2)
     hand.click((-3.0, 2.1), (-1.0, 2.1), (1.0, 2.1), (3.0, 2.1))
     assert [len(joint.between) for joint in hand.scene.joints] == [1, 2, 2, 1]
-    save_as(hand, tmp_path / "bridge.toml")
+    hand.save_as(tmp_path / "bridge.toml")
     found = run(load(tmp_path / "bridge.toml", ["world.duration=2"]), "pymunk")
     assert found.status == "ok"
     low = found.position[-1, :, 1]
@@ -245,7 +118,7 @@ def test_lane_of_walls_and_posts(hand: Hand, tmp_path: Path) -> None:
     hand.drag((0.0, 2.5), (0.3, 2.5))
     hand.key(pygame.K_y)
     hand.click((-4.0, 1.0), (-3.0, 1.0), (-3.0, 2.0), (-4.0, 1.0))
-    save_as(hand, tmp_path / "lane.toml")
+    hand.save_as(tmp_path / "lane.toml")
     scene = load(tmp_path / "lane.toml")
     assert scene.walls[0].points == ((-2.0, 4.0), (-2.0, 1.0), (-1.0, 0.5))
     assert (len(scene.walls[1].points), scene.walls[1].closed) == (4, True)
@@ -335,16 +208,10 @@ def test_fault_is_shown_at_the_element_and_changes_nothing(open_on: Callable[[st
     assert hand.view.draft.text == BALL
     hand.key(pygame.K_ESCAPE)
     hand.key(pygame.K_v)
-    assert not hand.editor.apply([*_moved_to(hand, (0.0, -3000.0))], "move")
+    assert not hand.editor.apply([SetValue(("ball", 0, "position"), [0.0, -3000.0])], "move")
     assert hand.editor.fault is not None
     assert "behind the plane" in hand.editor.fault[1]
     hand.frame()  # draws it
-
-
-def _moved_to(hand: Hand, point: Point) -> list:  # type: ignore[type-arg]
-    from sandbox.scene.files.toml_changes import SetValue
-
-    return [SetValue(("ball", 0, "position"), list(point))]
 
 
 def test_editing_keys(open_on: Callable[[str], Hand]) -> None:
@@ -537,33 +404,23 @@ def test_alignment_and_new_materials(open_on: Callable[[str], Hand]) -> None:
     assert hand.view.panel.heading_of("material:0") is not None
 
 
-def click_cross(hand: Hand, section: str) -> None:
-    cross = hand.view.panel.cross_of(section)
-    assert cross is not None
-    hand.frame(press(*cross.center), release(*cross.center))
-    hand.frame()
-
-
 def test_materials_and_pairs_are_removed_if_nothing_names_them(open_on: Callable[[str], Hand]) -> None:
     materials = '[[material]]\nname = "wood"\n\n[[material]]\nname = "steel" # hard\n'
     pair = '[[pair]]\nbetween = ["wood", "wood"]\nfriction = 0.3\n'
     hand = open_on(materials + pair + BALL.replace('name = "b"', 'name = "b"\nmaterial = "steel"'))
     text = hand.view.draft.text
 
-    def messages() -> list[str]:
-        return [text for level, text in hand.window.context.app_state.messages.visible() if level == "warning"]
-
     hand.frame()
     for section in ("world", "solver"):  # folded, so that the materials are in view
         heading = hand.view.panel.heading_of(section)
         assert heading is not None
         hand.frame(press(*heading.center), release(*heading.center))
-    click_cross(hand, "material:1")
-    assert hand.view.draft.text == text and messages() == ["material steel is used by ball b"]
-    click_cross(hand, "material:0")
-    assert hand.view.draft.text == text and messages()[-1] == "material wood is used by pair pair-1"
-    click_cross(hand, "pair:0")
-    click_cross(hand, "material:0")
+    hand.press_button("material:1")
+    assert hand.view.draft.text == text and hand.warnings() == ["material steel is used by ball b"]
+    hand.press_button("material:0")
+    assert hand.view.draft.text == text and hand.warnings()[-1] == "material wood is used by pair pair-1"
+    hand.press_button("pair:0")
+    hand.press_button("material:0")
     assert [material.name for material in hand.scene.materials] == ["steel"]
     assert not hand.scene.pairs and "# hard" in hand.view.draft.text
     hand.key(pygame.K_z, CTRL)

@@ -346,11 +346,25 @@ def test_mixed_values_change_only_if_something_is_typed() -> None:
     assert edited.changes == [("ball", "radius", 0.05), ("ball", "mass", None)]
 
 
-def test_other_kinds_cannot_be_edited() -> None:
-    edited = Edited(section(Wall, {"points": [[0, 0], [1, 1]]}, "wall"))
+def test_long_lists_of_points_cannot_be_edited_as_text() -> None:
+    edited = Edited(section(Wall, {"points": [[k, 0] for k in range(1000)]}, "wall"))
     edited.click("points", "wall")
     edited.click("points", "wall", button=3)
     assert not edited.panel.has_focus and not edited.changes
+
+
+def test_lists_and_tables_within_the_table_are_edited() -> None:
+    edited = Edited(section(Wall, {"points": [[0, 0], [1, 1]]}, "wall"))
+    for field, text in (("points", "0, 0; 2, 0"), ("layers", "a, b"), ("kick.speed", "2")):
+        edited.click(field, "wall")
+        edited.send(key(pygame.K_a, pygame.KMOD_CTRL))
+        edited.type(text)
+        edited.send(key(pygame.K_RETURN))
+    assert edited.changes == [
+        ("wall", "points", [[0.0, 0.0], [2.0, 0.0]]),
+        ("wall", "layers", ["a", "b"]),
+        ("wall", "kick.speed", 2.0),
+    ]
 
 
 def test_keys_belong_to_the_field_only_while_it_is_edited() -> None:

@@ -1,0 +1,229 @@
+"""Joints, drives and properties of the editor, with events as SDL sends them; what is built is run headless."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pygame
+import pytest
+
+from sandbox.action import Drive
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
+from sandbox.scene.description.joints import Gear, Groove, Slide
+from sandbox.scene.editing.elements import ElementKey
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from tests.window.editor.hand import BALL, CTRL, SIZE, Hand
+from tests.window.pressing import press, release
+
+pytestmark = pytest.mark.full  # a window
+
+
+def lasting(scene: Scene, duration: float) -> Scene:
+    """Return a scene with another duration, s."""
+    return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
+
+
+def test_slide_keeps_its_distance_within_half_and_the_whole(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.key(pygame.K_6)
+    hand.click((0.0, 2.0), (2.0, 2.0))
+    (slide,) = hand.scene.joints
+    assert isinstance(slide, Slide)
+    assert (slide.between, slide.least, slide.most) == (("a", "b"), 1.0, 2.0)
+
+
+def test_body_slides_along_a_groove(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on("[world]\ngravity = [0, -9.81]\n" + BALL)
+    hand.key(pygame.K_7)
+    hand.click((0.0, 2.0), (1.0, 1.0))
+    (groove,) = hand.scene.joints
+    assert isinstance(groove, Groove)
+    assert (groove.between, groove.groove, groove.anchor) == (("a",), ((0.0, 2.0), (1.0, 1.0)), (0.0, 0.0))
+    found = run(lasting(hand.scene, 0.5), "pymunk")
+    x, y = found.position[-1, 0].tolist()
+    assert math.isclose(x + y, 2.0, abs_tol=1e-3)  # on the line, to the error of the iterated joint
+    assert x > 0.3  # g sin 45° · t² / 2 · cos 45° = 0.6 m in 0.5 s, at half of g for the slope
+
+
+def test_groove_belongs_to_the_body_below(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(
+        BALL.replace(
+            '[[ball]]\nname = "a"',
+            '[[box]]\nname = "cart"\nposition = [0.0, 2.0]\nsize = [3.0, 0.4]\n[[ball]]\nname = "a"',
+        )
+    )
+    hand.key(pygame.K_7)
+    hand.click((1.2, 2.0))
+    hand.key(pygame.K_ESCAPE)
+    hand.click((0.0, 2.0), (1.0, 2.0))
+    (groove,) = hand.scene.joints
+    assert isinstance(groove, Groove)
+    assert groove.between == ("a", "cart")  # boxes are drawn above balls, so that the box slides on the ball
+    assert groove.groove == ((0.0, 0.0), (1.0, 0.0))
+
+
+@pytest.mark.parametrize(("x", "sign"), [(1.5, -1.0), (3.0, 1.0)])
+def test_gears_mesh_or_are_joined_by_a_belt(open_on: Callable[[str], Hand], x: float, sign: float) -> None:
+    text = BALL.replace("[2.0, 2.0]\nradius = 0.5", f"[{x}, 2.0]\nradius = 1.0")
+    hand = open_on(text.replace('name = "b"', 'name = "b"\nangular_velocity = 1.0'))
+    hand.key(pygame.K_8)
+    hand.click((0.0, 2.0), (x, 2.0))
+    (gear,) = hand.scene.joints
+    assert isinstance(gear, Gear)
+    assert gear.ratio == 2.0 * sign  # the small one turns twice as fast
+    hand.key(pygame.K_2)  # hinges, so that only rotation remains
+    hand.click((0.0, 2.0), (x, 2.0))
+    found = run(lasting(hand.scene, 2.0), "pymunk")
+    rates = found.angular_velocity[-1]
+    assert math.isclose(rates[0], gear.ratio * rates[1], rel_tol=1e-3)  # the error of the first step has decayed
+    assert abs(rates[1]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("key", "points", "message"),
+    [
+        (pygame.K_8, [(0.0, 2.0), (1.0, 4.0)], "a gear needs two bodies"),
+        (pygame.K_7, [(1.0, 4.0), (1.0, 5.0)], "a groove needs a body that slides"),
+        (pygame.K_7, [(0.0, 2.0), (0.0, 2.0)], "a groove needs a length"),
+        (pygame.K_6, [(0.0, 2.0), (0.1, 2.0)], "both ends are on the same body"),
+        (pygame.K_9, [(1.0, 4.0)], "a flipper needs a body"),
+        (pygame.K_0, [(1.0, 4.0)], "a plunger needs a body"),
+    ],
+)
+def test_impossible_joints_and_drives_say_what_would_be_right(
+    open_on: Callable[[str], Hand], key: int, points: list[tuple[float, float]], message: str
+) -> None:
+    hand = open_on(BALL)
+    hand.key(key)
+    hand.click(*points)
+    assert hand.warnings()[-1].startswith(message)
+    assert hand.view.draft.text == BALL
+
+
+def test_flipper_and_plunger_drive_bodies(hand: Hand, tmp_path: Path) -> None:
+    hand.key(pygame.K_c)
+    hand.drag((-1.0, 2.0), (1.0, 2.0))
+    hand.key(pygame.K_9)
+    hand.click((-1.0, 2.0))
+    drive = hand.scene.drives[0]
+    assert isinstance(drive, TorqueDrive)
+    assert (drive.pivot, drive.key, drive.stops[0]) == ((-1.0, 2.0), "left", 0.0)
+    assert drive.stops[1] > 0.5
+    assert hand.editor.selection == [ElementKey("capsule", 0)]  # its properties show the drive
+    hand.frame()
+    assert hand.view.panel.heading_of("drive:0") is not None
+    hand.key(pygame.K_9)
+    hand.click((-1.0, 2.0))
+    assert hand.warnings()[-1].startswith("capsule has a drive already")
+    hand.key(pygame.K_x)
+    hand.drag((3.0, 2.0), (3.4, 3.0))
+    hand.key(pygame.K_0)
+    hand.drag((3.2, 2.5), (3.2, 2.0))
+    plunger = hand.scene.drives[1]
+    assert isinstance(plunger, PlungerDrive)
+    assert (plunger.direction, plunger.travel, plunger.key) == ((0.0, 1.0), 0.5, "space")
+    hand.set_field("drive:1", "draw_time", "0.2")
+    hand.save_as(tmp_path / "table.toml")
+    scene = load(tmp_path / "table.toml", ["world.duration=0.3"])
+    names = list(scene.bodies.names)
+    found = run(
+        scene,
+        "pymunk",
+        actions=(Drive(time=0.0, drive="flipper", level=1.0), Drive(time=0.0, drive="plunger", level=1.0)),
+    )
+    swung = found.angle[:, names.index("capsule")]
+    assert math.isclose(swung.max(), drive.stops[1], abs_tol=0.05)  # it reaches its stop
+    assert np.flatnonzero(swung > 0.9 * drive.stops[1])[0] * np.diff(found.time)[0] < 0.15  # in about 40 ms
+    assert math.isclose(found.position[:, names.index("box"), 1].min(), 2.0, abs_tol=0.01)  # drawn back by 0.5 m
+    hand.press_button("drive:1")
+    assert len(hand.scene.drives) == 1
+
+
+def test_nested_tables_lists_and_points_or_names_are_edited(open_on: Callable[[str], Hand]) -> None:
+    text = BALL + "[[post]]\nposition = [4.0, 1.0]\nradius = 0.3\n[[attraction]]\ntoward = [0.0, 5.0]\nstrength = 1.0\n"
+    hand = open_on(text)
+    hand.click((4.0, 1.0))
+    hand.set_field("selection:post", "kick.threshold", "0.1")
+    assert hand.scene.posts[0].kick is None  # without a speed
+    hand.set_field("selection:post", "kick.speed", "2")
+    hand.set_field("selection:post", "kick.threshold", "0.2")
+    kick = hand.scene.posts[0].kick
+    assert kick is not None and (kick.speed, kick.threshold) == (2.0, 0.2)
+    hand.set_field("selection:post", "layers", "ground, above")
+    assert hand.scene.posts[0].layers == ("ground", "above")
+    hand.set_field("selection:post", "kick.threshold", "")
+    hand.set_field("selection:post", "kick.speed", "")
+    assert hand.scene.posts[0].kick is None and "kick" not in hand.view.draft.text
+    hand.click((0.0, 5.0))
+    hand.set_field("selection:attraction", "toward", "b")
+    assert hand.scene.attractions[0].toward == "b"
+    hand.set_field("selection:attraction", "toward", "nothing")
+    assert hand.scene.attractions[0].toward == "b"
+
+
+def test_pairs_of_materials_and_the_surface_are_added(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL)
+    hand.press_button("material")
+    hand.press_button("material")
+    assert [each.name for each in hand.scene.materials] == ["material", "material 2"]
+    for _ in range(4):
+        hand.press_button("pair")
+    assert [each.between for each in hand.scene.pairs] == [
+        ("material", "material 2"), ("material", "material"), ("material 2", "material 2"),
+    ]  # fmt: skip
+    heading = hand.view.panel.heading_of("pair:0")
+    assert heading is not None
+
+
+def test_tables_of_play_and_parts_of_bodies_are_edited(open_on: Callable[[str], Hand]) -> None:
+    text = BALL + '[[body]]\nname = "hammer"\nposition = [4.0, 2.0]\n'
+    text += "box = [{ size = [0.2, 1.0] }, { size = [0.8, 0.3], position = [0.0, 0.5] }]\n"
+    text += '\n[[play.marking]]\ncolour = "#ff0000"\nposition = [0.0, 0.0]\nradius = 1.0\n'
+    hand = open_on(text)
+    hand.click((4.0, 2.0))
+    hand.set_field("body:0:box:1", "size", "1, 0.3")
+    assert hand.scene.compounds[0].boxes[1].size == (1.0, 0.3)
+    hand.press_button("body:0:box:1")
+    assert len(hand.scene.compounds[0].boxes) == 1
+    hand.key(pygame.K_ESCAPE)
+    hand.frame()
+    unfold(hand, "play:marking:0")
+    hand.set_field("play:marking:0", "radius", "2")
+    assert hand.scene.play.markings[0].radius == 2.0
+    unfold(hand, "surface")
+    hand.set_field("surface", "gravity", "9.8")
+    assert hand.scene.surface is not None and hand.scene.surface.gravity == 9.8
+    hand.press_button("surface")
+    assert hand.scene.surface is None
+    assert loads(hand.view.draft.text) == hand.scene
+
+
+def unfold(hand: Hand, section: str) -> None:
+    """Click a heading of the property panel."""
+    heading = hand.in_view(lambda: hand.view.panel.heading_of(section))
+    hand.frame(press(*heading.center), release(*heading.center))
+
+
+def test_table_of_a_preset_is_edited(tmp_path: Path) -> None:
+    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
+    try:
+        assert window.app_state.open(find("9-ball"))
+        pygame.event.clear()
+        window.start_editing()
+        hand = Hand(window)
+        hand.frame()
+        before = hand.scene.balls
+        assert hand.view.draft.preset_table is not None
+        hand.set_field("billiards", "gap", "0.001")
+        assert hand.view.draft.document["billiards"]["gap"] == 0.001
+        assert hand.scene.balls != before
+        hand.key(pygame.K_z, CTRL)
+        assert hand.scene.balls == before
+    finally:
+        window.close()
