@@ -16,7 +16,11 @@ SECONDS = 2.0
 MAX_POINTS = 200
 """Points of a path"""
 MAX_BODIES = 300
-"""Bodies of a scene up to which paths are predicted: more would slow the window down while it is edited"""
+"""Bodies up to which paths follow the pointer, by `exact` if it can: more would slow the window down"""
+MAX_BODIES_AT_REST = 3_000
+"""Bodies up to which paths are predicted, by pymunk, once nothing is dragged any more"""
+REST = 0.2
+"""s without a change after which a path of more than `MAX_BODIES` is predicted"""
 MAX_WORK = 50_000
 """Steps × bodies of a prediction; a scene with more bodies is predicted for a shorter time"""
 MAX_TIME = 0.2
@@ -37,16 +41,18 @@ class GhostPath:
 def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath | None:
     """Return the path of a body from the start of a scene; None if no engine can run it, or it is too large.
 
-    The engine `exact` predicts it where it can, whose answer does not depend on the time step; otherwise pymunk, or the
-    first engine that can. The path is shorter where the body is removed, or where the work would exceed its limits.
+    The engine `exact` predicts it where it can, whose answer does not depend on the time step; otherwise, or in large
+    scenes, pymunk, or the first engine that can. The path is shorter where the body is removed, or where the work would exceed its limits.
 
     Args:
         scene: a valid scene, or one that is being edited and may be refused.
         body: index of the body.
         seconds: duration, s.
     """
-    engines = able(scene) if len(scene.bodies) <= MAX_BODIES else ()
-    name = next((each for each in ("exact", USUAL) if each in engines), engines[0] if engines else None)
+    count = len(scene.bodies)
+    engines = able(scene) if count <= MAX_BODIES_AT_REST else ()
+    preferred = ("exact", USUAL) if count <= MAX_BODIES else (USUAL,)
+    name = next((each for each in preferred if each in engines), engines[0] if engines else None)
     if name is None:
         return None
     try:
@@ -56,7 +62,7 @@ def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath
     until = perf_counter() + MAX_TIME
     try:
         dt = simulation.settings.dt
-        steps = min(max(round(seconds / dt), 1), max(MAX_WORK // max(len(scene.bodies), 1), 1))
+        steps = min(max(round(seconds / dt), 1), max(MAX_WORK // max(count, 1), 1))
         every = max(-(-steps // MAX_POINTS), 1)
         points = [scene.bodies.position[body]]
         for step in range(1, steps + 1):
@@ -97,7 +103,10 @@ class GhostPredictor:
             self._submitted = None
         elif self._submitted is None or self._submitted[0] is not scene or self._submitted[1] != body:
             self._submitted = scene, body
-            self._job.submit(self._submitted)
+            is_large = len(scene.bodies) > MAX_BODIES
+            if is_large:
+                self._job.forget()  # the former path would stay while the body is dragged
+            self._job.submit(self._submitted, REST if is_large else 0.0)
 
     def close(self) -> None:
         """End the thread, after the present prediction."""

@@ -16,7 +16,7 @@ class LatestJob(Generic[InputT, ResultT]):
     Args:
         compute: called in the thread; must not raise.
         name: of the thread.
-        delay: s without another input after which the computation begins.
+        delay: s without another input after which the computation begins, unless `submit` has another.
     """
 
     def __init__(self, compute: Callable[[InputT], ResultT], name: str, delay: float = 0.0) -> None:
@@ -24,17 +24,18 @@ class LatestJob(Generic[InputT, ResultT]):
         self._condition = threading.Condition()
         self._thread: threading.Thread | None = None
         self._input: InputT | None = None
-        self._changed_at = -math.inf
+        self._due_at = -math.inf
         self._computed: InputT | None = None
         self._result: ResultT | None = None
         self._is_closed = False
 
-    def submit(self, given: InputT) -> None:
+    def submit(self, given: InputT, delay: float | None = None) -> None:
         """Have a result computed, unless this object was submitted last. Cheap: for every frame."""
         if given is self._input or self._is_closed:
             return
         with self._condition:
-            self._input, self._changed_at = given, monotonic()
+            self._input = given
+            self._due_at = monotonic() + (self._delay if delay is None else delay)
             self._condition.notify()
         if self._thread is None:
             # A daemon, so that a second Ctrl+C ends the process without waiting for it.
@@ -76,7 +77,7 @@ class LatestJob(Generic[InputT, ResultT]):
                 if self._input is self._computed:
                     self._condition.wait()
                     continue
-                remaining = self._changed_at + self._delay - monotonic()
+                remaining = self._due_at - monotonic()
                 if remaining <= 0.0:
                     return self._input
                 self._condition.wait(remaining)

@@ -48,8 +48,11 @@ def test_path_of_many_bodies_is_shorter() -> None:
     path = predict_path(loads(FLIGHT + grid), 0)
     assert path is not None
     assert len(path.points) * path.interval < SECONDS
-    crowd = predict_path(loads(FLIGHT + grid.replace("rows = 10", "rows = 11")), 0)
-    assert crowd is None
+    crowd = predict_path(loads(FLIGHT + grid.replace("rows = 10", "rows = 30")), 0)
+    assert crowd is not None
+    assert crowd.engine == "pymunk"
+    assert len(crowd.points) >= 2  # as many as 0.2 s suffice for
+    assert predict_path(loads(FLIGHT + grid.replace("rows = 10", "rows = 104")), 0) is None
 
 
 def wait_for(predictor: GhostPredictor, seconds: float = 20.0) -> GhostPath | None:
@@ -77,6 +80,21 @@ def test_predictor_predicts_the_latest_scene() -> None:
         predictor.submit(scenes[-1], None)
         assert predictor.path is None
         assert predictor.fault is None
+    finally:
+        predictor.close()
+
+
+def test_path_of_many_bodies_waits_until_the_scene_rests() -> None:
+    grid = "[[grid]]\norigin = [0, 20]\ncolumns = 20\nrows = 20\nspacing = [1, 1]\nradius = 0.1\n"
+    predictor, scene = GhostPredictor(), loads(FLIGHT + grid)
+    try:
+        predictor.submit(loads(FLIGHT), 0)
+        assert wait_for(predictor) is not None
+        predictor.submit(scene, 0)
+        assert predictor.path is None
+        path = wait_for(predictor)
+        assert path is not None
+        assert path.engine == "pymunk"
     finally:
         predictor.close()
 
