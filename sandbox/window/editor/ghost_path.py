@@ -42,7 +42,8 @@ def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath
     """Return the path of a body from the start of a scene; None if no engine can run it, or it is too large.
 
     The engine `exact` predicts it where it can, whose answer does not depend on the time step; otherwise, or in large
-    scenes, pymunk, or the first engine that can. The path is shorter where the body is removed, or where the work would exceed its limits.
+    scenes, pymunk, or the first engine that can. The path is shorter where the body is removed, or where the work would
+    exceed its limits.
 
     Args:
         scene: a valid scene, or one that is being edited and may be refused.
