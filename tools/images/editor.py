@@ -1,4 +1,4 @@
-"""Film of the editor: a car is drawn, gets wheels with motors, and drives over a heap of boxes."""
+"""Film of the editor: a car, a heap of boxes, a ball on a rope and a thrown one are drawn, and then run."""
 
 import tempfile
 from collections.abc import Sequence
@@ -88,7 +88,7 @@ class _Hand:
 
 
 def make(path: Path) -> None:
-    """Draw a car and a heap of boxes, run them, and film all of it."""
+    """Draw the scene, run it, return to it, and film all of it."""
     with tempfile.TemporaryDirectory() as folder:  # of autosaves
         _make(path, Path(folder))
 
@@ -118,10 +118,13 @@ def _make(path: Path, folder: Path) -> None:
         box = window.editing.draft.scene.boxes[row + 2].position
         hand.drag(box, (x, y), 5)
     _set_friction(hand)
+    _hang_a_ball(hand)
+    _throw_a_ball(hand)
     hand.film(6)
     hand.key(pygame.K_SPACE)
-    for _ in range(46):
-        hand.film(elapsed=1.0 / FPS)
+    hand.film(80)
+    hand.key(pygame.K_e, pygame.KMOD_CTRL)
+    hand.film(16)
     window.close()
     save_gif(hand.frames, path, FPS, 64, 0.8)
 
@@ -139,6 +142,30 @@ def _set_friction(hand: _Hand) -> None:
     _type(hand, "1")
     hand.key(pygame.K_RETURN)
     hand.film(3)
+
+
+def _hang_a_ball(hand: _Hand) -> None:
+    """Draw a ball that hangs from a rope."""
+    hand.choose("ball")
+    hand.drag((3.4, 2.6), (3.75, 2.6))
+    hand.choose("rope")
+    hand.click(hand.pixel((3.4, 2.6)))
+    hand.click(hand.pixel((2.4, 4.2)))
+    hand.film(4)
+
+
+def _throw_a_ball(hand: _Hand) -> None:
+    """Draw a ball, and drag the arrow of its velocity, while its path is shown."""
+    hand.choose("ball")
+    hand.drag((-1.6, 2.0), (-1.3, 2.0))
+    hand.choose("select")
+    editing = hand.window.editing
+    assert editing is not None
+    hand.film(2)
+    handles = editing.editor.handles(editing.view_scale)
+    tip = next(handle.point for handle in handles if handle.kind == "velocity")
+    hand.drag(tip, (-0.9, 2.6), 16)
+    hand.film(6)
 
 
 def _type(hand: _Hand, text: Sequence[str]) -> None:

@@ -92,7 +92,8 @@ class EditView:
         return self.editor.draft
 
     @property
-    def _view(self) -> ViewScale:
+    def view_scale(self) -> ViewScale:
+        """Scale of the view, as gestures need it."""
         camera, gui = self._context.camera, self._context.gui
         return ViewScale(camera.scale, gui.ui_scale, max(min(gui.area.size), 1) / camera.scale)
 
@@ -150,7 +151,7 @@ class EditView:
                 use(name)
             if used:
                 return True
-        point, view = self._context.camera.to_world(event.pos), self._view
+        point, view = self._context.camera.to_world(event.pos), self.view_scale
         modifiers = pygame.key.get_mods()
         shift, control = bool(modifiers & pygame.KMOD_SHIFT), bool(modifiers & pygame.KMOD_CTRL)
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
@@ -189,7 +190,7 @@ class EditView:
         elif key in (pygame.K_SPACE, pygame.K_p):
             self._leave()
         elif key in ARROWS:
-            step = grid_step(self._view.scale, self._view.ui_scale) * (10.0 if shift else 1.0)
+            step = grid_step(self.view_scale.scale, self.view_scale.ui_scale) * (10.0 if shift else 1.0)
             x, y = ARROWS[key]
             self.editor.nudge((x * step, y * step))
         elif key in (pygame.K_DELETE, pygame.K_BACKSPACE):
@@ -231,7 +232,7 @@ class EditView:
         return True
 
     def _press_control(self, key: int, shift: bool) -> None:
-        editor, view = self.editor, self._view
+        editor, view = self.editor, self.view_scale
         self.panel.commit()
         if key == pygame.K_e:
             self._leave()
@@ -385,7 +386,7 @@ class EditView:
             return pygame.SYSTEM_CURSOR_NO
         if editor.tool != "select":
             return pygame.SYSTEM_CURSOR_CROSSHAIR
-        handle = editor.handle_at(self._context.camera.to_world(position), self._view)
+        handle = editor.handle_at(self._context.camera.to_world(position), self.view_scale)
         if handle is not None:
             return HANDLE_CURSORS.get((handle.kind, handle.index % 2), pygame.SYSTEM_CURSOR_HAND)
         return pygame.SYSTEM_CURSOR_SIZEALL if editor.hovered is not None else pygame.SYSTEM_CURSOR_ARROW
@@ -408,7 +409,7 @@ class EditView:
         snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)
-        draw_overlay(surface, context.camera, editor, self._view)
+        draw_overlay(surface, context.camera, editor, self.view_scale)
         area = gui.area
         self.toolbar.layout(area, gui.ui_scale)
         self._draw_check(surface, scene, area)
@@ -472,7 +473,7 @@ class EditView:
         size, pad = 13.0 * ui_scale, round(6 * ui_scale)
         path = self.draft.path
         name = ("new scene" if path is None else path.name) + (" ●" if self.draft.is_changed else "")
-        grid = grid_step(self._view.scale, ui_scale)
+        grid = grid_step(self.view_scale.scale, ui_scale)
         ghost = self._ghost.path
         detail = f"grid {grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
         left, top = self.toolbar.rect.right + pad, self.toolbar.rect.top
