@@ -81,11 +81,12 @@ def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> 
         replaced: the moved bodies; only their position and angle may differ.
     """
     before, preview = scene.bodies, with_elements(scene, replaced)
-    position, angle = before.position.copy(), before.angle.copy()
+    position, angle, elements = before.position.copy(), before.angle.copy(), list(before.elements)
     for key, body in replaced.items():
         (index,) = bodies_of(scene, key)
         position[index], angle[index] = centre_of(body), body.angle
-    moved = replace(before, position=position, angle=angle, elements=preview.elements)
+        elements[before.element[index]] = body
+    moved = replace(before, position=position, angle=angle, elements=tuple(elements))
     for name in ("round", "all_round", "shapes", "number_of"):  # they depend on shapes and names only
         vars(moved)[name] = getattr(before, name)
     vars(preview)["bodies"], vars(preview)[BODY_RANGES] = moved, body_ranges(scene)

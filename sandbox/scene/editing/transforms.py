@@ -15,7 +15,7 @@ from sandbox.scene.description.bodies import Attached, Compound, Polygon
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.joints import Anchored, Groove, Pivot, Pulley
-from sandbox.scene.editing.elements import ElementKey, all_elements, body_names, element_at, table_values
+from sandbox.scene.editing.elements import ElementKey, body_names, element_at, table_values
 
 
 @dataclass(frozen=True)
@@ -157,11 +157,12 @@ def transformation(scene: Scene, keys: Collection[ElementKey], by: Similarity) -
         if key.table in ("joint", "drive"):
             continue
         found[key] = transformed(element, by, is_whole=key.table not in CANNOT_ROTATE or by.scale != 1.0)
-    for key, element in all_elements(scene):
-        if key.table == "drive" and getattr(element, "body", None) in moved:
-            found[key] = transformed(element, by, is_whole=False)
-        if key.table == "joint":
-            found[key] = _joint_values(element, moved, is_selected=key in keys, by=by)
+    for index, drive in enumerate(scene.drives):
+        if drive.body in moved:
+            found[ElementKey("drive", index)] = transformed(drive, by, is_whole=False)
+    for index, joint in enumerate(scene.joints):
+        key = ElementKey("joint", index)
+        found[key] = _joint_values(joint, moved, is_selected=key in keys, by=by)
     return {key: values for key, values in found.items() if values}
 
 

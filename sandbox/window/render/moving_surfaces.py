@@ -13,6 +13,8 @@ import pygame
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.contacts import surface_parts
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.shapes import Piece, geometry_of
 from sandbox.window.render.draw_context import DrawContext
@@ -47,7 +49,7 @@ def _outlines(view: DrawContext) -> Iterator[tuple[FloatArray, float]]:
         if collider.surface_speed and (isinstance(collider, Plane) or collider.solid):
             for outline in _outline_of(view, collider):
                 yield outline, collider.surface_speed
-    moving = [any(part.surface_speed for part in surface_parts([element])) for element in bodies.elements]
+    moving = [_has_moving_surface(element) for element in bodies.elements]
     if not any(moving):
         return
     for index in view.shown.tolist():
@@ -60,6 +62,12 @@ def _outlines(view: DrawContext) -> Iterator[tuple[FloatArray, float]]:
                 x, y = _around_piece(piece).T
                 turned = np.column_stack((cos * x - sin * y, sin * x + cos * y))
                 yield frame.position[index] + turned, parts[piece.part].surface_speed
+
+
+def _has_moving_surface(element: BodySource) -> bool:
+    if not isinstance(element, Compound):  # at once, as all elements are asked in each frame
+        return bool(element.surface_speed)
+    return any(part.surface_speed for part in surface_parts([element]))
 
 
 def _outline_of(view: DrawContext, collider: Plane | Wall | Post) -> Iterator[FloatArray]:
