@@ -416,7 +416,7 @@ class MonkeyUser:
             x, y = self.window.context.camera.to_screen(at).tolist()
             return x + self.random.choice((0, 0, 3, -5)), y
         if editing is not None and kind < 0.5:
-            handles = editing.editor.handles(editing._view)
+            handles = editing.editor.handles(editing.view_scale)
             if handles:
                 x, y = self.window.context.camera.to_screen(np.asarray(self.random.choice(handles).point)).tolist()
                 return x, y

@@ -172,7 +172,7 @@ def test_handles_rotate_and_scale(open_on: Callable[[str], Hand]) -> None:
     hand = open_on('[[box]]\nname = "a"\nposition = [0.0, 0.0]\nsize = [2.0, 1.0]\n')
     hand.click((0.0, 0.0))
     hand.frame()
-    view = hand.view._view
+    view = hand.view.view_scale
     rotate = next(handle for handle in hand.editor.handles(view) if handle.kind == "rotate")
     radius = math.hypot(*rotate.point)
     hand.drag(rotate.point, (radius * math.cos(math.radians(62)), radius * math.sin(math.radians(62))))
@@ -338,7 +338,7 @@ def test_zoom_and_panel_work_while_editing(open_on: Callable[[str], Hand]) -> No
 def test_velocity_is_set_by_its_arrow(open_on: Callable[[str], Hand]) -> None:
     hand = open_on(BALL)
     hand.click((0.0, 2.0))
-    view = hand.view._view
+    view = hand.view.view_scale
     tip = next(handle for handle in hand.editor.handles(view) if handle.kind == "velocity").point
     hand.drag(tip, (0.5, 2.25), is_released=False)
     hand.type("3,-4")
@@ -474,7 +474,7 @@ def test_cursor_shows_what_a_press_does(open_on: Callable[[str], Hand], monkeypa
     assert cursor_at(*hand.pixel((1.0, 3.0))) == pygame.SYSTEM_CURSOR_ARROW
     assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_SIZEALL
     hand.click((0.0, 2.0))
-    corner = next(each for each in hand.editor.handles(hand.view._view) if each.kind == "scale" and each.index == 1)
+    corner = next(each for each in hand.editor.handles(hand.view.view_scale) if each.kind == "scale" and each.index == 1)
     assert cursor_at(*hand.pixel(corner.point)) == pygame.SYSTEM_CURSOR_SIZENWSE
     hand.key(pygame.K_b)
     assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_CROSSHAIR
