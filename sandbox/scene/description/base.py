@@ -54,6 +54,8 @@ AngularVelocity = Annotated[float, Field(ge=-1e12, le=1e12)]
 Radius = Annotated[float, Field(ge=1e-9, le=1e9)]
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
+Moment = Annotated[float, Field(ge=1e-40, le=1e42)]
+"""A moment of inertia, kg·m²."""
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
@@ -123,3 +125,5 @@ class BodySpec(BodySource):
     """velocity of the centre of mass, m/s"""
     fixed: bool = False
     """Never moves, as if infinitely heavy."""
+    moment: Moment | None = None
+    """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""

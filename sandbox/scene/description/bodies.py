@@ -14,6 +14,8 @@ MAX_PARTS = 1000
 
 Length = Annotated[float, Field(ge=1e-9, le=1e9)]
 Angle = Annotated[float, Field(ge=-1e12, le=1e12)]
+Rounding = Annotated[float, Field(ge=0, le=1e9)]
+"""Radius by which an outline is widened, which rounds its corners, m."""
 Outline = Annotated[tuple[Point, ...], Field(min_length=3, max_length=MAX_CORNERS)]
 
 
@@ -22,6 +24,8 @@ class Box(BodySpec):
 
     size: tuple[Length, Length]
     """width and height before rotation, m"""
+    radius: Rounding = 0.0
+    """radius by which it is widened on all sides, with round corners, m"""
 
 
 class Capsule(BodySpec):
@@ -40,6 +44,8 @@ class Polygon(BodySpec):
     """corners relative to `position`, m"""
     position: Point = (0.0, 0.0)
     """origin of the points, m; the position of the body in results is its centre of mass"""
+    radius: Rounding = 0.0
+    """radius by which it is widened on all sides, with round corners, m"""
 
 
 class Attached(HasMaterial):
@@ -65,15 +71,27 @@ class BoxPart(Attached):
 
     size: tuple[Length, Length]
     """width and height before rotation, m"""
+    radius: Rounding = 0.0
+    """radius by which it is widened on all sides, with round corners, m"""
 
 
 class CapsulePart(Attached):
-    """A capsule that is part of a body."""
+    """A capsule that is part of a body: along x in the frame of the part, or between two ends."""
 
-    length: Length
+    length: Length | None = None
     """distance between the centres of the round ends, m"""
+    ends: tuple[Point, Point] | None = None
+    """or these centres themselves, in the frame of the part, m"""
     radius: Radius
     """radius of the round ends, m"""
+
+    @property
+    def centres(self) -> tuple[Point, Point]:
+        """Centres of the round ends in the frame of the part, m."""
+        if self.ends is not None:
+            return self.ends
+        half = 0.5 * (self.length or 0.0)
+        return (-half, 0.0), (half, 0.0)
 
 
 class PolygonPart(Attached):
@@ -81,6 +99,8 @@ class PolygonPart(Attached):
 
     points: Outline
     """corners of the outline in the frame of the part, m"""
+    radius: Rounding = 0.0
+    """radius by which it is widened on all sides, with round corners, m"""
 
 
 AnyPart = BallPart | BoxPart | CapsulePart | PolygonPart
@@ -89,6 +109,8 @@ AnyPart = BallPart | BoxPart | CapsulePart | PolygonPart
 class Compound(BodySpec):
     """One rigid body made of several shapes, such as a hammer. Where parts overlap, their masses add up."""
 
+    centre_of_mass: Point | None = None
+    """centre of mass in the frame of the body, m; default: that of its parts"""
     balls: Annotated[tuple[BallPart, ...], Field(alias="ball", max_length=MAX_PARTS)] = ()
     boxes: Annotated[tuple[BoxPart, ...], Field(alias="box", max_length=MAX_PARTS)] = ()
     capsules: Annotated[tuple[CapsulePart, ...], Field(alias="capsule", max_length=MAX_PARTS)] = ()

@@ -108,6 +108,10 @@ def _shape(element: Part, by: Similarity) -> dict[str, Any]:
         values["points"] = tuple(mirror.vector(each) for each in element.points)
     if isinstance(element, Compound):
         values |= _parts(element, Similarity(mirrored=by.mirrored, scale=by.scale))
+        if element.centre_of_mass is not None:
+            values["centre_of_mass"] = Similarity(mirrored=by.mirrored, scale=by.scale).vector(element.centre_of_mass)
+    if isinstance(element, BodySpec) and element.moment is not None:  # the mass scales only with a density
+        values["moment"] = element.moment * by.scale ** (2 if element.density is None else 4)
     if by.scale != 1.0:
         for key in LENGTHS:
             value = getattr(element, key, None)
@@ -135,12 +139,13 @@ def _part(part: Attached, by: Similarity) -> dict[str, Any]:
     values: dict[str, Any] = {"position": list(by.vector(part.position))}
     if by.mirrored:
         values["angle"] = -part.angle
-    points = getattr(part, "points", None)
-    if points is not None:
-        values["points"] = [list(by.vector(each)) for each in points]
+    for key in ("points", "ends"):
+        points = getattr(part, key, None)
+        if points is not None:
+            values[key] = [list(by.vector(each)) for each in points]
     for key in ("radius", "length", "size"):
         value = getattr(part, key, None)
-        if value is not None:
+        if value:  # not the rounding of an outline that has none
             values[key] = [by.scale * each for each in value] if isinstance(value, tuple) else by.scale * value
     return values
 

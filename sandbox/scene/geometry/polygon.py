@@ -250,5 +250,42 @@ def polygon_moments(points: Sequence[Point]) -> Moments:
     return Moments(0.5 * double, (ox + x, oy + y), math.fsum(terms))
 
 
+def rounded_polygon_moments(points: Sequence[Point], radius: float) -> Moments:
+    """Return the moments of all points within a radius of a convex polygon.
+
+    Its parts are the polygon, a rectangle along each edge, and a sector at each corner, whose angles add up to 2π. The
+    centroid of a sector of angle θ is 4r sin(θ/2) / 3θ from the corner, its second moment about the corner θr⁴/4.
+
+    Args:
+        points: (n, 2) corners, counter-clockwise, m; three or more.
+        radius: m; 0 for the polygon itself.
+
+    Raises:
+        ValueError: the corners enclose no area, or are clockwise.
+    """
+    parts = [polygon_moments(points)]
+    if radius == 0.0:
+        return parts[0]
+    edges = list(zip(points, (*points[1:], points[0]), strict=True))
+    normals = [math.atan2(a[0] - b[0], b[1] - a[1]) for a, b in edges]
+    for (a, b), normal in zip(edges, normals, strict=True):
+        length, cos, sin = math.dist(a, b), math.cos(normal), math.sin(normal)
+        centre = 0.5 * (a[0] + b[0] + radius * cos), 0.5 * (a[1] + b[1] + radius * sin)
+        area = length * radius
+        parts.append(Moments(area, centre, area * (length * length + radius * radius) / 12.0))
+    for k, corner in enumerate(points):
+        turn = math.remainder(normals[k] - normals[k - 1], math.tau)
+        if turn <= 0.0:  # a straight corner
+            continue
+        middle = normals[k] - 0.5 * turn
+        distance, area = 4.0 * radius * math.sin(0.5 * turn) / (3.0 * turn), 0.5 * radius * radius * turn
+        centre = corner[0] + distance * math.cos(middle), corner[1] + distance * math.sin(middle)
+        parts.append(Moments(area, centre, 0.25 * turn * radius**4 - area * distance * distance))
+    total = math.fsum(part.area for part in parts)
+    x, y = (math.fsum(part.area * part.centroid[k] for part in parts) / total for k in (0, 1))
+    second = math.fsum(part.second + part.area * math.dist(part.centroid, (x, y)) ** 2 for part in parts)
+    return Moments(total, (x, y), second)
+
+
 def _dot(p: Point, q: Point) -> float:
     return p[0] * q[0] + p[1] * q[1]

@@ -30,7 +30,13 @@ from sandbox.scene.description.bodies import (
 from sandbox.scene.description.discs import Disc
 from sandbox.scene.description.fixed import Zone
 from sandbox.scene.description.generators import Stack
-from sandbox.scene.geometry.polygon import Moments, anticlockwise, capsule_moments, disc_moments, polygon_moments
+from sandbox.scene.geometry.polygon import (
+    Moments,
+    anticlockwise,
+    capsule_moments,
+    disc_moments,
+    rounded_polygon_moments,
+)
 from sandbox.scene.geometry.triangulation import convex_parts
 from sandbox.scene.geometry.vectors import nearest_on_segment, to_world
 
@@ -74,7 +80,8 @@ def geometry_of(element: BodySource) -> ElementGeometry:
         area = math.pi * element.radius**2
         mass = element.mass if element.mass is not None else 1.0 if element.density is None else element.density * area
         piece = Piece(((0.0, 0.0),), element.radius)
-        moment = 0.5 * mass * (element.radius * element.radius)
+        stated_moment = getattr(element, "moment", None)  # generators have none
+        moment = 0.5 * mass * (element.radius * element.radius) if stated_moment is None else stated_moment
         radius = element.radius
         return ElementGeometry(
             (piece,), mass, moment, (0.0, 0.0), bounding_radius=radius, inner_radius=radius, half_width=radius
@@ -92,7 +99,9 @@ def _solid_geometry(element: BodySource) -> ElementGeometry:
     weight = [rho * fraction.area for rho, fraction in zip(density, moments, strict=True)]
     mass = math.fsum(weight)
     x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / mass for k in (0, 1))
-    moment = math.fsum(
+    if isinstance(element, Compound) and element.centre_of_mass is not None:
+        x, y = element.centre_of_mass
+    moment = getattr(element, "moment", None) or math.fsum(
         rho * s.second + w * math.dist(s.centroid, (x, y)) ** 2
         for rho, w, s in zip(density, weight, moments, strict=True)
     )
@@ -131,14 +140,17 @@ def _pieces_of(shape: Box | Capsule | Polygon | Stack | AnyPart) -> list[Piece]:
     match shape:
         case BallPart():
             return [Piece(((0.0, 0.0),), shape.radius)]
-        case Capsule() | CapsulePart():
+        case Capsule():
             half = 0.5 * shape.length
             return [Piece(((-half, 0.0), (half, 0.0)), shape.radius)]
+        case CapsulePart():
+            return [Piece(shape.centres, shape.radius)]
         case Box() | BoxPart() | Stack():
             x, y = 0.5 * shape.size[0], 0.5 * shape.size[1]
-            return [Piece(((-x, -y), (x, -y), (x, y), (-x, y)), 0.0)]
+            rounding = 0.0 if isinstance(shape, Stack) else shape.radius
+            return [Piece(((-x, -y), (x, -y), (x, y), (-x, y)), rounding)]
         case Polygon() | PolygonPart():
-            return [Piece(part, 0.0) for part in convex_parts(anticlockwise(shape.points))]
+            return [Piece(part, shape.radius) for part in convex_parts(anticlockwise(shape.points))]
 
 
 def _moved(piece: Piece, part: Attached) -> Piece:
@@ -154,7 +166,7 @@ def _moments(piece: Piece) -> Moments:
         case 2:
             return capsule_moments(piece.corners[0], piece.corners[1], piece.radius)
         case _:
-            return polygon_moments(piece.corners)
+            return rounded_polygon_moments(piece.corners, piece.radius)
 
 
 def _inside(piece: Piece) -> float:
@@ -166,7 +178,7 @@ def _inside(piece: Piece) -> float:
     depth = math.inf
     for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
         depth = min(depth, (ax * by - ay * bx) / math.hypot(bx - ax, by - ay))
-    return max(depth, 0.0)
+    return max(depth + piece.radius, 0.0)
 
 
 def _half_width(piece: Piece) -> float:

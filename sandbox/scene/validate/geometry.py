@@ -40,6 +40,11 @@ def check_outlines(scene: Scene) -> Iterator[LocatedMessage]:
         if not compound.parts:
             message = "has no parts; add a [[body.ball]], [[body.box]], [[body.capsule]] or [[body.polygon]]"
             yield ("body", k), message
+        for n, capsule in enumerate(compound.capsules):
+            if (capsule.length is None) == (capsule.ends is None):
+                yield ("body", k, "capsule", n), "must have either `length` (along x) or `ends`, and not both"
+            elif capsule.ends is not None and capsule.ends[0] == capsule.ends[1]:
+                yield ("body", k, "capsule", n, "ends"), "are the same point; use a [[body.ball]]"
         if all(_is_sound(part.points) for part in compound.polygons):
             yield from _check_part_thickness(k, compound)
 
@@ -82,15 +87,15 @@ def _part_size(part: AnyPart) -> tuple[AnyPart, float, float]:
         case BallPart():
             return part, part.radius, part.radius
         case BoxPart():
-            return part, math.hypot(*part.size), min(part.size)
+            return part, math.hypot(*part.size) + part.radius, min(part.size) + part.radius
         case CapsulePart():
-            return part, part.length + part.radius, part.radius
+            return part, max(math.hypot(*end) for end in part.centres) + part.radius, part.radius
         case PolygonPart():
             points = anticlockwise(part.points)
             pieces = convex_parts(points)
             extents = [extent_of(piece) for piece in pieces]
             thin = min(signed_area(piece) / extent for piece, extent in zip(pieces, extents, strict=True))
-            return part, max(math.hypot(*point) for point in points), thin
+            return part, max(math.hypot(*point) for point in points) + part.radius, thin + part.radius
 
 
 def with_placeholder_shapes(scene: Scene) -> Scene:
@@ -98,7 +103,7 @@ def with_placeholder_shapes(scene: Scene) -> Scene:
     triangle = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     isolated = {"collides": "none", "mass": 1.0, "density": None}
     polygons = tuple(each.model_copy(update={"points": triangle, **isolated}) for each in scene.polygons)
-    no_parts = {"boxes": (), "capsules": (), "polygons": ()}
+    no_parts = {"boxes": (), "capsules": (), "polygons": (), "centre_of_mass": None}
     disc = {"balls": (BallPart(radius=1.0),), **no_parts, **isolated}
     compounds = tuple(each.model_copy(update=disc) for each in scene.compounds)
     return scene.model_copy(update={"polygons": polygons, "compounds": compounds})

@@ -258,6 +258,8 @@ def check_surface(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     if scene.surface is not None:
         yield from _check_body_kind(scene, scene.surface)
     for k, ball in enumerate(scene.balls):
+        if ball.moment is not None and scene.surface is not None:
+            yield ("ball", k, "moment"), "follows from the radius and the mass on a [surface]; remove it"
         if ball.spin is None:
             continue
         if scene.surface is None:

@@ -474,7 +474,8 @@ def test_cursor_shows_what_a_press_does(open_on: Callable[[str], Hand], monkeypa
     assert cursor_at(*hand.pixel((1.0, 3.0))) == pygame.SYSTEM_CURSOR_ARROW
     assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_SIZEALL
     hand.click((0.0, 2.0))
-    corner = next(each for each in hand.editor.handles(hand.view.view_scale) if each.kind == "scale" and each.index == 1)
+    handles = hand.editor.handles(hand.view.view_scale)
+    corner = next(each for each in handles if each.kind == "scale" and each.index == 1)
     assert cursor_at(*hand.pixel(corner.point)) == pygame.SYSTEM_CURSOR_SIZENWSE
     hand.key(pygame.K_b)
     assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_CROSSHAIR

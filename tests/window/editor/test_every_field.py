@@ -1,0 +1,96 @@
+"""Law of the property panel: setting the shown value of a field again changes nothing, and undo restores the text."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from sandbox.scene.editing.draft import SceneDraft
+from sandbox.scene.editing.elements import ElementKey, all_elements
+from sandbox.scene.editing.fields import format_value, parse
+from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
+from sandbox.window.editor.editor import Editor
+from sandbox.window.editor.element_properties import location_of, property_sections
+from sandbox.window.editor.property_panel import PropertyRow, PropertySection
+
+pytestmark = pytest.mark.full  # thousands of changes
+
+ELEMENTS_OF_A_TABLE = 2
+"""Elements of each table whose fields are set"""
+
+
+def select_each(editor: Editor) -> Iterator[None]:
+    """Select nothing, which shows the scene, and then each of the first elements of each table."""
+    keys = () if editor.is_locked else tuple(key for key, _ in all_elements(editor.draft.scene))
+    selections: list[list[ElementKey]] = [[], *([key] for key in keys if key.index < ELEMENTS_OF_A_TABLE)]
+    for editor.selection in selections:
+        yield
+
+
+def sections_of(editor: Editor) -> list[PropertySection]:
+    return property_sections(editor.draft.scene, editor.selection, editor.draft.preset_table)
+
+
+def shown_rows(editor: Editor) -> Iterator[tuple[str, PropertyRow]]:
+    """Yield the key of the section and each row with a value that can be edited, of one section of each kind."""
+    shown = set[tuple[str, ...]]()
+    for section in sections_of(editor):
+        kind = tuple(key for key in section.key.split(":") if not key.isdecimal())
+        if kind not in shown:
+            shown.add(kind)
+            yield from ((section.key, row) for row in section.rows if row.value is not None)
+
+
+def set_value(editor: Editor, section: str, field: str, value: Any) -> str | None:
+    """Set a field as the property panel does; return the message of a fault, or None."""
+    if section.startswith("selection:"):
+        return editor.set_property(editor.selection, field, value)
+    return editor.set_value(location_of(section), field, value)
+
+
+@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
+def test_shown_value_set_again_changes_nothing_and_is_undone(shipped_scene: ShippedScene) -> None:
+    editor = Editor(SceneDraft.read(shipped_scene.path))
+    draft, text, scene = editor.draft, editor.draft.text, editor.draft.scene
+    for _ in select_each(editor):
+        for section, row in shown_rows(editor):
+            if row.spec.kind == "other":
+                continue
+            value = parse(row.spec, format_value(row.spec, row.value))
+            assert set_value(editor, section, row.spec.key, value) is None, (section, row)
+            assert draft.scene == scene, (section, row)
+            if draft.undo_label is not None:
+                editor.undo()
+            assert draft.text == text, (section, row)
+
+
+@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
+def test_field_is_cleared_or_refused_and_undo_restores_the_text(shipped_scene: ShippedScene) -> None:
+    editor = Editor(SceneDraft.read(shipped_scene.path))
+    draft, text = editor.draft, editor.draft.text
+    for _ in select_each(editor):
+        for section, row in shown_rows(editor):
+            if row.spec.is_required:
+                continue
+            fault = set_value(editor, section, row.spec.key, None)
+            assert fault is None or draft.text == text, (section, row)
+            assert sections_of(editor), (section, row)
+            if draft.undo_label is not None:
+                editor.undo()
+            assert draft.text == text, (section, row)
+
+
+@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
+def test_buttons_of_headings_are_undone(shipped_scene: ShippedScene) -> None:
+    editor = Editor(SceneDraft.read(shipped_scene.path))
+    draft, text = editor.draft, editor.draft.text
+    for _ in select_each(editor):
+        for section in sections_of(editor):
+            if section.button == "remove":
+                editor.remove_table(location_of(section.key))
+            elif section.button == "add":
+                editor.add_material() if section.key == "material" else editor.add_pair()
+            assert sections_of(editor), section.title
+            if draft.undo_label is not None:
+                editor.undo()
+            assert draft.text == text, section.title
