@@ -100,7 +100,7 @@ def test_capsule_part_lies_between_its_ends() -> None:
     [
         ('[[body]]\nname = "b"\nposition = [1, 2]\ncapsule = [{ radius = 0.1 }]\n', "either `length`"),
         (
-            '[[body]]\nposition = [1, 2]\ncapsule = [{ radius = 0.1, length = 1.0, ends = [[0, 0], [1, 0]] }]\n',
+            "[[body]]\nposition = [1, 2]\ncapsule = [{ radius = 0.1, length = 1.0, ends = [[0, 0], [1, 0]] }]\n",
             "either `length`",
         ),
         (

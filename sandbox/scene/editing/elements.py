@@ -15,7 +15,7 @@ from sandbox.scene.description.joints import Joined
 from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.description.world import Pair
 from sandbox.scene.errors import Location
-from sandbox.scene.files.toml_changes import Change, RemoveElement, SetValue
+from sandbox.scene.files.toml_changes import Change, RemoveElement, RemoveValue, SetValue
 
 FIELD_OF = {str(field.alias): name for name, field in Scene.model_fields.items() if field.alias is not None}
 """Attribute of a scene, by the heading of its list of tables"""
@@ -217,10 +217,19 @@ def _material_references(element: Part) -> Iterator[tuple[Location, str]]:
         yield from ((("between", k), name) for k, name in enumerate(element.between))
 
 
+def _play_references(scene: Scene) -> Iterator[tuple[Location, str]]:
+    """Yield where `[play]` names an element or a body, as a path in the document, and the name."""
+    for key in ("arrows", "relaunch"):
+        name = getattr(scene.play, key)
+        if name is not None:
+            yield ("play", key), name
+    yield from ((("play", "part", k, "name"), part.name) for k, part in enumerate(scene.play.parts))
+
+
 def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
     """Return the changes that remove elements, and with their bodies all elements that refer to them."""
     gone = set(keys)
-    names = {name for key in keys for name in body_names(scene, key)}
+    names = {name for key in keys for name in (*body_names(scene, key), name_of(scene, key))}
     while True:
         more = {
             key for key, element in all_elements(scene) if key not in gone and names & set(bodies_referred_to(element))
@@ -228,28 +237,56 @@ def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
         if not more:
             break
         gone |= more
-        names |= {name for key in more for name in body_names(scene, key)}
-    return [RemoveElement(key.table, key.index) for key in sorted(gone)]
+        names |= {name for key in more for name in (*body_names(scene, key), name_of(scene, key))}
+    roles = [RemoveValue(path[:3]) for path, name in _play_references(scene) if name in names]  # parts, or single keys
+    return [*roles, *_kept_names(scene, gone), *(RemoveElement(key.table, key.index) for key in sorted(gone))]
+
+
+def _kept_names(scene: Scene, gone: Collection[ElementKey]) -> Iterator[Change]:
+    """Yield the changes that write default names which a removal would change, in tables where it matters.
+
+    It matters where such a name is referred to, or could become that of an element whose name is in the file.
+    """
+    referred = {name for _, element in all_elements(scene) for name in bodies_referred_to(element)}
+    referred |= {name for _, name in _play_references(scene)}
+    for table in {key.table for key in gone}:
+        first = min(key.index for key in gone if key.table == table)
+        kept = [ElementKey(table, k) for k in range(len(elements_of_table(scene, table)))]
+        kept = [key for key in kept if key not in gone]
+        stated = {name for key in kept if (name := getattr(element_at(scene, key), "name", None)) is not None}
+        defaults = {default_name(table, k) for k in range(len(kept))}
+        renamed = [key for key in kept if key.index > first and _has_default_name(scene, key)]
+        names = {name for key in renamed for name in (name_of(scene, key), *body_names(scene, key))}
+        if names & referred or stated & defaults:
+            yield from (SetValue((*key.location, "name"), name_of(scene, key)) for key in renamed)
+
+
+def _has_default_name(scene: Scene, key: ElementKey) -> bool:
+    element = element_at(scene, key)
+    return "name" in type(element).model_fields and getattr(element, "name", None) is None
 
 
 def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
-    """Return the changes that rename an element, and the references to it."""
-    before, references = name_of(scene, key), _material_references if key.table == "material" else body_references
+    """Return the changes that rename an element with its bodies, and the references to them."""
+    before, is_material = name_of(scene, key), key.table == "material"
+    references = _material_references if is_material else body_references
+    renamed = {before: name} | {body: name + body.removeprefix(before) for body in body_names(scene, key)}
     changes: list[Change] = [SetValue((*key.location, "name"), name)]
     for other, element in all_elements(scene):
-        changes += [SetValue((*other.location, *path), name) for path, found in references(element) if found == before]
-    return changes
+        found = [(path, renamed[name]) for path, name in references(element) if name in renamed]
+        changes += [SetValue((*other.location, *path), new) for path, new in found]
+    roles = () if is_material else _play_references(scene)
+    return [*changes, *(SetValue(path, renamed[each]) for path, each in roles if each in renamed)]
 
 
 def naming(scene: Scene, body: int) -> list[Change]:
-    """Return the changes that write the name of a body, for a new reference to it; empty if the file has its name.
+    """Return the changes that write the name of the element of a body, for a new reference to the body.
 
-    Default names change with the order of elements.
+    They are empty if the file has the name. Default names change with the order of elements.
     """
     key = element_of_body(scene, body)
-    is_default = getattr(element_at(scene, key), "name", None) is None
-    name = scene.bodies.names[body]
-    return renaming(scene, key, name) if is_default and name == name_of(scene, key) else []
+    is_named = getattr(element_at(scene, key), "name", None) is not None
+    return [] if is_named else [SetValue((*key.location, "name"), name_of(scene, key))]
 
 
 def material_users(scene: Scene, material: str) -> list[ElementKey]:

@@ -252,7 +252,8 @@ def _parse_list(spec: FieldSpec, typed: str) -> list[Any]:
     assert spec.item is not None
     is_of_arrays = spec.item.kind in ("numbers", "list")
     parts = [] if typed == "[]" else _points(typed) if is_of_arrays else _texts(typed)
-    items = [parse(spec.item, part) for part in parts]
+    is_of_texts = spec.item.kind in ("text", "name")
+    items = [_parse_text(spec.item, part) if is_of_texts else parse(spec.item, part) for part in parts]
     is_fixed = spec.min_items == spec.max_items
     if len(items) < spec.min_items or (spec.max_items is not None and len(items) > spec.max_items):
         noun = "points, with semicolons between them" if is_of_arrays else "of them, with commas between"
@@ -282,7 +283,8 @@ def _texts(typed: str) -> list[str]:
             raise ValueError("must be texts with commas between them; one with a comma is in double quotes")
         try:
             found.append(json.loads(match[1]) if match[1] else match[2].strip())
-        except ValueError:
+            found[-1].encode("utf-8")
+        except ValueError:  # also of half a surrogate pair
             raise ValueError(f"must be a text in double quotes, is {_shortened(match[1])}") from None
         position = match.end()
     return found

@@ -86,7 +86,7 @@ def with_changes(text: str, changes: Sequence[Change]) -> str:
     result = editor.result([change for change in changes if isinstance(change, AddElement)])
     if not had_newline:
         result = result.removesuffix("\n").removesuffix("\r")
-    if _without_empty(_loaded(result)) != _without_empty(wanted):
+    if _without_empty(_without_emptied(_loaded(result), altered)) != _without_empty(wanted):
         raise TextEditError("the layout of the file cannot be changed automatically; edit it by hand")
     return result
 
@@ -154,11 +154,32 @@ def _without_empty(document: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in document.items() if value not in ([], {})}
 
 
+def _without_emptied(document: dict[str, Any], altered: dict[str, Any]) -> dict[str, Any]:
+    """Return a document without the empty lists in its tables whose elements were all removed."""
+    result = {}
+    for key, value in document.items():
+        before = altered.get(key)
+        if value == [] and isinstance(before, list) and _REMOVED in before:
+            continue
+        if isinstance(value, dict) and isinstance(before, dict):
+            value = _without_emptied(value, before)
+        elif isinstance(value, list) and isinstance(before, list):
+            rest = [each for each in before if each is not _REMOVED]
+            are_tables = len(rest) == len(value) and all(isinstance(each, dict) for each in (*rest, *value))
+            value = [_without_emptied(*each) for each in zip(value, rest, strict=True)] if are_tables else value
+        result[key] = value
+    return result
+
+
 def _kept(value: Any) -> Any:
-    """Return a value without the removed elements of its lists."""
+    """Return a value without the removed elements of its lists, and tables without the lists that became empty."""
     if isinstance(value, dict):
-        return {key: _kept(inner) for key, inner in value.items()}
+        return {key: _kept(inner) for key, inner in value.items() if not _is_emptied(inner)}
     return [_kept(inner) for inner in value if inner is not _REMOVED] if isinstance(value, list) else value
+
+
+def _is_emptied(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(each is _REMOVED for each in value)
 
 
 def _plain(value: Any, location: Location) -> Any:

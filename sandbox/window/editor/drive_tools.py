@@ -86,11 +86,15 @@ class PlungerGesture(Gesture):
         return numbers[0] if numbers else round_value(math.dist(self.begin, self.end))
 
     def changes(self) -> list[Change]:
-        """Return the changes that add the drive; empty without a pull."""
+        """Return the changes that add the drive.
+
+        Raises:
+            PlacementError: it is not pulled.
+        """
         x, y = self.begin[0] - self.end[0], self.begin[1] - self.end[1]
         travel, length = self.travel(), math.hypot(x, y)
         if travel <= 0.0:
-            return []
+            raise PlacementError("a plunger needs a way: drag it back as far as it can be pulled")
         direction = [float(f"{x / length:.4g}") + 0.0, float(f"{y / length:.4g}") + 0.0] if length else [0.0, 1.0]
         values: dict[str, Any] = {
             "name": self.name,

@@ -107,8 +107,10 @@ class EditView:
         if self.prompt is not None and event.type in (pygame.KEYDOWN, pygame.TEXTINPUT, pygame.MOUSEBUTTONDOWN):
             self._prompt(self.prompt, event)
             return True
-        if self._context.gui.panel.visible and self.panel.handle_event(event):
-            return True
+        if self._context.gui.panel.visible:
+            self._show_panel(self._context.surface.get_size())  # an event before it may have changed the draft
+            if self.panel.handle_event(event):
+                return True
         if self._use_check_marks(event):
             return True
         if event.type == pygame.KEYDOWN:
@@ -464,7 +466,7 @@ class EditView:
         note = ""
         if editor.is_locked:
             note = f"[{self.draft.preset}] makes this scene. Ctrl+Shift+X replaces it by its elements, to edit them."
-        self.panel.show(property_sections(self.draft.scene, editor.selection, self.draft.preset_table), note)
+        self.panel.show(property_sections(self.draft, editor.selection), note)
         self._note_unsaved()
 
     def _draw_status(self, surface: pygame.Surface, area: pygame.Rect) -> None:

@@ -173,7 +173,7 @@ class Editor:
         """Press the left button at a point."""
         self.fault = self._preview = None
         if self.is_locked:
-            self._notify(f"[{self.draft.preset}] makes this scene; Ctrl+Shift+X takes it apart", "warning")
+            self._notify_locked()
             return
         if self.gesture is not None and self.gesture.is_multi_click:
             self._click_again(point, view, control)
@@ -194,6 +194,9 @@ class Editor:
                 self._notify(str(error), "warning")
             if isinstance(self.gesture, JointGesture) and self.tool in ONE_CLICK:
                 self.finish()
+
+    def _notify_locked(self) -> None:
+        self._notify(f"[{self.draft.preset}] makes this scene; Ctrl+Shift+X takes it apart", "warning")
 
     def _add_attraction(self, point: Point, view: ViewScale, control: bool) -> None:
         scene = self.draft.scene
@@ -404,8 +407,8 @@ class Editor:
         try:
             self.draft.change(changes, label, merge)
         except SceneError as error:
-            message = "; ".join(fault.message for fault in error.faults[:2])
-            self.fault = list(self.selection), message
+            message = _fault_text(error)
+            self.fault = list(self.selection) if self.tool == "select" else [], message
             self._notify(message, "error")
             return False
         except TextEditError as error:
@@ -430,7 +433,10 @@ class Editor:
 
     def select_all(self) -> None:
         """Select all elements with a place."""
-        hidden = ("material", "pair", "drive")
+        if self.is_locked:
+            self._notify_locked()
+            return
+        hidden = ("material", "pair", "drive", "shot")
         self.selection = [key for key, _ in all_elements(self.draft.scene) if key.table not in hidden]
 
     def copy(self) -> None:
@@ -575,21 +581,27 @@ class Editor:
             value: the new value; None removes the key.
         """
         scene = self.draft.scene
-        changes: list[Change] = []
+        changes, taken = self._new_material(name, value), all_names(scene)
         for key in keys:
-            if name == "material" and value is not None and value not in {m.name for m in scene.materials}:
-                changes += [] if changes else [AddElement("material", {"name": value})]  # a new one
             if name == "name" and value is not None:
-                changes += renaming(scene, key, value if len(keys) == 1 else unique_name(value, all_names(scene)))
+                own = value if len(keys) == 1 else unique_name(value, taken)
+                taken.add(own)
+                changes += renaming(scene, key, own)
             else:
                 changes.append(self._setting(key.location, name, value))
-        return self._change_property(changes, f"set {name} of {_count(list(keys))}")
+        return self._change_property(changes, f"set {name} of {_count(list(keys))}", name)
 
     def set_value(self, location: Location, name: str, value: Any) -> str | None:
         """Set a key of a table at a location, as `set_property` does; an empty location is the scene itself."""
         if len(location) == 2 and isinstance(location[1], int):
             return self.set_property([ElementKey(str(location[0]), location[1])], name, value)
-        return self._change_property([self._setting(location, name, value)], f"set {name}")
+        changes = [*self._new_material(name, value), self._setting(location, name, value)]
+        return self._change_property(changes, f"set {name}", name)
+
+    def _new_material(self, name: str, value: Any) -> list[Change]:
+        """Return the change that adds a material if a key names one that the scene does not have."""
+        known = {material.name for material in self.draft.scene.materials}
+        return [AddElement("material", {"name": value})] if name == "material" and value not in {None, *known} else []
 
     def _setting(self, location: Location, name: str, value: Any) -> Change:
         """Return the change that sets a key, or removes it, with a table within the table that has no other key."""
@@ -602,12 +614,12 @@ class Editor:
         is_last = len(path) > len(location) + 1 and set(table) <= {path[-1]}
         return RemoveValue(path[:-1] if is_last else path)
 
-    def _change_property(self, changes: Sequence[Change], label: str) -> str | None:
+    def _change_property(self, changes: Sequence[Change], label: str, field: str) -> str | None:
         """Apply the changes of a property; return the message of a fault, or None."""
         try:
             self.draft.change(changes, label)
         except SceneError as error:
-            return "; ".join(fault.message for fault in error.faults[:2])
+            return _fault_text(error, field)
         except TextEditError as error:
             return str(error)
         self._drop_gesture()
@@ -618,9 +630,13 @@ class Editor:
         """Remove a table, such as `[surface]`, a part of a rigid body, or a material that no element has."""
         scene = self.draft.scene
         if len(location) != 2 or not isinstance(location[1], int):
-            self.apply([RemoveValue(location)], f"remove {location[-2] if len(location) > 2 else location[-1]}")
+            also = [RemoveValue(("contact_models",))] if location == ("surface",) else []
+            label = f"remove {location[-2] if len(location) > 2 else location[-1]}"
+            self.apply([RemoveValue(location), *also], label)
             return
         key = ElementKey(str(location[0]), location[1])
+        if not exists(scene, key):
+            return
         users = material_users(scene, name_of(scene, key)) if key.table == "material" else []
         if users:
             more = f" and {len(users) - 1} more" if len(users) > 1 else ""
@@ -647,6 +663,15 @@ class Editor:
             self._notify("all pairs of materials have coefficients", "info")
             return
         self.apply([AddElement("pair", {"between": free})], "add a pair")
+
+
+def _fault_text(error: SceneError, field: str = "") -> str:
+    """Return the messages of at most two faults, with the path of each that is not at the edited field."""
+    texts = [
+        fault.message if not field or fault.path.endswith(field) else f"{fault.path}: {fault.message}"
+        for fault in error.faults
+    ]
+    return "; ".join(list(dict.fromkeys(texts))[:2])
 
 
 def _count(keys: Sequence[ElementKey]) -> str:

@@ -1,11 +1,15 @@
 """Sections of the property panel: the fields of the selected elements, or of the scene."""
 
+import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
-from sandbox.scene.description.surface import Floor
+from sandbox.scene.description.play import Play
+from sandbox.scene.description.surface import Floor, Shot
+from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import ElementKey, body_names, element_at, elements_of_table, name_of, table_values
 from sandbox.scene.editing.fields import fields_of
 from sandbox.scene.errors import Location
@@ -15,22 +19,22 @@ ATTACHED_TABLES = ("drive", "shot")
 """Elements without a place of their own, which are shown with their body"""
 
 
-def property_sections(
-    scene: Scene, selection: Sequence[ElementKey], preset: tuple[str, Part] | None = None
-) -> list[PropertySection]:
+def property_sections(draft: SceneDraft, selection: Sequence[ElementKey]) -> list[PropertySection]:
     """Return a section for the selected elements of each table; without a selection, those of the scene.
 
     The key of a section is `selection:TABLE`, `scene`, or the location of a table, such as `world` or `material:3`.
     Tables within tables, such as the parts of a rigid body, have sections of their own.
 
     Args:
-        scene: the scene.
+        draft: the scene and its file.
         selection: the selected elements.
-        preset: heading of the preset that makes the scene, and its table.
     """
     if selection:
-        return list(_sections_of_selection(scene, selection))
-    return list(_sections_of_scene(scene, preset))
+        return list(_sections_of_selection(draft.scene, selection))
+    preset = draft.preset_table
+    if preset is not None:
+        return list(_sections_of_preset(draft, *preset))
+    return list(_sections_of_scene(draft.scene))
 
 
 def location_of(section: str) -> Location:
@@ -56,16 +60,32 @@ def _sections_of_selection(scene: Scene, selection: Sequence[ElementKey]) -> Ite
                 yield _section(other.location, f"{table} {name_of(scene, other)}", element, True, is_removable=True)
 
 
-def _sections_of_scene(scene: Scene, preset: tuple[str, Part] | None) -> Iterator[PropertySection]:
+def _sections_of_preset(draft: SceneDraft, heading: str, table: Part) -> Iterator[PropertySection]:
+    """Yield the sections of a scene that a preset makes: the tables of its file, whose values take precedence."""
+    scene, document = draft.scene, draft.document
     yield PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about")))
-    if preset is not None:
-        heading, table = preset
-        yield _section((heading,), heading, table, True)
-        yield from _sections_within((heading,), table)
+    yield _section((heading,), heading, table, True)
+    yield from _sections_within((heading,), table)
+    for key, part in (("world", scene.world), ("solver", scene.solver)):
+        stated = document.get(key, {})
+        rows = [
+            PropertyRow(replace(row.spec, default=getattr(part, row.spec.key)), stated.get(row.spec.key))
+            for row in _rows(type(part), [part])
+        ]
+        yield PropertySection(key, key, tuple(rows))
+    if "play" in document:
+        play = Play.model_validate_json(json.dumps(document["play"]), by_alias=True)
+        yield _section(("play",), "play", play, False)
+        yield from _sections_within(("play",), play)
+    for k, each in enumerate(document.get("shot", ())):
+        shot = Shot.model_validate_json(json.dumps(each), by_alias=True)
+        yield _section(("shot", k), f"shot {shot.name or k + 1}", shot, False)
+
+
+def _sections_of_scene(scene: Scene) -> Iterator[PropertySection]:
+    yield PropertySection("scene", "scene", _rows(type(scene), [scene], ("title", "about")))
     yield _section(("world",), "world", scene.world, True)
     yield _section(("solver",), "solver", scene.solver, True)
-    if preset is not None:
-        return  # it makes the other tables
     if scene.surface is None:
         yield PropertySection("surface (none)", "surface", _rows(Floor, []), False)
     else:

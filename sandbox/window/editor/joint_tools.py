@@ -6,7 +6,7 @@ from typing import Any
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import naming
+from sandbox.scene.editing.elements import all_names, naming, unique_name
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
@@ -141,7 +141,7 @@ def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name
     gravity = math.hypot(*scene.world.gravity) or 1.0
     torque = MOTOR_TORQUE_FACTOR * float(scene.bodies.mass[index]) * gravity * float(scene.bodies.radius[index])
     motor = {
-        "name": f"{name} motor",
+        "name": unique_name(f"{name} motor", all_names(scene)),
         "kind": "motor",
         "between": names,
         "rate": round_value(-MOTOR_RATE if len(names) == 2 else MOTOR_RATE),

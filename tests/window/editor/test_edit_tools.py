@@ -204,6 +204,58 @@ def test_tables_of_play_and_parts_of_bodies_are_edited(open_on: Callable[[str], 
     assert loads(hand.view.draft.text) == hand.scene
 
 
+def test_sections_are_those_of_the_draft_when_several_events_come_at_once(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on("".join(f'[[material]]\nname = "m{k}"\n' for k in range(3)) + BALL)
+    hand.frame()
+    button = hand.in_view(lambda: hand.view.panel.button_of("material:2"))
+    click = press(*button.center), release(*button.center)
+    hand.frame(*click, *click)
+    assert len(hand.scene.materials) >= 1  # and no exception
+    assert hand.editor.set_value(("material", 7), "friction", 0.5) is not None
+    hand.editor.set_value(("body", 0, "box", 7), "size", None)  # nothing to remove
+
+
+def test_name_of_a_generator_is_written_for_a_joint_to_one_of_its_bodies(open_on: Callable[[str], Hand]) -> None:
+    rope = "[[rope]]\nstart = [{0}, 4]\nend = [{1}, 4]\nlinks = 4\nradius = 0.1\n"
+    hand = open_on(BALL + rope.format(-4, -2) + rope.format(-1, 1) + rope.format(2, 4))
+    node = hand.scene.bodies.position[hand.scene.bodies.number_of["rope-2-2"]].tolist()
+    hand.key(pygame.K_1)
+    hand.click((node[0], node[1]), (0.0, 2.0))
+    assert [each.name for each in hand.scene.ropes] == [None, "rope-2", None]
+    hand.key(pygame.K_v)
+    hand.editor.selection = [ElementKey("rope", 0)]
+    hand.key(pygame.K_DELETE)
+    assert [each.name for each in hand.scene.ropes] == ["rope-2", "rope-3"]  # which would be the second one's name
+    x = hand.scene.bodies.position[hand.scene.bodies.number_of[hand.scene.joints[0].between[0]], 0]
+    assert x == node[0]  # still the same rope
+    hand.editor.set_property([ElementKey("rope", 0)], "name", "line")
+    assert hand.scene.joints[0].between == ("line-2", "a")
+
+
+def test_names_of_several_and_references_of_play(open_on: Callable[[str], Hand]) -> None:
+    hand = open_on(BALL + '[play]\narrows = "a"\n')
+    keys = [ElementKey("ball", 0), ElementKey("ball", 1)]
+    assert hand.editor.set_property(keys, "name", "c") is None
+    assert [ball.name for ball in hand.scene.balls] == ["c", "c 2"]
+    assert hand.scene.play.arrows == "c"
+    hand.editor.selection = keys
+    hand.key(pygame.K_DELETE)
+    assert not hand.scene.balls and hand.scene.play.arrows is None
+
+
+def test_last_part_of_a_kind_and_second_motor(open_on: Callable[[str], Hand]) -> None:
+    parts = "box = [{ size = [0.2, 1.0] }]\nball = [{ radius = 0.3 }]\n"
+    hand = open_on(BALL + f'[[body]]\nname = "hammer"\nposition = [4.0, 2.0]\n{parts}')
+    hand.editor.remove_table(("body", 0, "box", 0))
+    assert not hand.scene.compounds[0].boxes
+    hand.key(pygame.K_5)
+    hand.click((0.0, 2.0))
+    hand.editor.selection = [ElementKey("joint", 0)]
+    hand.key(pygame.K_DELETE)
+    hand.click((2.0, 2.0))
+    assert len({joint.name for joint in hand.scene.joints}) == 3
+
+
 def unfold(hand: Hand, section: str) -> None:
     """Click a heading of the property panel."""
     heading = hand.in_view(lambda: hand.view.panel.heading_of(section))

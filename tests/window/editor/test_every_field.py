@@ -28,7 +28,7 @@ def select_each(editor: Editor) -> Iterator[None]:
 
 
 def sections_of(editor: Editor) -> list[PropertySection]:
-    return property_sections(editor.draft.scene, editor.selection, editor.draft.preset_table)
+    return property_sections(editor.draft, editor.selection)
 
 
 def shown_rows(editor: Editor) -> Iterator[tuple[str, PropertyRow]]:
@@ -82,15 +82,19 @@ def test_field_is_cleared_or_refused_and_undo_restores_the_text(shipped_scene: S
 
 @pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
 def test_buttons_of_headings_are_undone(shipped_scene: ShippedScene) -> None:
-    editor = Editor(SceneDraft.read(shipped_scene.path))
+    messages = list[str]()
+    editor = Editor(SceneDraft.read(shipped_scene.path), lambda text, _: messages.append(text))
     draft, text = editor.draft, editor.draft.text
     for _ in select_each(editor):
         for section in sections_of(editor):
+            messages.clear()
             if section.button == "remove":
                 editor.remove_table(location_of(section.key))
             elif section.button == "add":
                 editor.add_material() if section.key == "material" else editor.add_pair()
             assert sections_of(editor), section.title
+            assert section.button == "" or draft.text != text or messages, section.title
+            assert not any("edit it by hand" in message for message in messages), (section.title, messages)
             if draft.undo_label is not None:
                 editor.undo()
             assert draft.text == text, section.title
