@@ -281,6 +281,11 @@ PROOFS: dict[Demand, Proof] = {
         ),
         both(position(2.0, 0.0), position(0.75, 0.7, body=1)),
     ),
+    # the second ball stands in the way of the first, which passes it
+    Demand.GROUPS: Proof(
+        scene(ball=[ball(vx=2.0, group="a"), ball(1.0, group="a", name="passed"), ball(1.0, 5.0, name="apart")]),
+        both(position(2.0, 0.0), position(1.0, 0.0, body=1)),
+    ),
     # gravity within 0.5 m around x = 1: 0.5 s at −4 m/s²
     Demand.ZONES: Proof(
         scene(

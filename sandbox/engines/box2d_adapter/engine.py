@@ -55,6 +55,7 @@ OWN = frozenset(
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
+        Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
     }

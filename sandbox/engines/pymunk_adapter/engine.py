@@ -19,7 +19,17 @@ if TYPE_CHECKING:
 FIXED_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
 """Settings that describe pymunk's methods, each with its only supported value"""
 
-OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})
+OWN = frozenset(
+    {
+        Demand.POLYGONS,
+        Demand.ATTRACTION,
+        Demand.THRUST,
+        Demand.LAYERS,
+        Demand.GROUPS,
+        Demand.ZONES,
+        Demand.DRIVES,
+    }
+)
 
 PERSISTENCE = 3
 """pymunk's default, substeps"""

@@ -127,7 +127,7 @@ def find_contacts(
     if pairs < 0 or near < 0:
         return -1, 0, 0
     if pairs:
-        if len(balls.excluded):
+        if len(balls.excluded) or balls.group.any():
             pairs = drop_excluded(keys[:pairs], balls.owner, balls.excluded, balls.group)
         size = find_ball_contacts(keys[:pairs], position, radius, balls.surface, bodies.tangential, 0.0, out, size)
     if len(walls.planes) and number.plane_tests:

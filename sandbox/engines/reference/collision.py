@@ -306,6 +306,7 @@ class CirclePipeline(CollisionPipeline):
         """Update after a change of the bodies or static colliders in the body store."""
         super().rebuild()
         self._excluded: IntArray = excluded_pair_keys(self._store.links)
+        self._has_groups = bool(self._store.bodies.group.any())
         self._owner = np.arange(len(self._store.position))  # each ball is its own body
 
     @property
@@ -320,7 +321,7 @@ class CirclePipeline(CollisionPipeline):
         balls = segments = self._ball_keys[:0]
         if store.contact_matrix.ball_ball and not segments_only:
             balls = self._find_pairs(position, store.radius, store.collision_mask, self._moves, margin)
-            if len(self._excluded):
+            if len(self._excluded) or self._has_groups:
                 balls = balls[: drop_excluded(balls, self._owner, self._excluded, store.bodies.group)]
         if len(boxes.index):
             self._segment_keys, segments = self._search(

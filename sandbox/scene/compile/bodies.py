@@ -164,6 +164,9 @@ STATE = ("position", "velocity", "angle", "angular_velocity")
 FORM = ("radius", "core", "thin", "mass", "moment")
 COLUMNS = (*STATE, *FORM, "fixed", "group", "born", "lifetime", "roll", "layer", "visits")
 
+FIRST_NAMED_GROUP = 2**20
+"""Number of the first group that is named in a scene; ragdolls have lower ones."""
+
 SPHERE_MOMENT_RATIO = 0.8
 """Moment of inertia of a sphere, ⅖ m r², relative to that of a disc, ½ m r²."""
 
@@ -213,6 +216,8 @@ class Bodies:
     """whether balls are spheres, as on a surface, and not discs"""
     layers: tuple[str, ...] = (GROUND,)
     """collision layers of the scene"""
+    groups: tuple[str, ...] = ()
+    """names of groups; bodies of the k-th are in the group `FIRST_NAMED_GROUP + k`"""
 
     def __deepcopy__(self, _: dict[int, Any]) -> Self:
         """Return itself: it never changes, so that copies of a simulation can share it."""
@@ -250,9 +255,8 @@ class Bodies:
 
     def joined_by(self, single: BodySpec, name: str) -> "Bodies":
         """Return these bodies with one more, which gets the next index."""
-        added = join_layouts(
-            [name], (single,), [layout_of_singles([single])], self.spheres, self.layers, self.visits.shape[1]
-        )
+        layouts, zones = [layout_of_singles([single])], self.visits.shape[1]
+        added = join_layouts([name], (single,), layouts, self.spheres, self.layers, zones, self.groups)
         columns = {key: np.concatenate((getattr(self, key), getattr(added, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
         elements = (*self.elements, single)
@@ -262,6 +266,7 @@ class Bodies:
             elements=elements,
             spheres=self.spheres,
             layers=self.layers,
+            groups=added.groups,
             **columns,
         )
 
@@ -309,13 +314,21 @@ def join_layouts(
     spheres: bool,
     layers: tuple[str, ...],
     zones: int,
+    groups: tuple[str, ...] = (),
 ) -> Bodies:
-    """Concatenate layouts; each has as many elements as its bodies refer to."""
+    """Concatenate layouts; each has as many elements as its bodies refer to. `groups` are known already."""
     layouts = [*layouts, NO_LAYOUT]
     used = np.cumsum([0, *(each.elements for each in layouts)])
     element = np.concatenate([each.element + first for each, first in zip(layouts, used.tolist(), strict=False)])
     alone = np.cumsum([each.alone for each in layouts])
-    group = [np.full(len(each), number if each.alone else 0) for each, number in zip(layouts, alone, strict=True)]
+    group = np.concatenate(
+        [np.full(len(each), number if each.alone else 0) for each, number in zip(layouts, alone, strict=True)]
+    )
+    named = [each.group if isinstance(each, BodySpec) else None for each in elements]
+    groups = tuple(dict.fromkeys((*groups, *(name for name in named if name is not None))))
+    if groups:
+        number = np.asarray([0 if name is None else FIRST_NAMED_GROUP + groups.index(name) for name in named], np.int64)
+        group = np.where(number[element] > 0, number[element], group)
     lives = [np.full(len(each), np.inf) if each.lifetime is None else each.lifetime for each in layouts]
     rolls = [np.zeros((len(each), 2)) if each.roll is None else each.roll for each in layouts]
     shapes = [geometry_of(each) for each in elements]
@@ -335,7 +348,7 @@ def join_layouts(
         thin=of_element([shape.half_width for shape in shapes]),
         mass=of_element([shape.mass for shape in shapes]),
         moment=of_element([shape.moment * fraction for shape, fraction in zip(shapes, of_sphere, strict=True)]),
-        group=np.concatenate(group),
+        group=group,
         born=np.zeros(len(names)),
         lifetime=np.concatenate(lives),
         roll=np.concatenate(rolls) + 0.0,
@@ -345,6 +358,7 @@ def join_layouts(
         elements=elements,
         spheres=spheres,
         layers=layers,
+        groups=groups,
     )
 
 

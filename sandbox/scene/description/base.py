@@ -127,3 +127,7 @@ class BodySpec(BodySource):
     """Never moves, as if infinitely heavy."""
     moment: Moment | None = None
     """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""
+    fixed_rotation: bool = False
+    """Never turns, as if its moment of inertia were infinite."""
+    group: Name | None = None
+    """name of a group of bodies that do not collide with each other"""

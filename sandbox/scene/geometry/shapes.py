@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.scene.description.base import BodySource, Point
+from sandbox.scene.description.base import BodySource, BodySpec, Point
 from sandbox.scene.description.bodies import (
     AnyPart,
     Attached,
@@ -80,13 +80,23 @@ def geometry_of(element: BodySource) -> ElementGeometry:
         area = math.pi * element.radius**2
         mass = element.mass if element.mass is not None else 1.0 if element.density is None else element.density * area
         piece = Piece(((0.0, 0.0),), element.radius)
-        stated_moment = getattr(element, "moment", None)  # generators have none
-        moment = 0.5 * mass * (element.radius * element.radius) if stated_moment is None else stated_moment
+        moment = _stated_moment(element) or 0.5 * mass * (element.radius * element.radius)
         radius = element.radius
         return ElementGeometry(
             (piece,), mass, moment, (0.0, 0.0), bounding_radius=radius, inner_radius=radius, half_width=radius
         )
     return _solid_geometry(element)
+
+
+UNTURNABLE = 1e42
+"""kg·m², moment of inertia of bodies with `fixed_rotation`: no torque in range turns them by a measurable angle"""
+
+
+def _stated_moment(element: BodySource) -> float | None:
+    """Return the moment of inertia that an element states, kg·m²; None without one, as of generators."""
+    if not isinstance(element, BodySpec):
+        return None
+    return UNTURNABLE if element.fixed_rotation else element.moment
 
 
 @lru_cache(maxsize=4096)
@@ -101,7 +111,7 @@ def _solid_geometry(element: BodySource) -> ElementGeometry:
     x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / mass for k in (0, 1))
     if isinstance(element, Compound) and element.centre_of_mass is not None:
         x, y = element.centre_of_mass
-    moment = getattr(element, "moment", None) or math.fsum(
+    moment = _stated_moment(element) or math.fsum(
         rho * s.second + w * math.dist(s.centroid, (x, y)) ** 2
         for rho, w, s in zip(density, weight, moments, strict=True)
     )

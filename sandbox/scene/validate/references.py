@@ -257,6 +257,13 @@ def check_surface(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Yield the faults of settings that need a `[surface]`."""
     if scene.surface is not None:
         yield from _check_body_kind(scene, scene.surface)
+    for table, sources in scene.kinds.items():
+        for k, source in enumerate(sources):
+            if isinstance(source, BodySpec) and source.fixed_rotation:
+                if source.moment is not None:
+                    yield (table, k, "moment"), "has no effect with `fixed_rotation`; remove one of them"
+                if source.angular_velocity:
+                    yield (table, k, "angular_velocity"), "is not 0, but the body has a `fixed_rotation`"
     for k, ball in enumerate(scene.balls):
         if ball.moment is not None and scene.surface is not None:
             yield ("ball", k, "moment"), "follows from the radius and the mass on a [surface]; remove it"
