@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from sandbox.batch.store import Store
     from sandbox.engines.contract import Divergence, Refusal
     from sandbox.engines.exact.tabletop.shots import Table
+    from sandbox.engines.pymunk_adapter.capture import CaptureError, CaptureWarning, from_pymunk
     from sandbox.engines.reference.integrate import IntegrationResult, integrate
     from sandbox.engines.reference.integrators import INTEGRATORS
     from sandbox.engines.registry import ENGINES, UnknownEngineError
@@ -67,6 +68,8 @@ __all__ = [
     "Ball",
     "Box",
     "Capsule",
+    "CaptureError",
+    "CaptureWarning",
     "Compound",
     "Contacts",
     "Divergence",
@@ -108,6 +111,7 @@ __all__ = [
     "demands",
     "dumps",
     "ensemble",
+    "from_pymunk",
     "horizon",
     "integrate",
     "load",
@@ -129,6 +133,8 @@ _HOMES = {
     "Ball": "sandbox.scene.description.discs",
     "Box": "sandbox.scene.description.bodies",
     "Capsule": "sandbox.scene.description.bodies",
+    "CaptureError": "sandbox.engines.pymunk_adapter.capture",
+    "CaptureWarning": "sandbox.engines.pymunk_adapter.capture",
     "Compound": "sandbox.scene.description.bodies",
     "Contacts": "sandbox.trajectory",
     "Divergence": "sandbox.engines.contract",
@@ -169,6 +175,7 @@ _HOMES = {
     "demands": "sandbox.scene.compile.demands",
     "dumps": "sandbox.scene.files.load",
     "ensemble": "sandbox.measure.run.ensemble",
+    "from_pymunk": "sandbox.engines.pymunk_adapter.capture",
     "horizon": "sandbox.games.billiards.shots",
     "integrate": "sandbox.engines.reference.integrate",
     "load": "sandbox.scene.files.load",

@@ -29,6 +29,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Collides, Point
+from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
 from sandbox.scene.description.world import Settings
 
@@ -97,7 +98,9 @@ def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0
     if bodies.all_round:
         yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
         return
-    shapes = bodies.shapes
+    shapes, element = bodies.shapes, bodies.elements[bodies.element[index]]
+    # It may be captured from a space, whose polygons need not start at the corner at which pymunk starts a hull.
+    keeps_first_corner = isinstance(element, Compound) and element.centre_of_mass is not None
     first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
     for piece in range(first, last):
         corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].tolist()
@@ -108,7 +111,10 @@ def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0
             case 2:
                 yield piece, pymunk.Segment(body, corners[0], corners[1], radius)
             case _:
-                yield piece, pymunk.Poly(body, corners, radius=radius)
+                polygon = pymunk.Poly(body, corners, radius=radius)
+                if keeps_first_corner:
+                    polygon.unsafe_set_vertices(corners)
+                yield piece, polygon
 
 
 def _half_plane(plane: Plane, body: pymunk.Body, centre: FloatArray, reach: float) -> pymunk.Segment:

@@ -1,0 +1,442 @@
+"""Scenes of pymunk spaces: bodies, shapes and joints of a running game as the elements of a scene file.
+
+The scene states everything that pymunk computes with: mass and moment of each body, coefficients of each shape, and the
+settings of the space. Elements are in the order in which the space has its shapes and joints, because contacts and
+joints are solved in that order. So the engine `pymunk` continues a captured scene to the same bits as the space
+itself, unless `CapturedSpace` has remarks.
+
+What a scene cannot state is a remark and never left out silently: `omitted` changes the motion, `inexact` only its
+rounding.
+"""
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import pymunk
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import MAX_SPEED
+from sandbox.scene.editing.elements import unique_name
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
+
+Table: TypeAlias = dict[str, Any]
+ALL_CATEGORIES = 0xFFFFFFFF
+MIN_RADIUS = 1e-9
+"""m, smallest radius of a capsule, and length of a rod"""
+
+
+class CaptureError(ValueError):
+    """A space that cannot be a scene; `str()` has all reasons, one a line."""
+
+
+@dataclass(frozen=True)
+class CapturedSpace:
+    """Scene of a space, and what it lacks."""
+
+    scene: Scene
+    omitted: tuple[str, ...]
+    """what the scene cannot state, and its motion therefore lacks"""
+    inexact: tuple[str, ...]
+    """reasons for which the motion may differ from that of the space by rounding"""
+
+
+def capture_space(
+    space: pymunk.Space,
+    *,
+    dt: float = 1.0 / 60.0,
+    duration: float = 10.0,
+    title: str = "",
+    names: Mapping[pymunk.Body, str] | None = None,
+) -> CapturedSpace:
+    """Return the scene of a space, from its present state on.
+
+    Args:
+        space: the space, between two steps. It is not changed.
+        dt: the argument of the game's `space.step`, s.
+        duration: of a run of the scene, s.
+        title: of the scene.
+        names: names of bodies; others are called `body-1`, `body-2` and so on in the order of the space.
+
+    Raises:
+        CaptureError: a body or a value is out of the range of scenes.
+    """
+    capture = _Capture(space, {} if names is None else names)
+    document: Table = {
+        "title": title,
+        "world": {"gravity": _point(space.gravity), "duration": duration},
+        "solver": {
+            "dt": dt,
+            "iterations": int(space.iterations),
+            "slop": float(space.collision_slop),
+            "bias": float(space.collision_bias),
+            "persistence": int(space.collision_persistence),
+        },
+    }
+    capture.note_space()
+    document |= capture.elements()
+    try:
+        scene = from_document(document, "<pymunk space>")
+    except SceneError as error:
+        raise CaptureError(str(error)) from error
+    return CapturedSpace(scene, tuple(dict.fromkeys(capture.omitted)), tuple(dict.fromkeys(capture.inexact)))
+
+
+class CaptureWarning(UserWarning):
+    """Something in a pymunk space that the scene made from it does not have."""
+
+
+def from_pymunk(
+    space: pymunk.Space,
+    *,
+    dt: float = 1.0 / 60.0,
+    duration: float = 10.0,
+    title: str = "",
+    names: Mapping[pymunk.Body, str] | None = None,
+    strict: bool = False,
+) -> Scene:
+    """Return the scene of a pymunk space, from its present state on, as `capture_space` does.
+
+    A `CaptureWarning` states each thing that the scene cannot have, such as collision callbacks. `capture_space`
+    returns them instead, with the reasons for differences by rounding.
+
+    Args:
+        space: the space, between two steps. It is not changed.
+        dt: the argument of the game's `space.step`, s.
+        duration: of a run of the scene, s.
+        title: of the scene.
+        names: names of bodies; others are called `body-1`, `body-2` and so on in the order of the space.
+        strict: raise an error in place of warnings.
+
+    Raises:
+        CaptureError: a body or a value is out of the range of scenes, or `strict` is set and something is left out.
+    """
+    captured = capture_space(space, dt=dt, duration=duration, title=title, names=names)
+    if strict and captured.omitted:
+        raise CaptureError("a scene cannot have:\n" + "\n".join(captured.omitted))
+    for each in captured.omitted:
+        warnings.warn(f"left out of the scene: {each}", CaptureWarning, stacklevel=2)
+    return captured.scene
+
+
+class _Capture:
+    """Converts the bodies, shapes and joints of a space."""
+
+    def __init__(self, space: pymunk.Space, names: Mapping[pymunk.Body, str]) -> None:
+        self.space = space
+        self.omitted: list[str] = []
+        self.inexact: list[str] = []
+        self._shapes = [shape for shape in space.shapes if shape.body is not None and not self._is_sensor(shape)]
+        used = [shape.body for shape in self._shapes]
+        used += [body for constraint in space.constraints for body in (constraint.a, constraint.b)]
+        self._bodies = list(
+            dict.fromkeys(
+                body
+                for body in (*space.bodies, *used)
+                if body is not None and (body.body_type == pymunk.Body.DYNAMIC or body in used)
+            )
+        )
+        self._names = self._unique_names(names)
+
+    def _is_sensor(self, shape: pymunk.Shape) -> bool:
+        if shape.sensor:
+            self.omitted.append(
+                "sensor shapes, whose callbacks a scene does not have; a [[zone]] detects centres of bodies"
+            )
+        return bool(shape.sensor)
+
+    def _unique_names(self, given: Mapping[pymunk.Body, str]) -> dict[pymunk.Body, str]:
+        found: dict[pymunk.Body, str] = {}
+        taken: set[str] = set()
+        for k, body in enumerate(self._bodies, 1):
+            found[body] = unique_name(given.get(body, f"body-{k}"), taken)
+            taken.add(found[body])
+        return found
+
+    def note_space(self) -> None:
+        """Note the settings and callbacks of the space that a scene cannot state."""
+        space = self.space
+        if space.damping != 1.0:
+            self.omitted.append(
+                f"space.damping = {space.damping:g}; `world.linear_drag` slows bodies, and not their spin"
+            )
+        if math.isfinite(space.sleep_time_threshold):
+            self.omitted.append("sleeping of bodies (space.sleep_time_threshold)")
+        if space.current_time_step:
+            self.inexact.append(
+                "the space has been stepped: impulses of its contacts, kept for warm starting, are not captured"
+            )
+        if space.threaded:
+            self.inexact.append("the space is threaded, so that its own steps are not repeatable")
+        if getattr(space, "_handlers", None):
+            self.omitted.append(f"{len(space._handlers)} collision callbacks (space.on_collision)")
+        if getattr(space, "_post_step_callbacks", None):
+            self.omitted.append("post-step callbacks")
+
+    # Elements
+
+    def elements(self) -> dict[str, list[Table]]:
+        """Return the elements by table."""
+        tables: dict[str, list[Table]] = {}
+        fixed_count = self._leading_static_count()
+        for shape in self._shapes[:fixed_count]:
+            table, values = self._collider(shape)
+            tables.setdefault(table, []).append(values)
+        all_balls = True
+        for body, shapes in self._bodies_in_order(self._shapes[fixed_count:]):
+            ball = self._ball(body, shapes) if all_balls else None
+            all_balls = ball is not None
+            tables.setdefault("ball" if ball is not None else "body", []).append(ball or self._compound(body, shapes))
+        joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
+        return tables | ({"joint": joints} if joints else {})
+
+    def _leading_static_count(self) -> int:
+        """Return how many of the first shapes become walls and posts: segments, then circles, at rest at the origin.
+
+        The engine adds walls and posts before all bodies, and walls before posts.
+        """
+        count, circles = 0, False
+        for shape in self._shapes:
+            is_circle = isinstance(shape, pymunk.Circle)
+            if not self._is_world(_body_of(shape)) or not (
+                is_circle or (isinstance(shape, pymunk.Segment) and not circles)
+            ):
+                break
+            circles, count = is_circle, count + 1
+        return count
+
+    def _collider(self, shape: pymunk.Shape) -> tuple[str, Table]:
+        """Return the table and the values of a wall or post."""
+        values = self._surface(shape)
+        self._note_filter(shape)
+        if isinstance(shape, pymunk.Circle):
+            return "post", {"position": _point(shape.offset), "radius": float(shape.radius)} | values
+        assert isinstance(shape, pymunk.Segment)
+        points = [_point(shape.a), _point(shape.b)]
+        return "wall", {"points": points, "thickness": 2.0 * shape.radius} | values
+
+    def _bodies_in_order(self, shapes: Sequence[pymunk.Shape]) -> Iterator[tuple[pymunk.Body, list[pymunk.Shape]]]:
+        """Yield each body with its shapes, in the order of the shapes; bodies without shapes come last."""
+        of_body: dict[pymunk.Body, list[pymunk.Shape]] = {}
+        before: pymunk.Body | None = None
+        for shape in shapes:
+            body = _body_of(shape)
+            if body in of_body and body is not before:
+                self.inexact.append(f"the shapes of {self._names[body]} were not added together")
+            of_body.setdefault(body, []).append(shape)
+            before = body
+        yield from of_body.items()
+        colliders = {shape.body for shape in self._shapes}
+        yield from ((body, []) for body in self._bodies if body not in colliders and not self._is_world(body))
+
+    def _ball(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table | None:
+        """Return a body that is a single disc about its centre of mass; None for others."""
+        if not shapes:
+            return self._state(body, shapes) | {"radius": MIN_RADIUS, "collides": "none"}
+        (shape, *others) = shapes
+        if others or not isinstance(shape, pymunk.Circle) or any(shape.offset) or any(body.center_of_gravity):
+            return None
+        values = self._state(body, shapes) | {"radius": float(shape.radius)} | self._surface(shape)
+        if "moment" in values and values["moment"] == 0.5 * values["mass"] * (shape.radius * shape.radius):
+            del values["moment"]  # that of its shape
+        return values
+
+    def _compound(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table:
+        """Return a body with its shapes as parts."""
+        centre = body.center_of_gravity
+        if any(centre):
+            self.inexact.append(f"{self._names[body]} has a centre of gravity that is not its origin")
+        values = self._state(body, shapes) | {"centre_of_mass": _point(centre)}
+        kinds = [_PART_OF[type(shape)] for shape in shapes]
+        if kinds != sorted(kinds, key=list(_PART_OF.values()).index):
+            self.inexact.append(f"the shapes of {self._names[body]} are not in the order circles, segments, polygons")
+        for kind, shape in zip(kinds, shapes, strict=True):
+            values.setdefault(kind, []).append(self._part(body, shape))
+        if not shapes:
+            values["ball"] = [{"radius": MIN_RADIUS}]
+            values["collides"] = "none"
+        return values
+
+    def _part(self, body: pymunk.Body, shape: pymunk.Shape) -> Table:
+        """Return a shape as a part of its body."""
+        values = self._surface(shape)
+        match shape:
+            case pymunk.Circle():
+                return {"radius": float(shape.radius), "position": _point(shape.offset)} | values
+            case pymunk.Segment():
+                if shape.radius < MIN_RADIUS:
+                    self.inexact.append(
+                        f"a segment of {self._names[body]} has no radius; the scene has {MIN_RADIUS:g} m"
+                    )
+                ends = [_point(shape.a), _point(shape.b)]
+                return {"radius": max(float(shape.radius), MIN_RADIUS), "ends": ends} | values
+            case pymunk.Poly():
+                rounding = {"radius": float(shape.radius)} if shape.radius else {}
+                return {"points": [_point(each) for each in shape.get_vertices()]} | rounding | values
+        raise CaptureError(f"{self._names[body]} has a shape of an unknown type: {type(shape).__name__}")
+
+    def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table:
+        """Return name, motion, mass and filter of a body."""
+        name, is_fixed = self._names[body], body.body_type != pymunk.Body.DYNAMIC
+        values: Table = {"name": name, "position": _point(body.position)}
+        if body.angle:
+            values["angle"] = float(body.angle)
+        if is_fixed:
+            values["fixed"] = True
+            if any(body.velocity) or body.angular_velocity:
+                self.omitted.append(f"the motion of {name}, a kinematic body; a scene keeps it at rest")
+            elif body.body_type == pymunk.Body.KINEMATIC:
+                self.inexact.append(f"{name} is kinematic, and fixed in the scene; code of the game may move it")
+        else:
+            self._note_body(body, name)
+            if body.space is not self.space:
+                raise CaptureError(f"{name} is a dynamic body of a joint, and not in the space")
+            values["mass"] = float(body.mass)
+            if math.isinf(body.moment):
+                values["fixed_rotation"] = True
+            else:
+                values["moment"] = float(body.moment)
+            values["velocity"] = _point(body.velocity)
+            if body.angular_velocity:
+                values["angular_velocity"] = float(body.angular_velocity)
+        return values | self._filter(name, shapes)
+
+    def _note_body(self, body: pymunk.Body, name: str) -> None:
+        if getattr(body, "_velocity_func", None) is not None or getattr(body, "_position_func", None) is not None:
+            self.omitted.append(f"the velocity or position function of {name}")
+        if any(body.force) or body.torque:
+            self.omitted.append(f"the force on {name} that was applied for the next step only")
+        if body.is_sleeping:
+            self.omitted.append(f"{name} sleeps")
+        if math.hypot(*body.velocity) > MAX_SPEED:
+            raise CaptureError(f"{name} is faster than {MAX_SPEED:g} m/s")
+
+    def _surface(self, shape: pymunk.Shape) -> Table:
+        """Return the coefficients and the colour of a shape."""
+        elasticity = float(shape.elasticity)
+        if elasticity > 1.0:
+            self.omitted.append(f"an elasticity of {elasticity:g}, which adds energy; the scene has a restitution of 1")
+        if any(shape.surface_velocity):
+            self.omitted.append("surface velocities")
+        values: Table = {"restitution": min(elasticity, 1.0), "friction": float(shape.friction)}
+        colour = getattr(shape, "color", None)
+        if colour is not None:
+            values["colour"] = "#" + "".join(f"{min(max(int(each), 0), 255):02x}" for each in tuple(colour)[:3])
+        return values
+
+    def _filter(self, name: str, shapes: Sequence[pymunk.Shape]) -> Table:
+        """Return what a body collides with."""
+        filters = {shape.filter for shape in shapes}
+        if not filters:
+            return {}
+        if all(not each.categories or not each.mask for each in filters):
+            return {"collides": "none"}
+        groups = {each.group for each in filters}
+        if len(groups) > 1:
+            self.omitted.append(f"the different filter groups of the shapes of {name}")
+        for shape in shapes:
+            self._note_filter(shape, is_group_known=True)
+        group = min(groups)
+        return {"group": f"group {group}"} if group else {}
+
+    def _note_filter(self, shape: pymunk.Shape, *, is_group_known: bool = False) -> None:
+        found = shape.filter
+        is_everything = found.categories == found.mask == ALL_CATEGORIES
+        if not is_everything or (found.group and not is_group_known):
+            self.omitted.append("categories and masks of shape filters, and groups of static shapes")
+
+    # Joints
+
+    def _joint(self, constraint: pymunk.Constraint) -> Iterator[Table]:
+        """Yield the joint of a constraint; nothing if a scene has no such joint."""
+        a, b = constraint.a, constraint.b
+        kind = type(constraint).__name__
+        values = self._kind_of_joint(constraint)
+        ends = [None if self._is_world(body) else self._names[body] for body in (a, b)]
+        is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint | pymunk.GearJoint)
+        if values is None or ends == [None, None] or is_carried:
+            self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))
+            return
+        self._note_constraint(constraint, kind)
+        if ends[0] is None and "anchors" in values:  # a scene states the anchor of the body first
+            values["anchors"].reverse()
+        if ends[1] is None:
+            values = _turned(values)
+            self.inexact.append(f"the second body of a {kind} is the world, which the engine takes as the first one")
+        yield values | {
+            "between": [name for name in ends if name is not None],
+            "collide": bool(constraint.collide_bodies),
+        }
+
+    def _is_world(self, body: pymunk.Body) -> bool:
+        is_at_origin = not any(body.position) and not body.angle
+        return body is self.space.static_body or (body.body_type == pymunk.Body.STATIC and is_at_origin)
+
+    def _note_constraint(self, constraint: pymunk.Constraint, kind: str) -> None:
+        if math.isfinite(constraint.max_force) and not isinstance(constraint, pymunk.SimpleMotor):
+            self.omitted.append(f"max_force of a {kind}")
+        if math.isfinite(constraint.max_bias):
+            self.omitted.append(f"max_bias of a {kind}")
+        if constraint.error_bias != self.space.collision_bias:
+            self.inexact.append(f"error_bias of a {kind} is not that of the space's contacts")
+        if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
+            self.omitted.append(f"callbacks of a {kind}")
+
+    def _kind_of_joint(self, constraint: pymunk.Constraint) -> Table | None:
+        """Return the kind and the values of a joint; None if a scene has no such joint."""
+        match constraint:
+            case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
+                self.omitted.append("the length 0 of a PinJoint; the scene has a pivot instead")
+                return {"kind": "pivot"} | _anchors(constraint)
+            case pymunk.PinJoint():
+                return {"kind": "rod", "length": float(constraint.distance)} | _anchors(constraint)
+            case pymunk.PivotJoint():
+                return {"kind": "pivot"} | _anchors(constraint)
+            case pymunk.SlideJoint():
+                limits = {"least": float(constraint.min), "most": float(constraint.max)}
+                return {"kind": "slide"} | limits | _anchors(constraint)
+            case pymunk.GrooveJoint():
+                groove = [_point(constraint.groove_a), _point(constraint.groove_b)]
+                return {"kind": "groove", "groove": groove, "anchor": _point(constraint.anchor_b)}
+            case pymunk.DampedSpring():
+                values = {"rest_length": float(constraint.rest_length), "damping": float(constraint.damping)}
+                return {"kind": "spring", "stiffness": float(constraint.stiffness)} | values | _anchors(constraint)
+            case pymunk.DampedRotarySpring():
+                values = {"rest_angle": -float(constraint.rest_angle) + 0.0, "damping": float(constraint.damping)}
+                return {"kind": "rotary_spring", "stiffness": float(constraint.stiffness)} | values
+            case pymunk.RotaryLimitJoint():
+                return {"kind": "rotary_limit", "least": float(constraint.min), "most": float(constraint.max)}
+            case pymunk.GearJoint():
+                return {"kind": "gear", "ratio": float(constraint.ratio), "phase": float(constraint.phase)}
+            case pymunk.SimpleMotor():
+                torque = {"max_torque": float(constraint.max_force)} if math.isfinite(constraint.max_force) else {}
+                return {"kind": "motor", "rate": -float(constraint.rate) + 0.0} | torque
+        return None
+
+
+_PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}
+"""Table of the part for each type of shape, in the order in which the engine adds parts"""
+
+
+def _body_of(shape: pymunk.Shape) -> pymunk.Body:
+    assert shape.body is not None  # it is in a space
+    return shape.body
+
+
+def _point(vector: Sequence[float]) -> list[float]:
+    return [float(vector[0]), float(vector[1])]
+
+
+def _anchors(constraint: Any) -> Table:
+    return {"anchors": [_point(constraint.anchor_a), _point(constraint.anchor_b)]}
+
+
+def _turned(values: Table) -> Table:
+    """Return the values of a joint from its body to the world: angles are those of the body relative to the world."""
+    changed = {key: -value + 0.0 if key in ("rate", "rest_angle") else value for key, value in values.items()}
+    if values["kind"] == "rotary_limit":
+        changed |= {"least": -values["most"] + 0.0, "most": -values["least"] + 0.0}
+    return changed

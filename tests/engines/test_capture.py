@@ -1,0 +1,323 @@
+"""Scenes of pymunk spaces: the engine continues them to the same bits, and what a scene cannot have is named."""
+
+import math
+import random
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pymunk
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import sandbox
+from sandbox.engines.pymunk_adapter.capture import (
+    CapturedSpace,
+    CaptureError,
+    CaptureWarning,
+    capture_space,
+    from_pymunk,
+)
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import dumps, loads
+
+STEPS, DT = 300, 1.0 / 60.0
+
+
+def space_with_walls(gravity: float = -900.0) -> pymunk.Space:
+    """Return a space with a floor and two walls."""
+    space = pymunk.Space()
+    space.gravity = 0, gravity
+    for a, b in (((-300, 0), (300, 0)), ((-300, 0), (-300, 500)), ((300, 0), (300, 500))):
+        segment = pymunk.Segment(space.static_body, a, b, 2)
+        segment.elasticity, segment.friction = 0.9, 0.9
+        space.add(segment)
+    return space
+
+
+def balls() -> pymunk.Space:
+    space, rng = space_with_walls(), random.Random(1)
+    for _ in range(40):
+        body = pymunk.Body(10, pymunk.moment_for_circle(10, 0, 20))
+        body.position = rng.uniform(-250, 250), rng.uniform(50, 500)
+        circle = pymunk.Circle(body, 20)
+        circle.elasticity, circle.friction = 0.8, 0.5
+        space.add(body, circle)
+    return space
+
+
+def pyramid() -> pymunk.Space:
+    space = space_with_walls()
+    for row in range(8):
+        for k in range(8 - row):
+            body = pymunk.Body(5, pymunk.moment_for_box(5, (20, 20)))
+            body.position = (k - (8 - row) / 2) * 22, 12 + row * 22
+            box = pymunk.Poly.create_box(body, (20, 20))
+            box.friction = 0.5
+            space.add(body, box)
+    return space
+
+
+def mixed() -> pymunk.Space:
+    """Return a space of rounded polygons, bodies of two shapes, and bodies that never turn."""
+    space, rng = space_with_walls(-500.0), random.Random(3)
+    space.iterations, space.collision_slop = 15, 0.05
+    for k in range(30):
+        body = pymunk.Body(3, 500 if k % 3 else math.inf)
+        body.position = rng.uniform(-200, 200), rng.uniform(60, 600)
+        shapes: list[pymunk.Shape]
+        if k % 3 == 0:
+            shapes = [pymunk.Poly(body, [(-15, -8), (15, -8), (0, 18)], radius=2)]
+        elif k % 3 == 1:
+            body.angle, body.angular_velocity, body.velocity = 3 * rng.random(), rng.random(), (20, 5)
+            shapes = [pymunk.Circle(body, 8, (3, 2)), pymunk.Segment(body, (-12, 0), (12, 3), 4)]
+        else:
+            shapes = [pymunk.Circle(body, 10)]
+        for shape in shapes:
+            shape.friction, shape.elasticity = 0.6, 0.4
+        space.add(body, *shapes)
+    tilted = pymunk.Body(body_type=pymunk.Body.STATIC)
+    tilted.position, tilted.angle = (100, 80), 0.3
+    space.add(tilted, pymunk.Poly.create_box(tilted, (120, 10)))
+    return space
+
+
+def joints() -> pymunk.Space:
+    """Return a space with a chain, and with one joint of each kind that a scene has."""
+    space = pymunk.Space()
+    space.gravity = 0, -500
+
+    def disc(x: float, y: float, radius: float, group: int = 0) -> pymunk.Body:
+        body = pymunk.Body(4, 300)
+        body.position = x, y
+        circle = pymunk.Circle(body, radius)
+        circle.filter = pymunk.ShapeFilter(group=group)
+        space.add(body, circle)
+        return body
+
+    world = previous = space.static_body
+    for k in range(10):
+        body = disc((k + 1) * 20, 100, 6, group=1)
+        if k % 2:
+            space.add(pymunk.PinJoint(previous, body))
+        else:
+            space.add(pymunk.PivotJoint(previous, body, (k * 20 + 10, 100)))
+        previous = body
+    a, b, c = disc(50, 300, 10), disc(150, 300, 10), disc(250, 300, 10)
+    motor = pymunk.SimpleMotor(world, a, 3)
+    motor.max_force = 1e5
+    space.add(
+        pymunk.DampedSpring(world, a, (50, 400), (0, 0), 60, 200, 5),
+        motor,
+        pymunk.GearJoint(a, b, 0.1, 2),
+        pymunk.SlideJoint(a, b, (0, 0), (0, 0), 20, 100),
+        pymunk.PivotJoint(b, world, (150, 300)),
+        pymunk.DampedRotarySpring(a, b, 0.3, 1000, 10),
+        pymunk.RotaryLimitJoint(a, b, -2, 2),
+        pymunk.GrooveJoint(world, c, (200, 300), (300, 250), (0, 0)),
+    )
+    return space
+
+
+def state_of(space: pymunk.Space) -> np.ndarray:
+    """Return position of the centre of mass, velocity, angle and angular velocity of the dynamic bodies, (N, 6)."""
+    bodies = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+    centres = [b.local_to_world(b.center_of_gravity) if any(b.center_of_gravity) else b.position for b in bodies]
+    rows = zip(centres, bodies, strict=True)
+    return np.asarray([[*centre, *b.velocity, b.angle, b.angular_velocity] for centre, b in rows])
+
+
+def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, list[float]]:
+    """Advance a space and the engine on its scene; return the largest difference after each step."""
+    bodies = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+    captured = capture_space(space, dt=DT, names={body: f"dynamic {k}" for k, body in enumerate(bodies)})
+    simulation = ENGINES["pymunk"].start(captured.scene)
+    rows = [simulation.bodies.number_of[f"dynamic {k}"] for k in range(len(bodies))]
+    differences = []
+    for _ in range(steps):
+        space.step(DT)
+        simulation.step()
+        frame, expected = simulation.frame(), state_of(space)
+        found = np.column_stack((frame.position, frame.velocity, frame.angle, frame.angular_velocity))[rows]
+        differences.append(0.0 if found.tobytes() == expected.tobytes() else float(np.abs(found - expected).max()))
+    return captured, differences
+
+
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints])
+def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
+    captured, differences = compare(make())
+    assert not captured.omitted
+    assert max(differences) == 0.0
+
+
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints])
+def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
+    space = make()
+    scene = from_pymunk(space, dt=DT, title="captured")
+    assert loads(dumps(scene)) == scene
+    assert (scene.title, scene.solver.dt) == ("captured", DT)
+    assert scene.solver.slop == space.collision_slop and scene.solver.bias == space.collision_bias
+    assert scene.solver.persistence == 3 and scene.solver.iterations == space.iterations
+
+
+shapes = st.sampled_from(("circle", "segment", "box", "triangle"))
+
+
+@settings(max_examples=25)
+@given(st.lists(st.tuples(shapes, st.floats(-80, 80), st.floats(20, 200), st.floats(-3, 3)), min_size=1, max_size=12))
+def test_random_spaces_continue_to_the_same_bits(drawn: list[tuple[str, float, float, float]]) -> None:
+    space = space_with_walls()
+    for kind, x, y, angle in drawn:
+        body = pymunk.Body(2, 80)
+        body.position, body.angle = (x, y), angle
+        shape: pymunk.Shape
+        match kind:
+            case "circle":
+                shape = pymunk.Circle(body, 7)
+            case "segment":
+                shape = pymunk.Segment(body, (-9, 0), (9, 1), 3)
+            case "box":
+                shape = pymunk.Poly.create_box(body, (14, 10))
+            case _:
+                shape = pymunk.Poly(body, [(0, 9), (-8, -5), (8, -5)])
+        shape.friction, shape.elasticity = 0.7, 0.2
+        space.add(body, shape)
+    captured, differences = compare(space, 120)
+    assert not captured.omitted and not captured.inexact
+    assert max(differences) == 0.0
+
+
+def test_centre_of_gravity_is_kept_up_to_rounding() -> None:
+    space = space_with_walls()
+    body = pymunk.Body(2, 80)
+    body.center_of_gravity = 3, -2  # first: pymunk's position is outdated after a change of it
+    body.position, body.angle = (10, 60), 0.4
+    box = pymunk.Poly.create_box(body, (30, 10))
+    box.friction = 0.5
+    space.add(body, box)
+    captured, differences = compare(space, 100)
+    assert any("centre of gravity" in each for each in captured.inexact)
+    assert 0.0 < max(differences) < 1e-9  # m and rad, of a body that comes to rest within 2 s
+
+
+def test_space_in_motion_lacks_only_the_kept_impulses() -> None:
+    space = pyramid()
+    for _ in range(20):
+        space.step(DT)
+    captured = capture_space(space, dt=DT)
+    assert any("warm starting" in each for each in captured.inexact)
+    assert captured.scene.bodies.position.shape == (36, 2)
+
+
+def omitted_of(change: Callable[[pymunk.Space, pymunk.Body, pymunk.Shape], object]) -> str:
+    """Return what the scene of a space with one ball lacks after a change of the space."""
+    space = space_with_walls()
+    body = pymunk.Body(1, 10)
+    body.position = 0, 50
+    circle = pymunk.Circle(body, 5)
+    space.add(body, circle)
+    change(space, body, circle)
+    captured = capture_space(space)
+    return "\n".join(captured.omitted)
+
+
+def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
+    pymunk.Body.update_velocity(body, gravity, damping, dt)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s, b, c: setattr(s, "damping", 0.9), "space.damping = 0.9"),
+        (lambda s, b, c: setattr(s, "sleep_time_threshold", 0.5), "sleeping"),
+        (lambda s, b, c: s.on_collision(1, 2, begin=lambda *_: None), "1 collision callbacks"),
+        (lambda s, b, c: setattr(b, "velocity_func", _velocity_function), "velocity or position function of body-1"),
+        (lambda s, b, c: b.apply_force_at_local_point((1, 0)), "force on body-1"),
+        (lambda s, b, c: setattr(c, "elasticity", 1.5), "elasticity of 1.5"),
+        (lambda s, b, c: setattr(c, "surface_velocity", (1, 0)), "surface velocities"),
+        (lambda s, b, c: setattr(c, "filter", pymunk.ShapeFilter(mask=0b1)), "categories and masks"),
+        (lambda s, b, c: setattr(c, "sensor", True), "sensor shapes"),
+        (lambda s, b, c: s.add(pymunk.RatchetJoint(s.static_body, b, 0, 1)), "a RatchetJoint"),
+        (lambda s, b, c: s.add(pymunk.GearJoint(b, s.static_body, 0, 1)), "whose second body is the world"),
+    ],
+)
+def test_what_a_scene_cannot_have_is_named(
+    change: Callable[[pymunk.Space, pymunk.Body, pymunk.Shape], object], message: str
+) -> None:
+    assert message in omitted_of(change)
+
+
+def test_omissions_are_warnings_or_errors() -> None:
+    space = balls()
+    space.damping = 0.5
+    with pytest.warns(CaptureWarning, match=r"damping = 0\.5"):
+        assert isinstance(sandbox.from_pymunk(space), Scene)
+    with pytest.raises(CaptureError, match=r"damping = 0\.5"):
+        sandbox.from_pymunk(space, strict=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sandbox.from_pymunk(balls(), strict=True)
+
+
+def test_space_out_of_range_is_an_error_with_the_path() -> None:
+    space = pymunk.Space()
+    body = pymunk.Body(1e40, 1)
+    space.add(body, pymunk.Circle(body, 1))
+    with pytest.raises(CaptureError, match=r"ball.body-1.mass: must be at most 1e\+30"):
+        from_pymunk(space)
+
+
+def test_space_is_not_changed() -> None:
+    one, other = mixed(), mixed()
+    capture_space(one)
+    for space in (one, other):
+        for _ in range(50):
+            space.step(DT)
+    assert state_of(one).tobytes() == state_of(other).tobytes()
+
+
+EXAMPLES = ("playground", "damped_rotary_spring_pointer", "constraints", "box2d_pyramid", "tank")
+"""Examples that pymunk ships which run without input, some with things that a scene cannot have"""
+
+RUN_EXAMPLE = """
+import runpy, sys, warnings
+import pymunk
+from tests.engines.test_capture import compare
+
+class Stopped(BaseException):
+    pass
+
+step = pymunk.Space.step
+
+def stop_at_step(space, dt):
+    raise Stopped(space)
+
+name = sys.argv.pop()
+pymunk.Space.step = stop_at_step
+try:
+    runpy.run_module(f"pymunk.examples.{name}", run_name="__main__")
+except Stopped as stopped:
+    space = stopped.args[0]
+pymunk.Space.step = step
+captured, differences = compare(space)
+print("RESULT", max(differences), bool(captured.omitted), len(captured.scene.bodies))
+"""
+
+
+@pytest.mark.full  # child processes
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_of_pymunk_are_captured(name: str, tmp_path: Path) -> None:
+    environment = {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy", "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-W", "ignore", "-c", RUN_EXAMPLE, name]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+    )
+    assert "RESULT" in done.stdout, done.stderr[-2000:]
+    difference, has_omissions, bodies = done.stdout.split("RESULT")[1].split()
+    assert int(bodies) > 0
+    assert float(difference) == 0.0 or has_omissions == "True"
