@@ -161,8 +161,9 @@ def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> N
     scene = from_pymunk(space, dt=DT, title="captured")
     assert loads(dumps(scene)) == scene
     assert (scene.title, scene.solver.dt) == ("captured", DT)
-    assert scene.solver.slop == space.collision_slop and scene.solver.bias == space.collision_bias
-    assert scene.solver.persistence == 3 and scene.solver.iterations == space.iterations
+    resolved = ENGINES["pymunk"].resolve(scene, scene.solver)
+    assert (resolved.slop, resolved.bias) == (space.collision_slop, space.collision_bias)
+    assert (resolved.persistence, resolved.iterations) == (space.collision_persistence, space.iterations)
 
 
 shapes = st.sampled_from(("circle", "segment", "box", "triangle"))

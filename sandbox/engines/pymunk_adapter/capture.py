@@ -17,6 +17,8 @@ from typing import Any, TypeAlias
 
 import pymunk
 
+from sandbox.engines.common.base import BIAS
+from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_SPEED
 from sandbox.scene.editing.elements import unique_name
@@ -72,10 +74,13 @@ def capture_space(
             "dt": dt,
             "iterations": int(space.iterations),
             "slop": float(space.collision_slop),
-            "bias": float(space.collision_bias),
-            "persistence": int(space.collision_persistence),
         },
     }
+    # The engine's own defaults are left out, so that engines without these settings can run the scene.
+    if space.collision_bias != BIAS:
+        document["solver"]["bias"] = float(space.collision_bias)
+    if space.collision_persistence != PERSISTENCE:
+        document["solver"]["persistence"] = int(space.collision_persistence)
     capture.note_space()
     document |= capture.elements()
     try:
