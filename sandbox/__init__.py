@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from sandbox.engines.contract import Divergence, Refusal
     from sandbox.engines.exact.tabletop.shots import Table
     from sandbox.engines.pymunk_adapter.capture import CaptureError, CaptureWarning, from_pymunk
+    from sandbox.engines.pymunk_adapter.game_capture import GameCapture, capture
     from sandbox.engines.reference.integrate import IntegrationResult, integrate
     from sandbox.engines.reference.integrators import INTEGRATORS
     from sandbox.engines.registry import ENGINES, UnknownEngineError
@@ -79,6 +80,7 @@ __all__ = [
     "Force",
     "Frame",
     "FrameTable",
+    "GameCapture",
     "Impulse",
     "IntegrationResult",
     "Launch",
@@ -107,6 +109,7 @@ __all__ = [
     "Trajectory",
     "UnknownEngineError",
     "World",
+    "capture",
     "compare",
     "demands",
     "dumps",
@@ -144,6 +147,7 @@ _HOMES = {
     "Force": "sandbox.action",
     "Frame": "sandbox.trajectory",
     "FrameTable": "sandbox.frame_table",
+    "GameCapture": "sandbox.engines.pymunk_adapter.game_capture",
     "Impulse": "sandbox.action",
     "IntegrationResult": "sandbox.engines.reference.integrate",
     "Launch": "sandbox.action",
@@ -171,6 +175,7 @@ _HOMES = {
     "Trajectory": "sandbox.trajectory",
     "UnknownEngineError": "sandbox.engines.registry",
     "World": "sandbox.scene.description.world",
+    "capture": "sandbox.engines.pymunk_adapter.game_capture",
     "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.compile.demands",
     "dumps": "sandbox.scene.files.load",

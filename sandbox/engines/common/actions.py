@@ -411,13 +411,15 @@ def _move(action: Move, target: ActionTarget) -> None:
     index = _body_index(action.body, target)
     _refuse_driven(action.body, target.scene)
     fixed = bool(target.bodies.fixed[index])
-    if fixed and action.velocity not in (None, (0.0, 0.0)):
+    if fixed and (action.velocity not in (None, (0.0, 0.0)) or action.angular_velocity):
         raise ActionError(f"{action.body!r} is fixed; its position can be changed, but it cannot have a velocity")
     collides = target.bodies.elements[target.bodies.element[index]].collides
     _check_place(action.position, float(target.bodies.radius[index]), collides, target)
     target.move_body(index, np.asarray(action.position))
     if action.velocity is not None and not fixed:
         target.set_velocity(index, np.asarray(action.velocity))
+    if action.angular_velocity is not None and not fixed:
+        target.set_spin(index, action.angular_velocity)
 
 
 def _strike(action: Strike, target: ActionTarget) -> None:

@@ -66,7 +66,16 @@ def capture_space(
     Raises:
         CaptureError: a body or a value is out of the range of scenes.
     """
-    capture = _Capture(space, {} if names is None else names)
+    return scene_of(SpaceElements(space, {} if names is None else names), dt, duration, title)
+
+
+def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -> CapturedSpace:
+    """Return the scene of the elements of a space, as `capture_space` does.
+
+    Raises:
+        CaptureError: as `capture_space`.
+    """
+    space = capture.space
     document: Table = {
         "title": title,
         "world": {"gravity": _point(space.gravity), "duration": duration},
@@ -127,11 +136,11 @@ def from_pymunk(
     return captured.scene
 
 
-class _Capture:
+class SpaceElements:
     """Converts the bodies, shapes and joints of a space."""
 
-    def __init__(self, space: pymunk.Space, names: Mapping[pymunk.Body, str]) -> None:
-        self.space = space
+    def __init__(self, space: pymunk.Space, names: Mapping[pymunk.Body, str], *, notes_forces: bool = True) -> None:
+        self.space, self._notes_forces = space, notes_forces
         self.omitted: list[str] = []
         self.inexact: list[str] = []
         self._shapes = [shape for shape in space.shapes if shape.body is not None and not self._is_sensor(shape)]
@@ -144,7 +153,8 @@ class _Capture:
                 if body is not None and (body.body_type == pymunk.Body.DYNAMIC or body in used)
             )
         )
-        self._names = self._unique_names(names)
+        self.names = self._unique_names(names)
+        """name of each body"""
 
     def _is_sensor(self, shape: pymunk.Shape) -> bool:
         if shape.sensor:
@@ -230,12 +240,18 @@ class _Capture:
         for shape in shapes:
             body = _body_of(shape)
             if body in of_body and body is not before:
-                self.inexact.append(f"the shapes of {self._names[body]} were not added together")
+                self.inexact.append(f"the shapes of {self.names[body]} were not added together")
             of_body.setdefault(body, []).append(shape)
             before = body
         yield from of_body.items()
         colliders = {shape.body for shape in self._shapes}
         yield from ((body, []) for body in self._bodies if body not in colliders and not self._is_world(body))
+
+    def element_of(self, body: pymunk.Body) -> tuple[str, Table]:
+        """Return the table and the values of a body with the shapes that it has."""
+        shapes = [shape for shape in self._shapes if shape.body is body]
+        ball = self._ball(body, shapes)
+        return ("body", self._compound(body, shapes)) if ball is None else ("ball", ball)
 
     def _ball(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table | None:
         """Return a body that is a single disc about its centre of mass; None for others."""
@@ -253,11 +269,11 @@ class _Capture:
         """Return a body with its shapes as parts."""
         centre = body.center_of_gravity
         if any(centre):
-            self.inexact.append(f"{self._names[body]} has a centre of gravity that is not its origin")
+            self.inexact.append(f"{self.names[body]} has a centre of gravity that is not its origin")
         values = self._state(body, shapes) | {"centre_of_mass": _point(centre)}
         kinds = [_PART_OF[type(shape)] for shape in shapes]
         if kinds != sorted(kinds, key=list(_PART_OF.values()).index):
-            self.inexact.append(f"the shapes of {self._names[body]} are not in the order circles, segments, polygons")
+            self.inexact.append(f"the shapes of {self.names[body]} are not in the order circles, segments, polygons")
         for kind, shape in zip(kinds, shapes, strict=True):
             values.setdefault(kind, []).append(self._part(body, shape))
         if not shapes:
@@ -274,18 +290,18 @@ class _Capture:
             case pymunk.Segment():
                 if shape.radius < MIN_RADIUS:
                     self.inexact.append(
-                        f"a segment of {self._names[body]} has no radius; the scene has {MIN_RADIUS:g} m"
+                        f"a segment of {self.names[body]} has no radius; the scene has {MIN_RADIUS:g} m"
                     )
                 ends = [_point(shape.a), _point(shape.b)]
                 return {"radius": max(float(shape.radius), MIN_RADIUS), "ends": ends} | values
             case pymunk.Poly():
                 rounding = {"radius": float(shape.radius)} if shape.radius else {}
                 return {"points": [_point(each) for each in shape.get_vertices()]} | rounding | values
-        raise CaptureError(f"{self._names[body]} has a shape of an unknown type: {type(shape).__name__}")
+        raise CaptureError(f"{self.names[body]} has a shape of an unknown type: {type(shape).__name__}")
 
     def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table:
         """Return name, motion, mass and filter of a body."""
-        name, is_fixed = self._names[body], body.body_type != pymunk.Body.DYNAMIC
+        name, is_fixed = self.names[body], body.body_type != pymunk.Body.DYNAMIC
         values: Table = {"name": name, "position": _point(body.position)}
         if body.angle:
             values["angle"] = float(body.angle)
@@ -312,7 +328,7 @@ class _Capture:
     def _note_body(self, body: pymunk.Body, name: str) -> None:
         if getattr(body, "_velocity_func", None) is not None or getattr(body, "_position_func", None) is not None:
             self.omitted.append(f"the velocity or position function of {name}")
-        if any(body.force) or body.torque:
+        if self._notes_forces and (any(body.force) or body.torque):
             self.omitted.append(f"the force on {name} that was applied for the next step only")
         if body.is_sleeping:
             self.omitted.append(f"{name} sleeps")
@@ -360,7 +376,7 @@ class _Capture:
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
         values = self._kind_of_joint(constraint)
-        ends = [None if self._is_world(body) else self._names[body] for body in (a, b)]
+        ends = [None if self._is_world(body) else self.names[body] for body in (a, b)]
         is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint | pymunk.GearJoint)
         if values is None or ends == [None, None] or is_carried:
             self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))

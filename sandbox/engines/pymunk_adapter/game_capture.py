@@ -1,0 +1,228 @@
+"""Recordings of games that use pymunk: `Space.step` is watched while the game runs.
+
+The scene of a space is that before its first step. What the code of the game changes between two steps becomes
+actions before the next step: velocities and positions, forces, gravity, bodies added and removed. So the recording
+can be replayed, on this engine to the same bits, and on other engines and settings to compare.
+
+What actions cannot state is a remark and never left out silently, as in `capture`.
+"""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import pymunk
+
+from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
+from sandbox.engines.pymunk_adapter.capture import CapturedSpace, SpaceElements, scene_of
+from sandbox.engines.pymunk_adapter.engine import PymunkEngine
+from sandbox.recording import Recording
+
+MAX_ACTIONS = 1_000_000
+"""Actions of a recording; a game that changes 1,000 bodies at 60 Hz makes as many in 17 s"""
+
+
+class MotionState(NamedTuple):
+    """Motion of a body."""
+
+    position: tuple[float, float]
+    """m"""
+    velocity: tuple[float, float]
+    """m/s"""
+    angle: float
+    """rad"""
+    angular_velocity: float
+    """rad/s"""
+
+    @classmethod
+    def of(cls, body: pymunk.Body) -> "MotionState":
+        """Return the present motion of a body."""
+        (x, y), (vx, vy) = body.position, body.velocity
+        return cls((x, y), (vx, vy), body.angle, body.angular_velocity)
+
+
+class SpaceCapture:
+    """Recording of one space, step by step.
+
+    Args:
+        space: before its first step.
+        dt: argument of the first step, s.
+    """
+
+    def __init__(self, space: pymunk.Space, dt: float) -> None:
+        self.space, self.dt, self.steps = space, dt, 0
+        elements = SpaceElements(space, {}, notes_forces=False)
+        captured = scene_of(elements, dt, 10.0, "")
+        self._scene, self._names = captured.scene, elements.names
+        self._omitted, self._inexact = dict.fromkeys(captured.omitted), dict.fromkeys(captured.inexact)
+        self._actions: list[Action] = []
+        self._states = {body: MotionState.of(body) for body in self._names}
+        self._forces: dict[pymunk.Body, tuple[float, float, float]] = {}
+        self._gravity, self._constraints = tuple(space.gravity), set(space.constraints)
+        self._settings = self._present_settings()
+
+    def _present_settings(self) -> tuple[float, ...]:
+        space = self.space
+        return space.iterations, space.collision_slop, space.collision_bias, space.collision_persistence, space.damping
+
+    def before_step(self, dt: float) -> None:
+        """Note what the game has changed since the last step."""
+        space = self.space
+        if dt != self.dt:
+            self._omitted["the step, which the game varies; a scene has a constant dt"] = None
+        if self._present_settings() != self._settings:
+            self._omitted["changes of the settings of the space during the game"] = None
+        if set(space.constraints) != self._constraints:
+            self._omitted["joints that are added or removed during the game"] = None
+        if len(self._actions) > MAX_ACTIONS:
+            self._omitted[f"actions after the first {MAX_ACTIONS:,}"] = None
+            return
+        if tuple(space.gravity) != self._gravity:
+            self._gravity = tuple(space.gravity)
+            self._actions.append(SetParameter(time=self.time, path="world.gravity", value=list(self._gravity)))
+        if self.steps:
+            self._note_population()
+            self._note_motion()
+        self._note_forces()
+
+    def after_step(self) -> None:
+        """Note the state after a step."""
+        self.steps += 1
+        self._states = {body: MotionState.of(body) for body in self._names}
+
+    @property
+    def time(self) -> float:
+        """Time of the next step, s."""
+        return self.steps * self.dt
+
+    def _note_population(self) -> None:
+        """Note bodies that were added or removed. Bodies without shapes and joints are not used."""
+        present = [body for body in self.space.bodies if body.shapes or body in self._names]
+        for body in [body for body in self._names if body.space is None and body in self._states]:
+            if body.body_type == pymunk.Body.DYNAMIC:
+                self._actions.append(Remove(time=self.time, body=self._names[body]))
+            self._names.pop(body)
+        added = [body for body in present if body not in self._names]
+        if not added:
+            return
+        given = self._names | {body: f"added-{self.steps}-{k}" for k, body in enumerate(added, 1)}
+        elements = SpaceElements(self.space, given, notes_forces=False)
+        for body in added:
+            table, values = elements.element_of(body)
+            name = str(values["name"])
+            spawned: dict[str, Any] = {table: values}
+            self._actions.append(Spawn.model_validate_json(json.dumps({"time": self.time, "kind": "spawn"} | spawned)))
+            self._names[body], self._states[body] = name, MotionState.of(body)
+        self._omitted |= dict.fromkeys(elements.omitted)
+        self._inexact |= dict.fromkeys(elements.inexact)
+
+    def _note_motion(self) -> None:
+        """Note bodies whose motion is not that after the last step."""
+        for body, name in self._names.items():
+            before, now = self._states[body], MotionState.of(body)
+            if before == now:
+                continue
+            if now.angle != before.angle:
+                self._omitted["angles that the game sets"] = None
+            is_dynamic = body.body_type == pymunk.Body.DYNAMIC
+            if not is_dynamic and now.velocity != before.velocity:
+                self._omitted[f"the motion of {name}, a kinematic body; a scene keeps it at rest"] = None
+            x, y = body.local_to_world(body.center_of_gravity) if any(body.center_of_gravity) else now.position
+            velocity = now.velocity if is_dynamic and now.velocity != before.velocity else None
+            is_turned = is_dynamic and now.angular_velocity != before.angular_velocity
+            spin = now.angular_velocity if is_turned else None
+            move = Move(time=self.time, body=name, position=(x, y), velocity=velocity, angular_velocity=spin)
+            self._actions.append(move)
+
+    def _note_forces(self) -> None:
+        """Note forces that the game applies for the next step, where they differ from those of the last one."""
+        for body, name in self._names.items():
+            if body.body_type != pymunk.Body.DYNAMIC:
+                continue
+            force = (*body.force, body.torque)
+            if force != self._forces.get(body, (0.0, 0.0, 0.0)):
+                self._forces[body] = force
+                action = Force(time=self.time, body=name, force=(force[0], force[1]), torque=force[2])
+                self._actions.append(action)
+
+    def recording(self) -> Recording:
+        """Return the recording so far."""
+        settings = PymunkEngine().resolve(self._scene, self._scene.solver)
+        return Recording(self._scene, "pymunk", settings, tuple(self._actions), max(self.time, self.dt))
+
+    @property
+    def names(self) -> dict[pymunk.Body, str]:
+        """Names of the bodies in the scene and the actions."""
+        return dict(self._names)
+
+    @property
+    def captured(self) -> CapturedSpace:
+        """The scene before the first step, and what scene and actions lack."""
+        return CapturedSpace(self._scene, tuple(self._omitted), tuple(self._inexact))
+
+
+class GameCapture:
+    """All spaces that a game steps."""
+
+    def __init__(self) -> None:
+        self._captures: dict[pymunk.Space, SpaceCapture] = {}
+
+    def step(self, space: pymunk.Space, dt: float) -> SpaceCapture:
+        """Note the changes before a step of a space."""
+        if space not in self._captures:
+            self._captures[space] = SpaceCapture(space, dt)
+        found = self._captures[space]
+        found.before_step(dt)
+        return found
+
+    @property
+    def spaces(self) -> list[SpaceCapture]:
+        """Captures of all spaces, in the order of their first steps."""
+        return list(self._captures.values())
+
+    @property
+    def recording(self) -> Recording:
+        """Recording of the space that made the most steps.
+
+        Raises:
+            ValueError: no space has made a step.
+        """
+        return self._longest.recording()
+
+    @property
+    def omitted(self) -> tuple[str, ...]:
+        """What that recording lacks."""
+        return self._longest.captured.omitted
+
+    @property
+    def inexact(self) -> tuple[str, ...]:
+        """Reasons for which a replay may differ from the game by rounding."""
+        return self._longest.captured.inexact
+
+    @property
+    def _longest(self) -> SpaceCapture:
+        if not self._captures:
+            raise ValueError("no pymunk space has made a step")
+        return max(self._captures.values(), key=lambda each: each.steps)
+
+
+@contextmanager
+def capture() -> Iterator[GameCapture]:
+    """Record all pymunk spaces that are stepped within a `with` block.
+
+    Yields:
+        The recordings, which grow with each step.
+    """
+    game, step = GameCapture(), pymunk.Space.step
+
+    def watched(space: pymunk.Space, dt: float) -> None:
+        found = game.step(space, dt)
+        step(space, dt)
+        found.after_step()
+
+    pymunk.Space.step = watched  # type: ignore[method-assign, assignment]
+    try:
+        yield game
+    finally:
+        pymunk.Space.step = step  # type: ignore[method-assign]

@@ -1,0 +1,153 @@
+"""Recordings of games that use pymunk: replays end in the state of the game, bit for bit."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pymunk
+import pytest
+
+import sandbox
+from sandbox.engines.pymunk_adapter.game_capture import GameCapture, capture
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.run.runner import run
+from sandbox.recording import Recording
+from tests.engines.test_capture import DT, balls, space_with_walls
+
+STEPS = 200
+
+
+def disc(space: pymunk.Space, x: float, y: float, radius: float = 10.0) -> pymunk.Body:
+    body = pymunk.Body(2, 100)
+    body.position = x, y
+    circle = pymunk.Circle(body, radius)
+    circle.friction, circle.elasticity = 0.5, 0.3
+    space.add(body, circle)
+    return body
+
+
+class Platformer:
+    """A game that acts on its space in every way that a recording has."""
+
+    def __init__(self) -> None:
+        self.space, self.rng = space_with_walls(), random.Random(5)
+        self.player = disc(self.space, 0, 40)
+        self.others = [disc(self.space, 40 * k - 100, 60 + 30 * k) for k in range(5)]
+
+    def update(self, k: int) -> None:
+        """Act before step k."""
+        if k % 30 == 10:
+            self.player.velocity = self.rng.uniform(-200, 200), 400  # jump
+        if k % 17 == 3:
+            self.others[1].apply_impulse_at_local_point((self.rng.uniform(-50, 50), 300), (1.0, 2.0))
+        if 50 <= k < 90:
+            self.player.apply_force_at_world_point((800, 0), self.player.position)
+        if k == 60:
+            self.others[0].position = -50, 300
+            self.others[0].angular_velocity = 4.0
+        if k == 80:
+            self.space.gravity = 100, -700
+        if k % 40 == 25:
+            self.others.append(disc(self.space, self.rng.uniform(-200, 200), 400, 8))
+        if k == 120:
+            gone = self.others.pop(2)
+            self.space.remove(gone, *gone.shapes)
+
+
+def play(game: Platformer, steps: int = STEPS) -> GameCapture:
+    with capture() as captured:
+        for k in range(steps):
+            game.update(k)
+            game.space.step(DT)
+    return captured
+
+
+def end_of(recording: Recording, engine: str = "pymunk") -> dict[str, list[float]]:
+    """Return the state of each body at the end of a replay, by its name."""
+    found = run(recording.whole_scene, engine, actions=recording.actions)
+    return {
+        str(name): [*found.position[-1, k], *found.velocity[-1, k], found.angle[-1, k], found.angular_velocity[-1, k]]
+        for k, name in enumerate(found.names.tolist())
+    }
+
+
+def test_replay_of_a_game_ends_in_its_state_bit_for_bit() -> None:
+    game = Platformer()
+    captured = play(game)
+    assert not captured.omitted and not captured.inexact
+    kinds = {action.kind for action in captured.recording.actions}
+    assert kinds == {"move", "force", "set", "spawn", "remove"}
+    ends = end_of(captured.recording)
+    (space,) = captured.spaces
+    for body, name in space.names.items():
+        expected = [*body.position, *body.velocity, body.angle, body.angular_velocity]
+        if body.body_type == pymunk.Body.DYNAMIC:
+            assert ends[name] == expected, name
+    assert captured.recording.duration == pytest.approx(STEPS * DT)
+
+
+def test_recording_is_saved_and_replayed_on_other_engines(tmp_path: Path) -> None:
+    captured = play(Platformer(), 60)
+    path = captured.recording.save(tmp_path / "game.json")
+    recording = Recording.load(path)
+    assert recording.actions == captured.recording.actions
+    assert end_of(recording) == end_of(captured.recording)
+    other = end_of(recording.on("reference"), "reference")
+    assert np.isfinite(list(other.values())).all()
+
+
+def test_game_is_not_disturbed() -> None:
+    one, other = Platformer(), Platformer()
+    play(one)
+    for k in range(STEPS):
+        other.update(k)
+        other.space.step(DT)
+    assert [tuple(b.position) for b in one.space.bodies] == [tuple(b.position) for b in other.space.bodies]
+    assert not hasattr(pymunk.Space.step, "__wrapped__") and pymunk.Space.step.__name__ == "step"
+
+
+def test_step_is_restored_after_an_error() -> None:
+    step = pymunk.Space.step
+    with pytest.raises(RuntimeError, match="of the game"), capture() as captured:
+        balls().step(DT)
+        raise RuntimeError("of the game")
+    assert pymunk.Space.step is step
+    assert captured.recording.duration == DT
+
+
+def test_longest_space_is_the_recording_and_no_space_is_an_error() -> None:
+    with sandbox.capture() as captured:
+        with pytest.raises(ValueError, match="no pymunk space"):
+            captured.recording  # noqa: B018
+        menu, level = space_with_walls(), balls()
+        for _ in range(3):
+            menu.step(DT)
+        for _ in range(5):
+            level.step(DT)
+    assert len(captured.spaces) == 2
+    assert len(captured.recording.scene.bodies) == 40
+
+
+def test_what_actions_cannot_state_is_named() -> None:
+    space = space_with_walls()
+    body, other = disc(space, 0, 40), disc(space, 50, 40)
+    with capture() as captured:
+        space.step(DT)
+        body.angle = 1.0
+        space.step(0.5 * DT)
+        space.add(pymunk.PinJoint(body, other))
+        space.iterations = 20
+        space.step(DT)
+    text = "\n".join(captured.omitted)
+    for each in ("angles that the game sets", "varies", "joints that are added", "settings of the space"):
+        assert each in text
+
+
+def test_settings_of_the_recording_are_those_of_the_space() -> None:
+    space = balls()
+    space.collision_slop, space.iterations = 0.3, 17
+    with capture() as captured:
+        space.step(DT)
+    settings = captured.recording.settings
+    assert (settings.slop, settings.iterations, settings.dt) == (space.collision_slop, 17, DT)
+    assert ENGINES["pymunk"].missing(captured.recording.scene, settings) == ()
