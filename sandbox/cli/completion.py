@@ -42,7 +42,7 @@ def add_completions(command: click.Command) -> None:
     """Set the completion of the parameters of a command, by their names."""
     for parameter in command.params:
         words = _WORDS.get(parameter.name or "")
-        if parameter.name == "scenes" and command.name == "run":
+        if (command.name, parameter.name) in (("run", "scenes"), ("advise", "scene")):
             words = _scenes_and_sessions
         if words is not None and not isinstance(parameter.type, click.Choice):
             parameter.type = CompletedText(words)

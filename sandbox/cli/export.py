@@ -1,4 +1,4 @@
-"""Command `export`: write a stored run as csv, parquet, gif, mp4 or png."""
+"""Command `export`: write a stored run as csv, parquet, gif, mp4 or png, or a scene as a program for pymunk."""
 
 import os
 from dataclasses import replace
@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
+from sandbox.atomic_write import atomic_write
 from sandbox.batch.find_run import find_run, read_run
-from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows
+from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows, plural, scene_path
 from sandbox.cli.export_options import TABLES, Options, check_options, check_times
-from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.progress import ProgressBars, progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.progress import ProgressCallback
@@ -20,6 +21,7 @@ from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from sandbox.scene.compile.scene import Scene
     from sandbox.window.playback.recorded import RecordedRun
 
 
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
     "targets",
     multiple=True,
     metavar="FILE",
-    help="file to write: .csv, .parquet, .gif, .mp4 or .png; may be repeated",
+    help="file to write: .csv, .parquet, .gif, .mp4 or .png, or .py from a scene; may be repeated",
 )
 @click.option("--runs", is_flag=True, help="write a table of all runs of the folder DIR, one row per run")
 @click.option("--contacts", is_flag=True, help="write tables of contacts instead of states")
@@ -46,18 +48,23 @@ if TYPE_CHECKING:
 @click.option(
     "--overlay", "overlays", multiple=True, metavar="NAME", help="overlay to draw, such as velocities; may be repeated"
 )
+@set_option("set a value of the scene first; for a .py only")
+@click.option("--force", is_flag=True, help="replace an existing .py")
 @json_option
 @quiet_option("print no file names and no progress")
 def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
-    """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png.
+    """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png; or a scene as a program (.py).
 
     RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json). With --runs it is a folder with any
-    number of runs.
+    number of runs. For a .py it is a scene: the file is a program that needs only pymunk, with make_space() and step()
+    to use in a game, which computes the same states as the engine pymunk.
     """
     options = Options(**given)
     faults: list[Fault] = []
     with collect_errors(faults):
         check_options(options)
+    if options.has_program:
+        return _export_program(run, options, faults, as_json, quiet)
     if options.runs:
         return _export_runs(run, options, faults, as_json, quiet)
     source: Trajectory | Recording | None = None
@@ -96,8 +103,56 @@ def _print_files(run: str, files: list[dict[str, Any]], faults: list[Fault], as_
         print_json({"run": run, "files": files} | ({"faults": fault_rows(faults)} if faults else {}))
     elif not quiet:
         for file in files:
-            count = f"{file['rows']:,} rows" if "rows" in file else f"{file['frames']:,} frames"
-            click.echo(f"written: {file['path']} ({count.removesuffix('s') if count[:2] == '1 ' else count})")
+            counts = [plural(file[f"{noun}s"], noun) for noun in ("row", "frame", "line") if f"{noun}s" in file]
+            click.echo(f"written: {file['path']} ({counts[0]})")
+
+
+def _export_program(name: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
+    """Write a scene as a program, and return the exit status."""
+    from sandbox.scene.files.load import load
+
+    text = ""
+    with collect_errors(faults):
+        scene = load(scene_path(name), options.overrides)
+        if not faults:
+            text = _program_text(name, scene)
+    if faults:
+        return exit_with_errors(faults, as_json, run=name, files=[])
+    files: list[dict[str, Any]] = []
+    for target in options.targets:
+        try:
+            with atomic_write(Path(target)) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
+            click.echo(str(faults[-1]), err=True)
+        else:
+            files.append({"path": target, "format": "py", "lines": text.count("\n")})
+    _print_files(name, files, faults, as_json, quiet)
+    return 2 if faults else 0
+
+
+def _program_text(name: str, scene: "Scene") -> str:
+    """Return the program of a scene, with the warnings of `check`.
+
+    Raises:
+        SceneError: a program cannot express the scene; the error has all reasons.
+    """
+    from sandbox.engines.pymunk_adapter.program import obstacles, program_text
+    from sandbox.measure.preflight import floor_3_digits, largest_safe_dt, run_preflight
+
+    found = obstacles(scene)
+    if found:
+        raise SceneError([Fault(name, None, each.path, each.message) for each in found])
+    _hide_pygame_prompt()
+    from sandbox.window.view_bounds import predict_bounds, view_bounds
+
+    warnings = [each.message for each in run_preflight(scene, engine="pymunk").warnings]
+    safe_dt, reason = largest_safe_dt(scene, engine="pymunk"), ""
+    if safe_dt is not None and np.isfinite(safe_dt):
+        reason = f"With this number of substeps, no body of the scene can do so up to DT = {floor_3_digits(safe_dt)}."
+    view = view_bounds(scene, predict_bounds(scene, "pymunk"))
+    return program_text(scene, view=view, step_reason=reason, warnings=warnings)
 
 
 def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
@@ -207,15 +262,20 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
 
 
 def _film(run: str, trajectory: Trajectory) -> "RecordedRun":
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # only results on standard output
+    _hide_pygame_prompt()
     from sandbox.window.playback.recorded import RecordedRun
 
     return RecordedRun(trajectory, run)
 
 
+def _hide_pygame_prompt() -> None:
+    """Keep pygame from printing: only results are on standard output."""
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+
+
 def _export_images(options: Options, film: "RecordedRun", path: Path, on_progress: ProgressCallback | None) -> int:
     from sandbox.window.capture.export import ExportOptions, export_images
-    from sandbox.window.capture.image_files import CaptureError
+    from sandbox.window.capture.image_files import PictureError
 
     is_png = path.suffix.lower() == ".png"
     last = film.duration if options.until is None else min(options.until, film.duration)
@@ -231,5 +291,5 @@ def _export_images(options: Options, film: "RecordedRun", path: Path, on_progres
     )
     try:
         return export_images(film, export_options, path, on_progress)
-    except CaptureError as error:
+    except PictureError as error:
         raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None

@@ -13,6 +13,7 @@ from sandbox.window.playback.snapshot import OVERLAYS
 TABLES = (".csv", ".parquet")
 FILMS = (".gif", ".mp4")
 PICTURES = (*FILMS, ".png")
+PROGRAMS = (".py",)
 MIN_SIZE, MAX_WIDTH, MAX_HEIGHT = 16, 7680, 4320
 """px: a smaller picture is illegible, and few players support more than 8K"""
 MAX_RATE = 240.0
@@ -36,11 +37,18 @@ class Options:
     until: float | None = None
     at: float | None = None
     overlays: tuple[str, ...] = ()
+    overrides: tuple[str, ...] = ()
+    force: bool = False
 
     @property
     def suffixes(self) -> frozenset[str]:
         """File name extensions of the targets."""
         return frozenset(Path(target).suffix.lower() for target in self.targets)
+
+    @property
+    def has_program(self) -> bool:
+        """Whether a target is a program."""
+        return not self.suffixes.isdisjoint(PROGRAMS)
 
     @property
     def picture_size(self) -> tuple[int, int]:
@@ -67,6 +75,7 @@ def check_options(options: Options) -> None:
         *_unused_options(options),
         *_value_faults(options),
         *_run_table_faults(options),
+        *_program_faults(options),
     ]
     if messages:
         raise SceneError([Fault(option, None, "", message) for option, message in messages])
@@ -118,8 +127,8 @@ def _target_faults(options: Options) -> list[tuple[str, str]]:
         path = Path(target)
         suffix = path.suffix.lower()
         named = shorten(target, MAX_NAMED)
-        if suffix not in (*TABLES, *PICTURES):
-            found.append(("--to", f"{named}: the name must end in .csv, .parquet, .gif, .mp4 or .png"))
+        if suffix not in (*TABLES, *PICTURES, *PROGRAMS):
+            found.append(("--to", f"{named}: the name must end in .csv, .parquet, .gif, .mp4, .png or .py"))
         if path.absolute() in seen:
             found.append(("--to", f"{named}: is given twice"))
         seen.add(path.absolute())
@@ -146,6 +155,8 @@ def _unused_options(options: Options) -> list[tuple[str, str]]:
         ("--size", options.size, PICTURES),
         ("--overlay", options.overlays or None, PICTURES),
         ("--at", options.at, (".png",)),
+        ("--set", options.overrides or None, PROGRAMS),
+        ("--force", options.force or None, PROGRAMS),
     )
     return [
         (option, f"applies to {', '.join(suffixes)} only, and no --to FILE is one of these")
@@ -160,8 +171,26 @@ def _run_table_faults(options: Options) -> list[tuple[str, str]]:
         return []
     others = (("--contacts", options.contacts or None), ("--from", options.start), ("--until", options.until))
     found = [(option, "does not apply to a table of runs") for option, value in others if value is not None]
-    pictures = [target for target in options.targets if Path(target).suffix.lower() in PICTURES]
+    pictures = [target for target in options.targets if Path(target).suffix.lower() in (*PICTURES, *PROGRAMS)]
     return found + [("--runs", f"{shorten(target, MAX_NAMED)}: is no table") for target in pictures]
+
+
+def _program_faults(options: Options) -> list[tuple[str, str]]:
+    """Return the faults of a program: it is written from a scene, and an existing one may have been edited."""
+    if not options.has_program:
+        return []
+    found = [
+        (option, "does not apply to a program")
+        for option, time in (("--from", options.start), ("--until", options.until))
+        if time is not None
+    ]
+    for target in options.targets:
+        path, named = Path(target), shorten(target, MAX_NAMED)
+        if path.suffix.lower() not in PROGRAMS:
+            found.append(("--to", f"{named}: is written from a run, a program from a scene; export them separately"))
+        elif path.is_file() and not options.force:
+            found.append(("--to", f"{named}: exists already; add --force to replace it, or name another file"))
+    return found
 
 
 def _value_faults(options: Options) -> list[tuple[str, str]]:

@@ -6,6 +6,7 @@ from typing import Any
 from sandbox.jsonable import json_schema
 
 DOCUMENTS = {
+    "advise": "sandbox.measure.advice.result:AdviceDocument",
     "check": "sandbox.cli.check:CheckDocument",
     "compare": "sandbox.measure.compare.result:ComparisonDocument",
     "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",

@@ -66,7 +66,7 @@ def document_of(text: str) -> dict[str, Any]:
 
 def json_of(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any], list[str]]:
     """Call with `--json`; return exit status, document, and lines of standard error."""
-    status = call([*arguments, "--json"])
+    status = call([arguments[0], "--json", *arguments[1:]])  # `record` passes what follows its file to the game
     out, err = capfd.readouterr()
     return status, document_of(out), _without_announcement(err)
 

@@ -40,6 +40,15 @@ position = [0.0, 0.0]
 radius = 1.0
 """
 
+GAME = """
+import pymunk
+space = pymunk.Space()
+body = pymunk.Body(1, 1)
+space.add(body, pymunk.Circle(body, 1))
+space.step(0.01)
+"""
+LEVEL = '<svg xmlns="http://www.w3.org/2000/svg"><circle r="5"/></svg>'
+
 EXAMPLES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "run": (("drop.toml", "--engine", "pymunk"), ("runs",)),
     "runs": (("runs",), ("count", "statuses", "runs")),
@@ -48,9 +57,15 @@ EXAMPLES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("drop.toml", "--engine", "pymunk", "--points", "2", "--repeats", "1", "--tolerance", "1"),
         ("points",),
     ),
+    "advise": (
+        ("drop.toml", "--effort", "0.1", "--repeats", "1", "--tolerance", "1m"),
+        ("present", "recommended", "code"),
+    ),
     "shots": (("putt.toml", "--count", "20", "--threads", "1"), ("odds", "sensitivity", "horizon")),
     "extremes": (("--axes", "speed", "--engines", "pymunk", "--quick", "--workers", "1"), ("cells", "limits")),
     "report": (("drop.toml", "--engine", "pymunk", "--out", "page.html"), ("scenes", "page")),
+    "record": (("game.py",), ("recording", "steps", "actions", "omitted")),
+    "import": (("level.svg", "--to", "level.toml"), ("level", "scene", "counts", "warnings")),
     "check": (("drop.toml", "--no-trial"), ("ok", "faults", "engines", "warnings")),
     "scenes": ((), ("scenes",)),
     "engines": ((), ("engines",)),
@@ -78,7 +93,8 @@ def test_example_of_a_command_succeeds(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name, text in (("drop.toml", DROP), ("putt.toml", PUTT), ("shell.toml", SHELL)):
+    files = (("drop.toml", DROP), ("putt.toml", PUTT), ("shell.toml", SHELL), ("level.svg", LEVEL), ("game.py", GAME))
+    for name, text in files:
         write_scene(tmp_path, text, name)
     if command in ("export", "runs"):
         assert call(["run", "drop.toml", "--out", "runs", "--quiet"]) == 0

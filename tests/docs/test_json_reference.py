@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import sandbox
+from sandbox.action import Impulse
 from sandbox.cli.main import COMMANDS, call
 from sandbox.recording import Recording
 
@@ -33,6 +34,7 @@ SAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "sandbox run --dry-run": ("run tunnel.toml --sweep solver.dt=0.01,0.005 --dry-run",),
     "sandbox runs": ("runs store", "runs store --by engine --of contacts"),
+    "sandbox import": ("import level.svg", "import level.svg --to level.toml"),
     "sandbox check": ("check bounce", "check bullet", "check landing --no-trial", "check bad.toml"),
     "sandbox compare": (
         "compare tunnel.toml --engines pymunk,exact --why",
@@ -43,6 +45,7 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "tradeoff pendulum_90 --effort 0.01 --tolerance 1 --set world.duration=0.2",
         "tradeoff tunnel.toml --effort 0.01 --tolerance 0.5",
     ),
+    "sandbox advise": ("advise tunnel.toml --effort 0.1 --repeats 1", "advise acted.json --effort 0.1 --repeats 1"),
     "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),
     "sandbox report": ("report tunnel.toml --effort 0 --engines exact --out page.html",),
     "sandbox shots": ("shots 9-ball --count 20 --sensitivity --horizon --window '7:upper left pocket'",),
@@ -54,7 +57,15 @@ SAMPLES: dict[str, tuple[str, ...]] = {
 }
 """Commands that together print all keys of a section, by section of the page."""
 
-SLOW = {"sandbox compare", "sandbox tradeoff", "sandbox extremes", "sandbox report", "sandbox shots", "sandbox match"}
+SLOW = {
+    "sandbox compare",
+    "sandbox tradeoff",
+    "sandbox advise",
+    "sandbox extremes",
+    "sandbox report",
+    "sandbox shots",
+    "sandbox match",
+}
 
 TUNNEL = """
 world = { duration = 0.2 }
@@ -130,10 +141,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text(BAD)
     Path("tunnel.toml").write_text(TUNNEL)
+    Path("level.svg").write_text('<svg viewBox="0 0 9 9"><circle r="5"/><text>x</text></svg>')
     limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
     Path("against.json").write_text(json.dumps({"limits": [limit]}))
     scene = sandbox.loads(TUNNEL)
     Recording(scene, "pymunk", scene.solver, (), duration=0.1).save("session.json")
+    push = Impulse(time=0.05, body="bullet", impulse=(1.0, 0.0))
+    Recording(scene, "pymunk", scene.solver, (push,), duration=0.2).save("acted.json")
     for store in ("store", "damaged"):
         call(["run", "tunnel.toml", "--out", store, "--quiet"])
     (stored,) = Path("damaged").glob("*.npz")

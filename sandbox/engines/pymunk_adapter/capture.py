@@ -25,7 +25,7 @@ from sandbox.scene.editing.elements import unique_name
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
 
-Table: TypeAlias = dict[str, Any]
+KeyValues: TypeAlias = dict[str, Any]
 ALL_CATEGORIES = 0xFFFFFFFF
 MIN_RADIUS = 1e-9
 """m, smallest radius of a capsule, and length of a rod"""
@@ -76,7 +76,7 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
         CaptureError: as `capture_space`.
     """
     space = capture.space
-    document: Table = {
+    document: KeyValues = {
         "title": title,
         "world": {"gravity": _point(space.gravity), "duration": duration},
         "solver": {
@@ -193,9 +193,9 @@ class SpaceElements:
 
     # Elements
 
-    def elements(self) -> dict[str, list[Table]]:
+    def elements(self) -> dict[str, list[KeyValues]]:
         """Return the elements by table."""
-        tables: dict[str, list[Table]] = {}
+        tables: dict[str, list[KeyValues]] = {}
         fixed_count = self._leading_static_count()
         for shape in self._shapes[:fixed_count]:
             table, values = self._collider(shape)
@@ -223,7 +223,7 @@ class SpaceElements:
             circles, count = is_circle, count + 1
         return count
 
-    def _collider(self, shape: pymunk.Shape) -> tuple[str, Table]:
+    def _collider(self, shape: pymunk.Shape) -> tuple[str, KeyValues]:
         """Return the table and the values of a wall or post."""
         values = self._surface(shape)
         self._note_filter(shape)
@@ -247,13 +247,13 @@ class SpaceElements:
         colliders = {shape.body for shape in self._shapes}
         yield from ((body, []) for body in self._bodies if body not in colliders and not self._is_world(body))
 
-    def element_of(self, body: pymunk.Body) -> tuple[str, Table]:
+    def element_of(self, body: pymunk.Body) -> tuple[str, KeyValues]:
         """Return the table and the values of a body with the shapes that it has."""
         shapes = [shape for shape in self._shapes if shape.body is body]
         ball = self._ball(body, shapes)
         return ("body", self._compound(body, shapes)) if ball is None else ("ball", ball)
 
-    def _ball(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table | None:
+    def _ball(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues | None:
         """Return a body that is a single disc about its centre of mass; None for others."""
         if not shapes:
             return self._state(body, shapes) | {"radius": MIN_RADIUS, "collides": "none"}
@@ -265,7 +265,7 @@ class SpaceElements:
             del values["moment"]  # that of its shape
         return values
 
-    def _compound(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table:
+    def _compound(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return a body with its shapes as parts."""
         centre = body.center_of_gravity
         if any(centre):
@@ -281,7 +281,7 @@ class SpaceElements:
             values["collides"] = "none"
         return values
 
-    def _part(self, body: pymunk.Body, shape: pymunk.Shape) -> Table:
+    def _part(self, body: pymunk.Body, shape: pymunk.Shape) -> KeyValues:
         """Return a shape as a part of its body."""
         values = self._surface(shape)
         match shape:
@@ -299,10 +299,10 @@ class SpaceElements:
                 return {"points": [_point(each) for each in shape.get_vertices()]} | rounding | values
         raise CaptureError(f"{self.names[body]} has a shape of an unknown type: {type(shape).__name__}")
 
-    def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> Table:
+    def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return name, motion, mass and filter of a body."""
         name, is_fixed = self.names[body], body.body_type != pymunk.Body.DYNAMIC
-        values: Table = {"name": name, "position": _point(body.position)}
+        values: KeyValues = {"name": name, "position": _point(body.position)}
         if body.angle:
             values["angle"] = float(body.angle)
         if is_fixed:
@@ -335,20 +335,20 @@ class SpaceElements:
         if math.hypot(*body.velocity) > MAX_SPEED:
             raise CaptureError(f"{name} is faster than {MAX_SPEED:g} m/s")
 
-    def _surface(self, shape: pymunk.Shape) -> Table:
+    def _surface(self, shape: pymunk.Shape) -> KeyValues:
         """Return the coefficients and the colour of a shape."""
         elasticity = float(shape.elasticity)
         if elasticity > 1.0:
             self.omitted.append(f"an elasticity of {elasticity:g}, which adds energy; the scene has a restitution of 1")
         if any(shape.surface_velocity):
             self.omitted.append("surface velocities")
-        values: Table = {"restitution": min(elasticity, 1.0), "friction": float(shape.friction)}
+        values: KeyValues = {"restitution": min(elasticity, 1.0), "friction": float(shape.friction)}
         colour = getattr(shape, "color", None)
         if colour is not None:
             values["colour"] = "#" + "".join(f"{min(max(int(each), 0), 255):02x}" for each in tuple(colour)[:3])
         return values
 
-    def _filter(self, name: str, shapes: Sequence[pymunk.Shape]) -> Table:
+    def _filter(self, name: str, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return what a body collides with."""
         filters = {shape.filter for shape in shapes}
         if not filters:
@@ -371,7 +371,7 @@ class SpaceElements:
 
     # Joints
 
-    def _joint(self, constraint: pymunk.Constraint) -> Iterator[Table]:
+    def _joint(self, constraint: pymunk.Constraint) -> Iterator[KeyValues]:
         """Yield the joint of a constraint; nothing if a scene has no such joint."""
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
@@ -406,7 +406,7 @@ class SpaceElements:
         if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
             self.omitted.append(f"callbacks of a {kind}")
 
-    def _kind_of_joint(self, constraint: pymunk.Constraint) -> Table | None:
+    def _kind_of_joint(self, constraint: pymunk.Constraint) -> KeyValues | None:
         """Return the kind and the values of a joint; None if a scene has no such joint."""
         match constraint:
             case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
@@ -439,7 +439,7 @@ class SpaceElements:
 
 
 _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}
-"""Table of the part for each type of shape, in the order in which the engine adds parts"""
+"""KeyValues of the part for each type of shape, in the order in which the engine adds parts"""
 
 
 def _body_of(shape: pymunk.Shape) -> pymunk.Body:
@@ -451,11 +451,11 @@ def _point(vector: Sequence[float]) -> list[float]:
     return [float(vector[0]), float(vector[1])]
 
 
-def _anchors(constraint: Any) -> Table:
+def _anchors(constraint: Any) -> KeyValues:
     return {"anchors": [_point(constraint.anchor_a), _point(constraint.anchor_b)]}
 
 
-def _turned(values: Table) -> Table:
+def _turned(values: KeyValues) -> KeyValues:
     """Return the values of a joint from its body to the world: angles are those of the body relative to the world."""
     changed = {key: -value + 0.0 if key in ("rate", "rest_angle") else value for key, value in values.items()}
     if values["kind"] == "rotary_limit":

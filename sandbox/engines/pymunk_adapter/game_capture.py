@@ -182,6 +182,11 @@ class GameCapture:
         return list(self._captures.values())
 
     @property
+    def steps(self) -> int:
+        """Largest number of steps of a space."""
+        return max((each.steps for each in self._captures.values()), default=0)
+
+    @property
     def recording(self) -> Recording:
         """Recording of the space that made the most steps.
 
@@ -207,9 +212,16 @@ class GameCapture:
         return max(self._captures.values(), key=lambda each: each.steps)
 
 
+class StepLimitReached(SystemExit):
+    """Ends a game that has made the wanted number of steps."""
+
+
 @contextmanager
-def capture() -> Iterator[GameCapture]:
+def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
     """Record all pymunk spaces that are stepped within a `with` block.
+
+    Args:
+        max_steps: steps of a space after which the next one raises `StepLimitReached`; default: unlimited.
 
     Yields:
         The recordings, which grow with each step.
@@ -217,6 +229,8 @@ def capture() -> Iterator[GameCapture]:
     game, step = GameCapture(), pymunk.Space.step
 
     def watched(space: pymunk.Space, dt: float) -> None:
+        if max_steps is not None and game.steps >= max_steps:
+            raise StepLimitReached(0)
         found = game.step(space, dt)
         step(space, dt)
         found.after_step()

@@ -113,6 +113,8 @@ class SearchSpace:
     """names of the engines"""
     frame: float = 1.0 / 60.0
     """s, duration of a frame of a game: the longest dt of `exact`; the other engines may take twice that"""
+    has_fixed_dt: bool = False
+    """whether every configuration has the dt of the base, as in the loop of a game that steps once a frame"""
     _valid: dict[Configuration, bool] = field(default_factory=dict, init=False, repr=False)
     _resolved: dict[Configuration, Settings] = field(default_factory=dict, init=False, repr=False)
 
@@ -152,6 +154,8 @@ class SearchSpace:
 
     def _can_run(self, configuration: Configuration) -> bool:
         refinement, substeps = configuration.refinement, configuration.substeps
+        if self.has_fixed_dt and refinement != 1:
+            return False
         if not (MIN_REFINEMENT <= refinement <= MAX_REFINEMENT and 1 <= substeps <= MAX_SUBSTEPS):
             return False
         if not 1 <= configuration.iterations <= MAX_ITERATIONS:

@@ -90,6 +90,8 @@ def tradeoff(
     most: int = MAX_POINTS,
     truth: Truth | str | None = None,
     runs: Mapping[str, Trajectory] = MappingProxyType({}),
+    has_fixed_dt: bool = False,
+    is_explained: bool = True,
     on_progress: ProgressCallback | None = None,
     **settings: Any,
 ) -> Tradeoff:
@@ -119,6 +121,8 @@ def tradeoff(
         truth: truth of this scene and its frames, as accurate as the tolerance requires, or the reason why there is
             none, if already known.
         runs: runs of this scene with its own settings by engine, if already made.
+        has_fixed_dt: try no other dt than that of the scene, or of `settings`; substeps divide it.
+        is_explained: split the errors into their sources and try simpler models too.
         on_progress: progress callback; its message describes each stage.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
@@ -154,7 +158,9 @@ def tradeoff(
         contexts = _contexts(scene, base, truth_tolerance, seeding.search, contexts[0].zoom)
     objective = complete_objective(contexts[0], metric, tolerance, budget, fps)
     study = _Study(
-        space=SearchSpace(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps),
+        space=SearchSpace(
+            scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps, has_fixed_dt
+        ),
         contexts=contexts,
         objective=objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps)),
         seeding=seeding,
@@ -163,6 +169,7 @@ def tradeoff(
         deadline=deadline,
         on_progress=on_progress,
         refused=tuple(_refused(scene, names, base)),
+        is_explained=is_explained,
     )
     return study.run(runs, repeats, most)
 
@@ -252,6 +259,8 @@ class _Study:
     on_progress: ProgressCallback
     refused: tuple[Evaluation, ...]
     """evaluations of the engines that cannot run the scene"""
+    is_explained: bool = True
+    """whether to split the errors into their sources, and to try simpler models"""
     _validation_contexts: list[EvaluationContext] = field(default_factory=list)
     _validation_errors: dict[Configuration, float] = field(default_factory=dict)
 
@@ -301,7 +310,7 @@ class _Study:
         within_budget = recommend_most_accurate(points, self.objective, seeds, self._validate)
         splits: list[ErrorBudget] = []
         proposals: list[Simplification] = []
-        if repeats and clock_without_compilation() < self.deadline:
+        if repeats and self.is_explained and clock_without_compilation() < self.deadline:
             self.on_progress(Progress("splitting the error into its sources, and trying simpler models"))
             splits = self._error_budgets()
             proposals = self._simplifications(within_tolerance)

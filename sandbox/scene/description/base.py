@@ -54,7 +54,7 @@ AngularVelocity = Annotated[float, Field(ge=-1e12, le=1e12)]
 Radius = Annotated[float, Field(ge=1e-9, le=1e9)]
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
-Moment = Annotated[float, Field(ge=1e-40, le=1e42)]
+Moment = Annotated[float, Field(ge=1e-40, le=1e30)]
 """A moment of inertia, kg·m²."""
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.scene.description.base import Name, Part, Point, Vector
+from sandbox.scene.description.base import Moment, Name, Part, Point, Vector
 
 DriveKey = Literal[
     "up", "down", "left", "right", "space", "left shift", "right shift", "z", "slash", "return"
@@ -18,7 +18,6 @@ DriveKey = Literal[
 
 StopAngle = Annotated[float, Field(ge=-1e9, le=1e9)]
 Torque = Annotated[float, Field(gt=0, le=1e30)]
-Moment = Annotated[float, Field(gt=0, le=1e30)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Second = Annotated[float, Field(ge=0, le=1e9)]
 Rate = Annotated[float, Field(gt=0, le=1e9)]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pygame
 
-from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, screenshot, unwritable_reason
+from sandbox.window.capture.image_files import AtomicFile, PictureError, Size, screenshot, unwritable_reason
 from sandbox.window.capture.recorder import FilmRecorder, recorder_in, size_within
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
@@ -49,14 +49,14 @@ class CaptureController:
         """Save a surface as a numbered PNG."""
         try:
             self._notify(f"screenshot: {screenshot(surface, self._folder, name)}", "info")
-        except CaptureError as error:
+        except PictureError as error:
             self._notify(str(error), "error")
 
     def start_recording(self, size: Size, name: str) -> None:
         """Start a film of a window of a size, px."""
         try:
             self._recorder = recorder_in(self._folder, name, self._film, size_within(size, MAX_WIDTH), FRAME_RATE)
-        except CaptureError as error:
+        except PictureError as error:
             self._notify(str(error), "error")
             return
         self._seconds = self._pending_seconds = 0.0
@@ -79,7 +79,7 @@ class CaptureController:
             return
         try:
             self._recorder.add(surface, self._pending_seconds)
-        except CaptureError as error:
+        except PictureError as error:
             self._notify(str(error), "warning")
             self.stop_recording()
         self._pending_seconds = 0.0
@@ -91,7 +91,7 @@ class CaptureController:
             return
         try:
             self._notify(f"recorded: {recorder.close()}", "info")
-        except CaptureError as error:
+        except PictureError as error:
             self._notify(str(error), "error")
 
     def save_session(self, view: LiveView | RecordedView | None, name: str) -> None:
@@ -108,7 +108,7 @@ class CaptureController:
             view.session.recording().save(outfile.temporary)
             self._notify(f"session: {outfile.place()}", "info")
             view.session.mark_saved()
-        except (CaptureError, OSError) as error:
+        except (PictureError, OSError) as error:
             outfile.discard()
-            reason = str(error) if isinstance(error, CaptureError) else str(unwritable_reason(self._folder, error))
+            reason = str(error) if isinstance(error, PictureError) else str(unwritable_reason(self._folder, error))
             self._notify(f"cannot save the session: {reason}", "error")

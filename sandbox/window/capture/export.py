@@ -119,7 +119,7 @@ def export_images(
     Needs no display. If it is interrupted, no file is left.
 
     Raises:
-        CaptureError: the file cannot be made.
+        PictureError: the file cannot be made.
     """
     renderer = RunRenderer(run)
     surface = offscreen(options.size)

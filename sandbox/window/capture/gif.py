@@ -16,7 +16,7 @@ import numpy.typing as npt
 import pygame
 from PIL import GifImagePlugin, Image
 
-from sandbox.window.capture.image_files import AtomicFile, CaptureError, Pixels, Size, rgb_pixels, unwritable_reason
+from sandbox.window.capture.image_files import AtomicFile, PictureError, Pixels, Size, rgb_pixels, unwritable_reason
 
 COMMON_COLOURS = 96
 """number of palette entries for the most frequent colours, which are exact; the others come from a median cut"""
@@ -112,7 +112,7 @@ class GifRecorder:
         max_frames: maximum number of frames of the gif.
 
     Raises:
-        CaptureError: the file cannot be written.
+        PictureError: the file cannot be written.
     """
 
     def __init__(self, outfile: AtomicFile, size: Size, max_frames: int) -> None:
@@ -136,14 +136,14 @@ class GifRecorder:
         """Add a picture and its duration, s.
 
         Raises:
-            CaptureError: the gif has `max_frames`, or the file cannot be written.
+            PictureError: the gif has `max_frames`, or the file cannot be written.
         """
         # A millionth of slack: 1/50 s is not exact in binary.
         if self._pending is not None and self._pending_seconds < MIN_DURATION * (1 - 1e-6):
             self._pending_seconds += seconds
             return
         if self._count >= self._max_frames:
-            raise CaptureError(
+            raise PictureError(
                 f"a gif holds at most {self._max_frames:,} frames; record a shorter one, or an mp4, which may be longer"
             )
         self._flush()
@@ -154,11 +154,11 @@ class GifRecorder:
         """Finish the file and return its path.
 
         Raises:
-            CaptureError: the file cannot be written, or no picture was added. Nothing is left then.
+            PictureError: the file cannot be written, or no picture was added. Nothing is left then.
         """
         try:
             if not self._count:
-                raise CaptureError("a recording needs at least one frame")
+                raise PictureError("a recording needs at least one frame")
             self._flush()
             self._write(TRAILER)
             try:

@@ -27,7 +27,7 @@ Pixels = npt.NDArray[np.uint8]
 """(height, width, 3), sRGB."""
 
 
-class CaptureError(Exception):
+class PictureError(Exception):
     """A picture or film cannot be made; the message states the reason and a remedy."""
 
 
@@ -56,7 +56,7 @@ class AtomicFile:
         """Rename the complete file to its final name, and return its path.
 
         Raises:
-            CaptureError: the file cannot be renamed; the temporary file is removed then.
+            PictureError: the file cannot be renamed; the temporary file is removed then.
         """
         try:
             return self._link_numbered() if self.is_numbered else self.temporary.replace(self.path)
@@ -93,9 +93,9 @@ def safe_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:MAX_STEM].strip("-") or "scene"
 
 
-def unwritable_reason(path: Path, error: OSError) -> CaptureError:
+def unwritable_reason(path: Path, error: OSError) -> PictureError:
     """Return the error for a file or folder that cannot be written."""
-    return CaptureError(f"{path}: cannot be written: {error.strerror or error}")
+    return PictureError(f"{path}: cannot be written: {error.strerror or error}")
 
 
 def offscreen(size: Size) -> pygame.Surface:
@@ -140,7 +140,7 @@ def save_image(surface: pygame.Surface, outfile: AtomicFile) -> Path:
     """Write a surface as a complete PNG or not at all, and return its path.
 
     Raises:
-        CaptureError: the file cannot be written.
+        PictureError: the file cannot be written.
     """
     try:
         with outfile.temporary.open("xb") as stream:
@@ -163,6 +163,6 @@ def screenshot(surface: pygame.Surface, folder: Path, stem: str) -> Path:
         stem: name of the scene; see `safe_stem`.
 
     Raises:
-        CaptureError: the folder cannot be written to.
+        PictureError: the folder cannot be written to.
     """
     return save_image(surface, AtomicFile.numbered(folder, stem, ".png"))

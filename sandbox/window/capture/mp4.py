@@ -13,7 +13,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import pygame
 
-from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, rgb_pixels, unwritable_reason
+from sandbox.window.capture.image_files import AtomicFile, PictureError, Size, rgb_pixels, unwritable_reason
 
 RATE_FACTOR = 18
 """ffmpeg's constant rate factor, 0 (lossless) to 51; at 18 no loss is visible"""
@@ -30,7 +30,7 @@ class Mp4Recorder:
         fps: pictures/s.
 
     Raises:
-        CaptureError: ffmpeg is missing, or the file cannot be written.
+        PictureError: ffmpeg is missing, or the file cannot be written.
     """
 
     def __init__(self, outfile: AtomicFile, size: Size, fps: float) -> None:
@@ -43,7 +43,7 @@ class Mp4Recorder:
         try:
             program = imageio_ffmpeg.get_ffmpeg_exe()
         except RuntimeError as error:
-            raise CaptureError(f"ffmpeg not found: {error}") from None
+            raise PictureError(f"ffmpeg not found: {error}") from None
         command = [
             *(program, "-v", "error", "-y", "-nostdin"),
             *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{even[0]}x{even[1]}", "-r", f"{fps:.9g}", "-i", "-"),
@@ -72,7 +72,7 @@ class Mp4Recorder:
         """Add a picture and its duration, s.
 
         Raises:
-            CaptureError: ffmpeg has ended.
+            PictureError: ffmpeg has ended.
         """
         self._seconds += seconds
         due = math.floor(self._seconds * self._fps + 0.5) - self._written
@@ -91,14 +91,14 @@ class Mp4Recorder:
         """Finish the file and return its path.
 
         Raises:
-            CaptureError: ffmpeg failed, or no picture was added. Nothing is left then.
+            PictureError: ffmpeg failed, or no picture was added. Nothing is left then.
         """
         try:
             with suppress(OSError):  # ffmpeg has ended already; its exit status is checked below
                 self._pipe.close()
             status = self._process.wait()
             if not self._written:
-                raise CaptureError("a recording needs at least one frame")
+                raise PictureError("a recording needs at least one frame")
             if status != 0:
                 raise self._failure(f"status {status}")
             return self._outfile.place()
@@ -115,9 +115,9 @@ class Mp4Recorder:
         self._messages.close()
         self._outfile.discard()
 
-    def _failure(self, default: str) -> CaptureError:
+    def _failure(self, default: str) -> PictureError:
         """Return an error with ffmpeg's messages in one line."""
         self._messages.seek(0)
         lines = self._messages.read().decode("utf-8", "replace").split("\n")
         messages = "; ".join(line.strip() for line in lines if line.strip())
-        return CaptureError(f"ffmpeg: {messages[:300] or default}")
+        return PictureError(f"ffmpeg: {messages[:300] or default}")

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import pygame
 
-from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size
+from sandbox.window.capture.image_files import AtomicFile, PictureError, Size
 from sandbox.window.capture.limits import FILM_SUFFIXES, MAX_GIF_FRAMES, NEEDS_VIDEO, can_make_mp4
 
 
@@ -17,14 +17,14 @@ class FilmRecorder(Protocol):
         """Add a picture and its duration, s.
 
         Raises:
-            CaptureError: no picture can be added. Earlier ones are kept: `close` writes them.
+            PictureError: no picture can be added. Earlier ones are kept: `close` writes them.
         """
 
     def close(self) -> Path:
         """Finish the file and return its path.
 
         Raises:
-            CaptureError: the file cannot be finished; it is removed.
+            PictureError: the file cannot be finished; it is removed.
         """
 
     def cancel(self) -> None:
@@ -40,7 +40,7 @@ def recorder_for(path: Path, size: Size, fps: float) -> FilmRecorder:
         fps: pictures/s of an mp4. In a gif each picture has its own duration.
 
     Raises:
-        CaptureError: unknown suffix, missing `video` extra, or the file cannot be written.
+        PictureError: unknown suffix, missing `video` extra, or the file cannot be written.
     """
     return _recorder(AtomicFile.at(path), path.suffix.lower(), size, fps)
 
@@ -49,7 +49,7 @@ def recorder_in(folder: Path, stem: str, suffix: str, size: Size, fps: float) ->
     """Return a recorder that writes the first free of `sandbox-<stem>-1<suffix>`, `…-2<suffix>`, … when it is closed.
 
     Raises:
-        CaptureError: as `recorder_for`.
+        PictureError: as `recorder_for`.
     """
     return _recorder(AtomicFile.numbered(folder, stem, suffix), suffix, size, fps)
 
@@ -62,15 +62,15 @@ def size_within(size: Size, max_width: int) -> Size:
 
 def _recorder(outfile: AtomicFile, suffix: str, size: Size, fps: float) -> FilmRecorder:
     if min(size) < 2 or not (math.isfinite(fps) and fps > 0):
-        raise CaptureError(f"cannot record {size[0]} x {size[1]} pixels at {fps:g} frames per second")
+        raise PictureError(f"cannot record {size[0]} x {size[1]} pixels at {fps:g} frames per second")
     if suffix == ".gif":
         from sandbox.window.capture.gif import GifRecorder  # Pillow is imported only if a gif is recorded
 
         return GifRecorder(outfile, size, MAX_GIF_FRAMES)
     if suffix == ".mp4":
         if not can_make_mp4():
-            raise CaptureError(NEEDS_VIDEO)
+            raise PictureError(NEEDS_VIDEO)
         from sandbox.window.capture.mp4 import Mp4Recorder
 
         return Mp4Recorder(outfile, size, fps)
-    raise CaptureError(f"a recording is written as {' or '.join(FILM_SUFFIXES)}, not {suffix!r}")
+    raise PictureError(f"a recording is written as {' or '.join(FILM_SUFFIXES)}, not {suffix!r}")

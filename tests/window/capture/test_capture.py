@@ -14,7 +14,7 @@ from PIL import Image
 
 from sandbox.window.capture import recorder as capture
 from sandbox.window.capture.gif import MAX_ERROR, PaletteQuantiser
-from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem, screenshot
+from sandbox.window.capture.image_files import PictureError, fit_image, offscreen, rgb_pixels, safe_stem, screenshot
 from sandbox.window.capture.recorder import FilmRecorder, recorder_for, recorder_in, size_within
 from tests.films import gif_frames, mp4_frames
 
@@ -86,10 +86,10 @@ def test_safe_stem_removes_unsafe_characters(name: str, stem: str) -> None:
 
 
 def test_missing_folder_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(CaptureError, match="cannot be written: No such file"):
+    with pytest.raises(PictureError, match="cannot be written: No such file"):
         screenshot(picture(), tmp_path / "nowhere", "a")
     for suffix in (".gif", ".mp4"):
-        with pytest.raises(CaptureError, match="cannot be written: No such file"):
+        with pytest.raises(PictureError, match="cannot be written: No such file"):
             recorder_for(tmp_path / "nowhere" / f"a{suffix}", SIZE, 30.0)
 
 
@@ -115,7 +115,7 @@ def test_recorder_leaves_one_file_or_none(suffix: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
 def test_film_without_pictures_is_an_error_and_leaves_no_file(suffix: str, tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0)
-    with pytest.raises(CaptureError, match="at least one frame"):
+    with pytest.raises(PictureError, match="at least one frame"):
         recorder.close()
     assert file_names(tmp_path) == []
 
@@ -218,7 +218,7 @@ def test_gif_has_a_frame_limit_and_keeps_earlier_frames(tmp_path: Path, monkeypa
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     for k in range(3):
         recorder.add(picture(10 + k), 0.05)
-    with pytest.raises(CaptureError, match="at most 3 frames"):
+    with pytest.raises(PictureError, match="at most 3 frames"):
         recorder.add(picture(), 0.05)
     assert gif_frames(recorder.close())[1] == [50, 50, 50]
 
@@ -231,7 +231,7 @@ def test_full_disk_is_an_error_and_leaves_no_file(tmp_path: Path, monkeypatch: p
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(recorder._stream, "write", fail)
-    with pytest.raises(CaptureError, match="No space left on device"):
+    with pytest.raises(PictureError, match="No space left on device"):
         recorder.close()
     assert file_names(tmp_path) == []
 
@@ -267,7 +267,7 @@ def test_mp4_of_odd_size_is_cropped_by_a_row_and_a_column(tmp_path: Path) -> Non
 def test_mp4_without_its_extra_names_the_package_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(capture, "can_make_mp4", lambda: False)
-    with pytest.raises(CaptureError, match=r'pip install -e "\.\[video\]"'):
+    with pytest.raises(PictureError, match=r'pip install -e "\.\[video\]"'):
         recorder_for(tmp_path / "film.mp4", SIZE, 30.0)
     assert file_names(tmp_path) == []
 
@@ -279,7 +279,7 @@ def test_failing_ffmpeg_is_reported_with_its_own_message(tmp_path: Path, monkeyp
     monkeypatch.setattr(imageio_ffmpeg, "get_ffmpeg_exe", lambda: str(program))
     recorder = recorder_for(tmp_path / "film.mp4", SIZE, 30.0)
     recorder.add(picture(), 0.1)
-    with pytest.raises(CaptureError, match=r"^ffmpeg: disk on fire$"):
+    with pytest.raises(PictureError, match=r"^ffmpeg: disk on fire$"):
         recorder.close()
     assert file_names(tmp_path) == ["ffmpeg"]
 
@@ -288,23 +288,23 @@ def test_ffmpeg_killed_while_recording_is_an_error(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.mp4", (640, 360), 30.0)
     recorder._process.kill()
     recorder._process.wait()
-    with pytest.raises(CaptureError, match=r"^ffmpeg: "):
+    with pytest.raises(PictureError, match=r"^ffmpeg: "):
         for _ in range(4):  # a pipe holds less than one such picture
             recorder.add(picture(size=(640, 360)), 0.1)
-    with pytest.raises(CaptureError):
+    with pytest.raises(PictureError):
         recorder.close()
     assert file_names(tmp_path) == []
 
 
 @pytest.mark.parametrize(("suffix", "word"), [(".avi", ".gif or .mp4"), ("", ".gif or .mp4")])
 def test_other_suffixes_are_refused(suffix: str, word: str, tmp_path: Path) -> None:
-    with pytest.raises(CaptureError, match=word):
+    with pytest.raises(PictureError, match=word):
         recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0)
 
 
 @pytest.mark.parametrize(("size", "fps"), [((0, 10), 30.0), ((10, 10), 0.0), ((10, 10), float("nan"))])
 def test_impossible_films_are_refused(size: tuple[int, int], fps: float, tmp_path: Path) -> None:
-    with pytest.raises(CaptureError, match="cannot record"):
+    with pytest.raises(PictureError, match="cannot record"):
         recorder_for(tmp_path / "film.gif", size, fps)
 
 

@@ -1,0 +1,417 @@
+"""Command `advise`: which dt, how many iterations, which engine a game needs, on one page."""
+
+import re
+import shutil
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from sandbox.cli.common import (
+    collect_errors,
+    exit_with_errors,
+    reasons_not_writable,
+    scene_path,
+    scene_paths,
+    suggest_names,
+)
+from sandbox.cli.options import (
+    OutputOptions,
+    json_option,
+    quiet_option,
+    set_option,
+    time_limit_option,
+)
+from sandbox.cli.progress import status_line
+from sandbox.cli.streams import print_json
+from sandbox.cli.tables import add_columns, format_optional, new_table, print_line, print_table
+from sandbox.echo import MAX_NAMED, shorten
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.measure.advice.result import Advice, Knob, OtherEngine
+from sandbox.measure.advice.study import DEFAULT_FPS, DEFAULT_ZOOM, advise
+from sandbox.measure.advice.text import (
+    engine_text,
+    error_text,
+    fallback_head,
+    figures_text,
+    knob_head,
+    no_setting_text,
+    pixels_text,
+    ratio_text,
+    recording_sentences,
+    risk_label,
+    risk_text,
+    search_sentence,
+    setting_text,
+    target_text,
+    truth_sentences,
+)
+from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.run.sessions import read_session
+from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import load
+
+MAX_RISKS = 6
+"""Risks of a setting that are printed; the page and the JSON document have all."""
+MAX_REASON = 100
+"""Characters of the reason why a setting failed, in a table."""
+INDENT = "   "
+
+TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
+"""Units of `--budget`, ms"""
+LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
+"""Units of `--tolerance` besides px, m"""
+PX = "px"
+QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
+
+
+class Quantity(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
+    """Positive number with a unit, as in `4ms`; the value is the number and the unit.
+
+    Args:
+        name: name for messages.
+        units: known units.
+        example: example for messages.
+    """
+
+    def __init__(self, name: str, units: tuple[str, ...], example: str) -> None:
+        self.name = name
+        self._units, self._example = units, example
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, str]:
+        """Return number and unit.
+
+        Raises:
+            click.BadParameter: the text is no positive number with a known unit.
+        """
+        if isinstance(value, tuple):
+            return value
+        units = ", ".join(self._units)
+        found = QUANTITY.fullmatch(str(value))
+        if found is None:
+            self.fail(f"{shorten(str(value))!r} is not a number with a unit, such as {self._example}", param, ctx)
+        number, unit = float(found[1]), found[2]
+        if not unit:
+            self.fail(f"{value!r} has no unit; units: {units}, as in {self._example}", param, ctx)
+        if unit not in self._units:
+            hint = suggest_names(unit, self._units)
+            self.fail(f"{shorten(unit)!r} is not one of the units {units}; {hint}", param, ctx)
+        if not 0.0 < number < float("inf"):
+            self.fail(f"{value!r} must be positive and finite", param, ctx)
+        return number, unit
+
+
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    scene: str
+    engine: str | None
+    overrides: tuple[str, ...]
+    fps: float
+    budget: tuple[float, str] | None
+    tolerance: tuple[float, str]
+    zoom: float
+    effort: float
+    time_limit: float | None
+    repeats: int
+    out: Path | None
+
+    @property
+    def tolerance_metres(self) -> float:
+        """The tolerance, m."""
+        number, unit = self.tolerance
+        return number / self.zoom if unit == PX else number * LENGTH_UNITS[unit]
+
+    @property
+    def budget_ms(self) -> float | None:
+        """The budget, ms."""
+        return None if self.budget is None else self.budget[0] * TIME_UNITS[self.budget[1]]
+
+
+@click.command(name="advise")
+@click.argument("scene", metavar="SCENE|RECORDING")
+@click.option(
+    "--engine", metavar="NAME", help="present engine of the game; default: pymunk, or the engine of the recording"
+)
+@set_option()
+@click.option("--fps", type=POSITIVE, default=DEFAULT_FPS, metavar="N", help="frames per second; default: 60")
+@click.option(
+    "--budget",
+    type=Quantity("time", tuple(TIME_UNITS), "4ms"),
+    metavar="TIME",
+    help="computing time per frame that is available: 4ms, 500us or 0.004s",
+)
+@click.option(
+    "--tolerance",
+    type=Quantity("length", (PX, *LENGTH_UNITS), "1px"),
+    default="1px",
+    metavar="LENGTH",
+    help="largest allowed error of a position: 1px, 5mm, 2cm or 0.02m; default: 1px",
+)
+@click.option("--zoom", type=POSITIVE, default=DEFAULT_ZOOM, metavar="PX", help="pixels per metre; default: 50")
+@click.option(
+    "--effort",
+    type=POSITIVE,
+    default=DEFAULT_EFFORT,
+    metavar="N",
+    help=f"effort of the search, as of `tradeoff`; default: {DEFAULT_EFFORT:g}",
+)
+@time_limit_option("time limit of the search, s; the settings tried then depend on the machine; default: no limit")
+@click.option(
+    "--repeats",
+    type=click.IntRange(1, 1000),
+    default=DEFAULT_REPEATS,
+    metavar="N",
+    help=f"timings of each setting that is printed; default: {DEFAULT_REPEATS}",
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="write the advice as an HTML page")
+@json_option
+@quiet_option()
+def advise_command(**given: Any) -> int:
+    """Answer which dt, how many iterations and which engine a game needs.
+
+    Prints the forecast and the measured error of the present setting, the cheapest setting within the tolerance, the
+    effect of each single change, the price of the other engines, and the lines of code to change. All settings that
+    are considered step once a frame, dt = 1/fps, with substeps. SCENE|RECORDING is a scene file, the name of a shipped
+    scene, or a recorded session (.json). Exit status 1: no setting is within the tolerance and the budget.
+    """
+    options = _Options(**given)
+    faults: list[Fault] = []
+    if options.engine is not None:
+        with collect_errors(faults, "--engine", (UnknownEngineError,)):
+            engine_named(options.engine)
+    read = _read(options, faults)
+    advice: Advice | None = None
+    if read is not None and not faults:
+        with (
+            collect_errors(faults, options.scene, (TooLargeError, ValueError)),
+            status_line(options.is_silent) as progress,
+        ):
+            advice = advise(
+                read,
+                options.engine,
+                fps=options.fps,
+                tolerance=options.tolerance_metres,
+                budget=options.budget_ms,
+                zoom=options.zoom,
+                effort=options.effort,
+                time_limit=options.time_limit,
+                repeats=options.repeats,
+                on_progress=progress,
+            )
+    if advice is None:
+        return exit_with_errors(faults, options.as_json, scene=options.scene)
+    if options.as_json:
+        print_json(advice.document(options.scene))
+    elif not options.quiet:
+        print_advice(options.scene, advice)
+    status = 0 if advice.is_met else 1
+    if advice.interrupted:
+        click.echo("interrupted: what was measured so far is kept", err=True)
+        status = 130
+    return max(status, _write_page(advice, options))
+
+
+def _read(options: _Options, faults: list[Fault]) -> Scene | Recording | None:
+    """Return the scene or the recording; add faults of it, and of the page to write, to the faults."""
+    read: Scene | Recording | None = None
+    with collect_errors(faults):
+        if scene_paths([options.scene])[0][1].lower().endswith(".json"):
+            read = read_session(scene_paths([options.scene])[0][1])
+            if options.overrides:
+                raise SceneError([Fault("--set", None, "", "a recording has its scene and settings within it")])
+        else:
+            read = load(scene_path(options.scene), options.overrides)
+    if options.out is not None:
+        name = shorten(str(options.out), MAX_NAMED)
+        faults += [Fault("--out", None, "", f"{name}: {reason}") for reason in reasons_not_writable(options.out)]
+    return read
+
+
+def _write_page(advice: Advice, options: _Options) -> int:
+    """Write the page of `--out`; return 2 if it cannot be written."""
+    if options.out is None:
+        return 0
+    from sandbox.report.html.advice import write_advice
+
+    try:
+        write_advice(advice, options.out)
+    except OSError as error:
+        click.echo(f"--out: {error.filename}: {error.strerror}", err=True)
+        return 2
+    if not options.is_silent:
+        click.echo(f"written: {options.out}")
+    return 0
+
+
+def print_advice(scene: str, advice: Advice) -> None:
+    """Print the advice in five numbered parts.
+
+    Args:
+        scene: the scene as the user named it.
+        advice: the advice.
+    """
+    name = f"{scene} ({advice.scene})" if advice.scene else scene
+    _print_heading(f"{name}: {target_text(advice)}")
+    for sentence in (*truth_sentences(advice), *recording_sentences(advice)):
+        _print_item(sentence, "")
+    _print_present(advice)
+    _print_recommended(advice)
+    _print_knobs(advice)
+    _print_engines(advice)
+    _print_code(advice)
+    click.echo()
+    _print_item(f"{search_sentence(advice)}.", "")
+
+
+def _print_present(advice: Advice) -> None:
+    present = advice.present
+    _print_heading(f"1. Present setting: {setting_text(present, advice.fps)}", blank=True)
+    _print_item(figures_text(advice, present))
+    if present.status != "refused" and not advice.risks:
+        _print_item("forecast: no problem")
+    _print_risks(advice, advice.risks)
+    for note in advice.notes:
+        _print_item(f"note: {note}")
+
+
+def _print_risks(advice: Advice, risks: tuple[Any, ...]) -> None:
+    for risk in risks[:MAX_RISKS]:
+        _print_item(f"{risk_label(risk)}: {risk_text(risk, advice.fps)}")
+    if len(risks) > MAX_RISKS:
+        _print_item(f"… and {len(risks) - MAX_RISKS} more; --out and --json list all")
+
+
+def _print_recommended(advice: Advice) -> None:
+    chosen = advice.recommended
+    if chosen is not None:
+        _print_heading(f"2. Cheapest setting within the tolerance: {setting_text(chosen, advice.fps)}", blank=True)
+        _print_item(figures_text(advice, chosen))
+    else:
+        _print_heading(f"2. Cheapest setting within the tolerance: {no_setting_text(advice)}", blank=True)
+    if advice.fallback is not None:
+        _print_item(f"{fallback_head(advice)}: {setting_text(advice.fallback, advice.fps)}")
+        _print_item(figures_text(advice, advice.fallback))
+    elif chosen is not None and advice.fits_budget(chosen) is False:
+        _print_item("no setting that was tried is within the budget")
+    if advice.remaining_risks:
+        _print_item("formulas still forecast, although the measured run may not show it:")
+        _print_risks(advice, advice.remaining_risks)
+
+
+def _print_knobs(advice: Advice) -> None:
+    if not advice.knobs:
+        return
+    _print_heading(f"3. {knob_head(advice)}", blank=True)
+    table = new_table()
+    add_columns(table, [f"{INDENT}change"])
+    add_columns(table, (_error_head(advice), "error ratio", "ms per frame", "cost ratio"), "right")
+    add_columns(table, [""])
+    for knob in advice.knobs:
+        table.add_row(*_knob_cells(advice, knob))
+    print_table(table)
+
+
+def _error_head(advice: Advice) -> str:
+    if advice.tolerance_px is not None:
+        return "error, px"
+    return f"{advice.metric}{f', {advice.unit}' if advice.unit else ''}"
+
+
+def _error_cell(advice: Advice, setting: Any) -> str:
+    return pixels_text(setting.error_px) if advice.tolerance_px is not None else format_optional(setting.error)
+
+
+def _knob_cells(advice: Advice, knob: Knob) -> list[Any]:
+    from rich.text import Text
+
+    setting = knob.setting
+    remark = ""
+    if setting.status != "ok":
+        remark = shorten(error_text(advice, setting), MAX_REASON)
+    elif (is_within := advice.is_within_tolerance(setting)) is not None:
+        remark = "within" if is_within else "too large"
+    return [
+        f"{INDENT}{knob.change}",
+        _error_cell(advice, setting),
+        ratio_text(knob.error_ratio),
+        format_optional(setting.frame_ms),
+        ratio_text(knob.cost_ratio),
+        Text(remark, style="dim"),
+    ]
+
+
+def _print_engines(advice: Advice) -> None:
+    if not advice.others:
+        return
+    _print_heading("4. The same tolerance on the other engines", blank=True)
+    measured = [other for other in advice.others if other.setting is not None]
+    if measured:
+        table = new_table()
+        add_columns(table, [f"{INDENT}engine", "setting"])
+        add_columns(table, (_error_head(advice), "ms per frame", "cost ratio"), "right")
+        add_columns(table, [""])
+        for other in measured:
+            table.add_row(*_engine_cells(advice, other))
+        print_table(table)
+    for other in advice.others:
+        if other.setting is None:
+            _print_item(f"{other.engine}: {engine_text(other)}")
+
+
+def _engine_cells(advice: Advice, other: OtherEngine) -> list[Any]:
+    from rich.text import Text
+
+    setting = other.setting
+    assert setting is not None
+    return [
+        f"{INDENT}{other.engine}",
+        setting_text(setting, advice.fps),
+        _error_cell(advice, setting),
+        format_optional(setting.frame_ms),
+        ratio_text(setting.ratio),
+        Text(engine_text(other), style="dim"),
+    ]
+
+
+LANGUAGES: Mapping[str, str] = {
+    "python": "lines of a game that uses pymunk",
+    "c": "lines of a game that uses Box2D, in metres",
+    "toml": "lines of the scene file",
+}
+
+
+def _print_code(advice: Advice) -> None:
+    if advice.code is None:
+        return
+    which = "the recommended setting" if advice.recommended is not None else f"the {fallback_head(advice)}"
+    _print_heading(f"5. {which[:1].upper()}{which[1:]} as {LANGUAGES[advice.code.language]}", blank=True)
+    for line in advice.code.lines:
+        print_line(f"{INDENT} {line}")
+    for remark in advice.code.remarks:
+        _print_item(remark)
+
+
+def _print_heading(text: str, *, blank: bool = False) -> None:
+    if blank:
+        click.echo()
+    print_line(text, style="bold")
+
+
+def _print_item(text: str, indent: str = INDENT) -> None:
+    """Print one item; on a terminal it is wrapped between words, otherwise it is one line."""
+    if sys.stdout.isatty():
+        width = shutil.get_terminal_size().columns
+        click.echo(click.wrap_text(text, width, initial_indent=indent, subsequent_indent=f"{indent}  "))
+    else:
+        click.echo(f"{indent}{text}")

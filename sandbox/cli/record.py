@@ -1,0 +1,153 @@
+"""Command `record`: play a game that uses pymunk, and keep the session as a recording."""
+
+import contextlib
+import runpy
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from sandbox.cli.common import exit_with_errors, plural, reasons_not_writable
+from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.streams import print_json
+from sandbox.echo import MAX_NAMED, shorten
+from sandbox.jsonable import to_json
+from sandbox.scene.errors import Fault
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordDocument:
+    """JSON document of a recorded game."""
+
+    game: str
+    """as the user named it"""
+    recording: str | None = None
+    """file that was written; None if there is none"""
+    spaces: int = 0
+    """spaces that made a step; the one with the most steps is recorded"""
+    bodies: int = 0
+    """at the start"""
+    steps: int = 0
+    duration: float = 0.0
+    """s"""
+    actions: int = 0
+    omitted: Sequence[str] = ()
+    """what the recording lacks"""
+    inexact: Sequence[str] = ()
+    """reasons for which a replay may differ by rounding"""
+    ended: str | None = None
+    """why the game ended, if it did not end by itself"""
+
+
+@click.command(name="record", context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
+@click.argument("game", metavar="GAME.py")
+@click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[ARGUMENTS]…")
+@click.option("--to", "target", metavar="FILE", help="recording to write; default: GAME.json in the working folder")
+@click.option("--force", is_flag=True, help="replace an existing file")
+@click.option("--steps", type=click.IntRange(min=1), metavar="N", help="end the game after so many steps of its space")
+@json_option
+@quiet_option("print no summary; remarks are printed")
+def record_command(
+    game: str,
+    arguments: tuple[str, ...],
+    target: str | None,
+    force: bool,
+    steps: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Play a game that uses pymunk, and keep the session as a recording.
+
+    GAME.py runs as `python GAME.py [ARGUMENTS]` would run it, in this process; options of this command come before it.
+    Its pymunk spaces are watched: the scene is the space before its first step, and what the game changes between two
+    steps becomes an action. `sandbox replay`, `run`, `compare` and `advise` take the recording. What a scene cannot
+    have, such as collision callbacks, is listed on standard error.
+    """
+    path = Path(target) if target is not None else Path(f"{Path(game).stem}.json")
+    faults = _faults(game, path, force)
+    if faults:
+        return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game)))
+    from sandbox.engines.pymunk_adapter.capture import CaptureError
+    from sandbox.engines.pymunk_adapter.game_capture import capture
+
+    ended: str | None = None
+    status = 0
+    with capture(max_steps=steps) as captured, _started_as(game, arguments, is_quiet=as_json):
+        try:
+            runpy.run_path(game, run_name="__main__")
+        except SystemExit:
+            pass  # the usual end of a game
+        except KeyboardInterrupt:
+            ended, status = "interrupted", 130
+        except CaptureError as error:
+            faults = [Fault(game, None, "", f"its space cannot be a scene: {error}")]
+        except Exception as error:  # noqa: BLE001, of the user's program
+            traceback.print_exc()
+            ended, status = f"{type(error).__name__}: {error}", 1
+    if not captured.spaces and not faults:
+        faults = [Fault(game, None, "", "no pymunk space made a step, so that there is nothing to record")]
+    if not faults:
+        try:
+            captured.recording.save(path)
+        except OSError as error:
+            faults = [Fault(str(path), None, "", f"cannot be written: {error.strerror or error}")]
+    if faults:
+        return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game, ended=ended)))
+    recording = captured.recording
+    document = RecordDocument(
+        game=game,
+        recording=str(path),
+        spaces=len(captured.spaces),
+        bodies=len(recording.scene.bodies),
+        steps=captured.steps,
+        duration=recording.duration,
+        actions=len(recording.actions),
+        omitted=captured.omitted,
+        inexact=captured.inexact,
+        ended=ended,
+    )
+    if as_json:
+        print_json(to_json(document))
+    elif not quiet:
+        bodies = f"{document.bodies:,} {'body' if document.bodies == 1 else 'bodies'}"
+        steps_made = f"{plural(document.steps, 'step')} of {1000.0 * recording.settings.dt:.4g} ms"
+        summary = f"{bodies}, {steps_made}, {plural(document.actions, 'action')}"
+        click.echo(f"written: {shorten(str(path), MAX_NAMED)} ({summary})")
+    for each in captured.omitted:
+        click.echo(f"{game}: left out: {each}", err=True)
+    for each in captured.inexact:
+        click.echo(f"{game}: a replay may differ by rounding: {each}", err=True)
+    return status
+
+
+def _faults(game: str, path: Path, force: bool) -> list[Fault]:
+    """Return why the game cannot be run, or the recording cannot be written."""
+    found = []
+    if not Path(game).exists():
+        found.append(Fault(game, None, "", "does not exist; name the Python file of the game"))
+    elif Path(game).suffix != ".py" and not (Path(game) / "__main__.py").exists():
+        found.append(Fault(game, None, "", "is no Python program; name a .py file, or a folder with a __main__.py"))
+    reason = next(iter(reasons_not_writable(path)), "")
+    if not reason and path.exists() and not force:
+        reason = "exists already; add --force to replace it, or name another file: --to FILE"
+    if reason:
+        found.append(Fault("--to", None, "", f"{shorten(str(path), MAX_NAMED)}: {reason}"))
+    return found
+
+
+@contextlib.contextmanager
+def _started_as(game: str, arguments: Sequence[str], *, is_quiet: bool) -> Iterator[None]:
+    """Give a program the arguments and the import path that the interpreter would give it."""
+    before = sys.argv, sys.path[:]
+    folder = Path(game).resolve()
+    sys.argv = [game, *arguments]
+    sys.path.insert(0, str(folder if folder.is_dir() else folder.parent))
+    output = contextlib.redirect_stdout(sys.stderr) if is_quiet else contextlib.nullcontext()
+    try:
+        with output:  # standard output is for the JSON document
+            yield
+    finally:
+        sys.argv, sys.path[:] = before[0], before[1]

@@ -1,0 +1,112 @@
+"""Forecast for a game: the diagnostics of `sandbox check` in order of severity, with remedies for a loop of frames."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pydantic import ValidationError
+
+from sandbox.measure.preflight import Diagnostic, notes, run_preflight, warnings
+from sandbox.measure.preflight.diagnostic import ROUNDING
+from sandbox.measure.preflight.tunnelling import intervals
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+
+ELEMENT_KEYS = ("ball", "body", "joint", "thing", "first")
+"""Details that name the element of a diagnostic, in the order of preference."""
+GAME_NOTES = frozenset({"flight", "pixels"})
+"""Kinds of notes that matter for the settings of a game."""
+DETECTION_KINDS = frozenset({"tunnelling", "depth", "entry"})
+"""Kinds of diagnostics that depend on how often contacts are detected."""
+UNKNOWN_ODDS = 0.5
+"""Rank of a diagnostic without odds among those that have them: formulas predict it, but no run has shown it."""
+
+
+@dataclass(frozen=True)
+class Risk:
+    """Problem that a setting can have, with its odds, element and remedy."""
+
+    kind: str
+    """identifier of the problem, such as `tunnelling`"""
+    element: str | None
+    """name of the body, joint or static object; None if the whole scene is concerned"""
+    odds: float | None
+    """upper bound of the odds, 0 to 1; 1 if the trial run has shown it; None if the formula gives none"""
+    is_observed: bool
+    """whether the trial run has shown it"""
+    message: str
+    """description with a remedy"""
+    safe_substeps: int | None
+    """substeps of a frame from which on it cannot happen; None if substeps are no remedy, or too many would be
+    needed"""
+
+    @property
+    def rank(self) -> float:
+        """Severity for sorting: observed problems first, then by their odds."""
+        return 2.0 if self.is_observed else UNKNOWN_ODDS if self.odds is None else self.odds
+
+
+def forecast(scene: Scene, settings: Settings, engine: str, fps: float) -> list[Risk]:
+    """Return the problems of a setting by formulas and by a trial run, the most severe first.
+
+    Args:
+        scene: the scene.
+        settings: the setting.
+        engine: name of the engine.
+        fps: frames per second, for the substeps that avoid a problem.
+    """
+    formulas = {each.message for each in warnings(scene, settings, engine)}
+    return _ordered(run_preflight(scene, settings, engine).warnings, settings, engine, fps, formulas)
+
+
+def formula_forecast(scene: Scene, settings: Settings, engine: str, fps: float) -> list[Risk]:
+    """Return the problems of a setting by formulas only, the most severe first; the arguments are those of `forecast`.
+
+    The measured run of the setting need not show them: a body can tunnel at a slightly different speed.
+    """
+    found = warnings(scene, settings, engine)
+    return _ordered(found, settings, engine, fps, {each.message for each in found})
+
+
+def game_notes(scene: Scene, engine: str) -> list[str]:
+    """Return the notes about a scene that matter for the settings of a game.
+
+    Args:
+        scene: the scene, with the present setting as its `[solver]`.
+        engine: name of the engine.
+    """
+    return [each.message for each in notes(scene, engine) if each.kind in GAME_NOTES]
+
+
+def _ordered(
+    found: Iterable[Diagnostic], settings: Settings, engine: str, fps: float, formulas: set[str]
+) -> list[Risk]:
+    return sorted((_risk(each, settings, engine, fps, formulas) for each in found), key=lambda risk: -risk.rank)
+
+
+def _risk(found: Diagnostic, settings: Settings, engine: str, fps: float, formulas: set[str]) -> Risk:
+    details = found.details
+    is_observed = "seen_at" in details or found.message not in formulas
+    odds = 1.0 if is_observed else details.get("odds")
+    # Some engines detect contacts once a step, so that substeps do not prevent tunnelling.
+    has_effect = found.kind not in DETECTION_KINDS or intervals(settings.replace(substeps=2), engine) == 2
+    element = next((str(details[key]) for key in ELEMENT_KEYS if key in details), None)
+    return Risk(
+        kind=found.kind,
+        element=element,
+        odds=None if odds is None else min(float(odds), 1.0),
+        is_observed=is_observed,
+        message=found.message,
+        safe_substeps=_safe_substeps(details.get("safe_dt"), settings, fps) if has_effect else None,
+    )
+
+
+def _safe_substeps(safe_dt: float | int | str | None, settings: Settings, fps: float) -> int | None:
+    """Return the substeps of a frame whose length is at most that of a safe dt with the present substeps."""
+    if safe_dt is None or not 0.0 < float(safe_dt) < math.inf:
+        return None
+    needed = math.ceil(settings.substeps / (fps * float(safe_dt)) * (1.0 - ROUNDING))
+    try:
+        return settings.replace(substeps=max(needed, 1)).substeps
+    except ValidationError:  # more than a setting may have
+        return None

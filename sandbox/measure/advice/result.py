@@ -1,0 +1,267 @@
+"""Results of the advice for a game as frozen values and as a JSON document."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from sandbox.jsonable import in_json, to_json
+from sandbox.measure.advice.forecast import Risk
+from sandbox.measure.advice.game_code import GameCode
+from sandbox.scene.description.world import Settings
+
+FallbackKind = Literal["invariant", "budget", "accuracy"]
+KnobStart = Literal["present", "recommended", "fallback"]
+
+
+@dataclass(frozen=True)
+class MeasuredSetting:
+    """Setting of an engine with its error and cost, all measured in this run. Unknown values are None."""
+
+    engine: str
+    """name of the engine"""
+    settings: Settings
+    """settings as the engine resolved them"""
+    asked: Settings = field(metadata=in_json(omit=True))
+    """settings given to the engine; those that are None are chosen by it"""
+    status: str
+    """`ok`, `diverged`, `failed`, `refused`, or `stopped` if the run took too long"""
+    reason: str | None
+    """reason for a status other than `ok`"""
+    error: float | None
+    """error, in the unit of the metric"""
+    error_px: float | None
+    """error on the screen, px; None if the metric is no length"""
+    invariant: float | None
+    """invariant that also holds beyond the predictability horizon, in its unit; None if the advice has none"""
+    missed_contacts: float | None
+    """contacts that the engine missed"""
+    within_until: float | None = None
+    """s, time from which on the error exceeds the tolerance; None if it does not, or if that was not measured"""
+    frame_ms: float | None = None
+    """computing time of a frame, ms: the median of the timings; of a step, if that is longer than a frame; None if it
+    was not timed"""
+    ratio: float | None = None
+    """cost per simulated second relative to the present setting; None if one of them was not timed"""
+    repeats: int = 0
+    """number of timings"""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """Effect of one change of a setting."""
+
+    change: str
+    """the change, such as `substeps 4 → 8`"""
+    setting: MeasuredSetting = field(metadata=in_json(inline=True))
+    """the changed setting; its `ratio` is relative to the present setting"""
+    cost_ratio: float | None
+    """cost relative to the setting without the change"""
+    error_ratio: float | None
+    """error relative to the setting without the change"""
+
+
+@dataclass(frozen=True)
+class OtherEngine:
+    """Price of another engine."""
+
+    engine: str
+    """name of the engine"""
+    setting: MeasuredSetting | None
+    """cheapest setting within the tolerance, or the most accurate one if there is none; None if it has no setting"""
+    is_within_tolerance: bool
+    """whether that setting is within the tolerance"""
+    missing: str | None
+    """reason why the engine cannot run the scene; None if it can"""
+
+
+@dataclass(frozen=True)
+class ReplayedActions:
+    """Run of a setting with the actions of a recording."""
+
+    setting: str
+    """`present` or `recommended`"""
+    status: str
+    reason: str | None
+    missed_contacts: int | None
+    """contacts that the engine missed"""
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """Advice for a game: which dt, how many iterations, which engine."""
+
+    scene: str
+    """title of the scene"""
+    engine: str
+    """name of the present engine"""
+    fps: float
+    """frames per second of the game"""
+    zoom: float
+    """px/m, scale of errors on the screen"""
+    metric: str
+    """name of the metric of the error"""
+    metric_about: str
+    """description of the metric"""
+    metric_reason: str | None
+    """reason why errors are no positions; None if they are"""
+    unit: str
+    """unit of the error; empty for a fraction"""
+    tolerance: float
+    """largest accepted error, in the unit of the metric"""
+    tolerance_px: float | None
+    """the same on the screen, px; None if the metric is no length"""
+    budget: float | None
+    """ms, computing time per frame that is available; None if not given"""
+    invariant: str | None
+    """metric that also holds beyond the predictability horizon; None if positions are predictable to the end"""
+    invariant_tolerance: float | None
+    """largest accepted value of the invariant, in its unit"""
+    truth: str | None
+    """kind of the truth: `closed_form`, `exact` or `refined`; None if there is none"""
+    truth_about: str | None
+    """source of the truth, or the reason why there is none"""
+    trusted_until: float | None
+    """s, time up to which errors count; None without a truth"""
+    duration: float
+    """s, duration of the scene"""
+    risks: tuple[Risk, ...]
+    """forecast for the present setting, the most severe first"""
+    notes: tuple[str, ...]
+    """facts about the scene that matter for the settings"""
+    present: MeasuredSetting
+    """the present setting"""
+    is_in_loop: bool
+    """whether the present dt is that of a frame, so that the game steps once a frame"""
+    recommended: MeasuredSetting | None
+    """cheapest setting of the present engine within the tolerance"""
+    fallback: MeasuredSetting | None
+    """another setting if the recommended one is missing or over the budget"""
+    fallback_kind: FallbackKind | None
+    """choice of the fallback: the cheapest that keeps the `invariant`, the most accurate within the `budget`, or the
+    most accurate of all (`accuracy`)"""
+    remaining_risks: tuple[Risk, ...]
+    """forecast for the recommended setting, or for the fallback without one"""
+    knob_start: KnobStart | None
+    """choice of the setting that the knobs are changed from: `present`, `recommended` or `fallback`"""
+    knob_setting: MeasuredSetting | None
+    """that setting"""
+    knobs: tuple[Knob, ...]
+    """effect of each single change"""
+    others: tuple[OtherEngine, ...]
+    """the other engines"""
+    code: GameCode | None
+    """lines for the game that set the recommended setting, or the fallback without one"""
+    recorded_actions: int
+    """actions of the player in a recording, without which errors, costs and forecast are computed"""
+    replays: tuple[ReplayedActions, ...]
+    """runs with these actions"""
+    tried: int
+    """number of settings that were tried"""
+    untried: int
+    """number of settings left out because of their cost or the time limit"""
+    out_of_time: bool
+    """whether the time limit ended the search"""
+    interrupted: bool
+    """whether Ctrl-C ended the advice; what was measured before is kept"""
+    machine: Mapping[str, Any]
+    """description of the machine"""
+    versions: Mapping[str, str]
+    """versions of Python and of the packages used"""
+
+    def __repr__(self) -> str:
+        """Return the scene, the engine and the recommended setting."""
+        if self.recommended is None:
+            return f"<Advice for {self.scene!r} on {self.engine}: no setting within the tolerance>"
+        own = self.recommended.settings
+        return f"<Advice for {self.scene!r} on {self.engine}: {own.substeps} substeps, {own.iterations} iterations>"
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the recommended setting exists and fits the budget, if there is one."""
+        return self.recommended is not None and self.fits_budget(self.recommended) is not False
+
+    @property
+    def chosen(self) -> MeasuredSetting | None:
+        """The recommended setting; without one, the fallback."""
+        return self.recommended or self.fallback
+
+    @property
+    def is_predictable(self) -> bool:
+        """Whether there is a truth that is trusted to the end of the scene."""
+        return self.trusted_until is not None and self.trusted_until >= self.duration
+
+    def fits_budget(self, setting: MeasuredSetting) -> bool | None:
+        """Return whether a frame of a setting takes at most the budget; None without a budget or a timing."""
+        if self.budget is None or setting.frame_ms is None:
+            return None
+        return setting.frame_ms <= self.budget
+
+    def is_within_tolerance(self, setting: MeasuredSetting) -> bool | None:
+        """Return whether the error of a setting is within the tolerance; None if the error is unknown."""
+        return None if setting.error is None else setting.error <= self.tolerance
+
+    def document(self, scene: str | None = None) -> dict[str, Any]:
+        """Return the advice as one JSON document.
+
+        Args:
+            scene: name of the scene in the document, such as its path; default: its title.
+        """
+        shared = {name: getattr(self, name) for name in AdviceDocument.__dataclass_fields__ if name not in COMPUTED}
+        found: dict[str, Any] = to_json(
+            AdviceDocument(
+                **shared | {"scene": self.scene if scene is None else scene},
+                title=self.scene,
+                fits_budget=None if self.recommended is None else self.fits_budget(self.recommended),
+            )
+        )
+        return found
+
+
+COMPUTED = ("title", "fits_budget")
+"""Fields of the document that are not fields of the advice."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdviceDocument:
+    """JSON document of an advice; the fields are those of `Advice`."""
+
+    scene: str
+    title: str
+    engine: str
+    fps: float
+    zoom: float
+    metric: str
+    metric_about: str
+    metric_reason: str | None
+    unit: str
+    tolerance: float
+    tolerance_px: float | None
+    budget: float | None
+    invariant: str | None
+    invariant_tolerance: float | None
+    truth: str | None
+    truth_about: str | None
+    trusted_until: float | None
+    duration: float
+    risks: Sequence[Risk]
+    notes: Sequence[str]
+    present: MeasuredSetting
+    is_in_loop: bool
+    recommended: MeasuredSetting | None
+    fits_budget: bool | None
+    fallback: MeasuredSetting | None
+    fallback_kind: FallbackKind | None
+    remaining_risks: Sequence[Risk]
+    knob_start: KnobStart | None
+    knob_setting: MeasuredSetting | None
+    knobs: Sequence[Knob]
+    others: Sequence[OtherEngine]
+    code: GameCode | None
+    recorded_actions: int
+    replays: Sequence[ReplayedActions]
+    tried: int
+    untried: int
+    out_of_time: bool
+    interrupted: bool
+    machine: Mapping[str, Any]
+    versions: Mapping[str, str]

@@ -1,0 +1,195 @@
+"""Sentences of an advice, shared by the terminal and the page."""
+
+from collections.abc import Iterator
+
+from sandbox.formatting import UNKNOWN, format_percent, format_plural, format_quantity
+from sandbox.measure.advice.forecast import Risk
+from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine
+from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value
+from sandbox.scene.description.world import Settings
+
+SMALLEST_PX = 1e-3
+"""px; smaller errors are written as a bound, because nothing on the screen shows them."""
+SAME_STEP = 1e-9
+"""Relative: a dt that differs from a frame by less is written as that of a frame."""
+METHODS = ("integrator", "detection", "response", "joints", "half_kick", "continuous", "slop", "bias", "persistence")
+"""Settings that are named if they were asked for; others have no effect on results."""
+
+
+def setting_text(setting: MeasuredSetting, fps: float) -> str:
+    """Return a setting in a few words: `dt 1/60 s, 4 substeps, 10 iterations, half_kick`."""
+    own, asked = setting.settings, setting.asked
+    if setting.engine == "exact":
+        return f"frames of {step_text(own.dt, fps)}; no time step"
+    parts = [f"dt {step_text(own.dt, fps)}", format_plural(own.substeps, "substep")]
+    if setting.engine != "box2d":
+        parts.append(format_plural(own.iterations, "iteration"))
+    return ", ".join([*parts, *_methods(asked)])
+
+
+def _methods(asked: Settings) -> Iterator[str]:
+    for key in METHODS:
+        value = getattr(asked, key)
+        if value is True:
+            yield key
+        elif value is not None and value is not False:
+            yield f"{key} {format_value(value)}"
+        elif value is False and key == "continuous":
+            yield "no continuous"
+
+
+def step_text(dt: float, fps: float) -> str:
+    """Return a time step: `1/60 s` for that of a frame, otherwise a decimal number."""
+    return f"1/{fps:g} s" if abs(dt * fps - 1.0) <= SAME_STEP else f"{dt:.4g} s"
+
+
+def pixels_text(pixels: float | None) -> str:
+    """Return an error in px without its unit."""
+    if pixels is None:
+        return UNKNOWN
+    return f"<{SMALLEST_PX:g}" if pixels < SMALLEST_PX else f"{pixels:.3g}"
+
+
+def error_text(advice: Advice, setting: MeasuredSetting) -> str:
+    """Return the error of a setting with its unit, in px and as a length where it is one."""
+    if setting.status != "ok":
+        return f"{setting.status}: {setting.reason or 'no reason given'}"
+    if setting.error is None:
+        return "error unknown"
+    if setting.error_px is None:
+        return f"{advice.metric} {format_quantity(setting.error, advice.unit)}"
+    length = "" if setting.error_px < SMALLEST_PX else f" ({format_quantity(setting.error, 'm')})"
+    return f"error {pixels_text(setting.error_px)} px{length}"
+
+
+def figures_text(advice: Advice, setting: MeasuredSetting) -> str:
+    """Return error, missed contacts, invariant and cost of a setting, as far as they were measured."""
+    parts = [error_text(advice, setting)]
+    is_within = advice.is_within_tolerance(setting)
+    if is_within is not None:
+        parts[0] += ", within the tolerance" if is_within else ", more than the tolerance"
+    if setting.missed_contacts:
+        parts.append(format_plural(round(setting.missed_contacts), "missed contact"))
+    if setting.within_until is not None:
+        parts[0] += f" from {setting.within_until:.3g} s on"
+    if advice.invariant is not None and setting.invariant is not None:
+        parts.append(f"{advice.invariant} to the end {setting.invariant:.3g}")
+    return "; ".join([*parts, *cost_parts(advice, setting)])
+
+
+def cost_parts(advice: Advice, setting: MeasuredSetting) -> Iterator[str]:
+    """Yield the time of a frame, its ratio to the present setting, and whether it fits the budget."""
+    if setting.frame_ms is None:
+        return
+    dt = setting.settings.dt
+    text = f"{setting.frame_ms:.3g} ms per {'frame' if dt * advice.fps <= FRAME_TOLERANCE else f'step of {dt:.4g} s'}"
+    if setting.ratio is not None and setting is not advice.present:
+        text += f", {ratio_text(setting.ratio)} the present cost per second"
+    fits = advice.fits_budget(setting)
+    if fits is not None:
+        text += f", {'within' if fits else 'more than'} the budget of {advice.budget:g} ms"
+    yield text
+
+
+def ratio_text(ratio: float | None) -> str:
+    """Return a ratio: `×0.52`."""
+    return UNKNOWN if ratio is None else f"×{ratio:.3g}"
+
+
+def target_text(advice: Advice) -> str:
+    """Return the frame rate, tolerance and budget."""
+    tolerance = format_quantity(advice.tolerance, advice.unit)
+    if advice.tolerance_px is not None:
+        tolerance = f"{pixels_text(advice.tolerance_px)} px ({tolerance} at {advice.zoom:g} px per metre)"
+    else:
+        tolerance = f"{advice.metric} {tolerance}"
+    budget = "" if advice.budget is None else f", budget {advice.budget:g} ms per frame"
+    return f"{advice.engine} at {advice.fps:g} fps, tolerance {tolerance}{budget}"
+
+
+def truth_sentences(advice: Advice) -> Iterator[str]:
+    """Yield the truth that errors are measured against, up to when, and what counts without one."""
+    if advice.truth is None or advice.trusted_until is None:
+        yield f"No truth is known, so position errors are absent: {advice.truth_about}."
+    else:
+        kind = advice.truth.replace("_", " ")
+        until = f"the end, {advice.duration:.4g} s"
+        if not advice.is_predictable:
+            until = f"{advice.trusted_until:.3g} s of {advice.duration:.4g} s only"
+        yield f"Errors are distances from the truth ({kind}: {advice.truth_about}), up to {until}."
+    if advice.metric_reason is not None:
+        yield f"The error is instead {advice.metric} ({advice.metric_about}), because {advice.metric_reason}."
+    elif advice.invariant is not None:
+        yield f"Beyond that time no setting predicts positions; {advice.invariant} is measured to the end."
+
+
+def recording_sentences(advice: Advice) -> Iterator[str]:
+    """Yield that the advice is for a scene without the actions of its recording, and the runs with them."""
+    if not advice.recorded_actions:
+        return
+    yield (
+        f"The recording has {format_plural(advice.recorded_actions, 'action')}. Errors, costs and forecast are those "
+        "of its scene without them, because no truth with actions is available."
+    )
+    for each in advice.replays:
+        outcome = format_plural(each.missed_contacts or 0, "missed contact")
+        if each.status != "ok" or each.missed_contacts is None:
+            outcome = f"{each.status}{'' if each.reason is None else f': {each.reason}'}"
+        yield f"With the actions, the {each.setting} setting has: {outcome}."
+
+
+def risk_label(risk: Risk) -> str:
+    """Return the odds of a risk: `observed`, `68 %`, or `forecast` if a formula gives no odds."""
+    if risk.is_observed:
+        return "observed"
+    return "forecast" if risk.odds is None else format_percent(risk.odds)
+
+
+def risk_text(risk: Risk, fps: float) -> str:
+    """Return the description of a risk with its remedy, also for a loop of frames."""
+    remedy = f"substeps >= {risk.safe_substeps}"
+    if risk.safe_substeps is None or remedy in risk.message:
+        return risk.message
+    return f"{risk.message}; at dt = 1/{fps:g} s, {remedy}"
+
+
+def no_setting_text(advice: Advice) -> str:
+    """Return why there is no recommended setting."""
+    if not advice.tried:
+        return "no setting was tried" + (" within the time limit" if advice.out_of_time else "")
+    return f"none of the settings tried on {advice.engine} is within the tolerance"
+
+
+def fallback_head(advice: Advice) -> str:
+    """Return what the fallback is."""
+    if advice.fallback_kind == "invariant":
+        return f"cheapest setting with {advice.invariant} within {advice.invariant_tolerance:g} to the end"
+    return f"most accurate setting {'within the budget' if advice.fallback_kind == 'budget' else 'tried'}"
+
+
+def knob_head(advice: Advice) -> str:
+    """Return the heading of the knobs, with the setting that they are changed from."""
+    start, which = advice.knob_setting, {"present": "the present setting", "recommended": "the recommended setting"}
+    text = "" if start is None else f": {setting_text(start, advice.fps)}"
+    return f"One change at a time of {which.get(advice.knob_start or '', 'this setting')}{text}"
+
+
+def engine_text(other: OtherEngine) -> str:
+    """Return the remark about another engine: why it cannot run the scene, or that it misses the tolerance."""
+    if other.missing is not None:
+        return f"cannot run the scene: {other.missing}"
+    if other.setting is None:
+        return "no setting reached the end of the scene"
+    return "" if other.is_within_tolerance else "misses the tolerance"
+
+
+def search_sentence(advice: Advice) -> str:
+    """Return how many settings were tried, and what ended the search early."""
+    parts = [f"{advice.tried} settings tried over all engines"]
+    if advice.untried:
+        parts.append(f"{advice.untried} left out as too expensive")
+    if advice.out_of_time:
+        parts.append("the time limit ended the search")
+    repeats = advice.present.repeats or (advice.chosen.repeats if advice.chosen else 0)
+    costs = f"costs are medians of {repeats} timings in turns on this machine" if repeats else "no costs were timed"
+    return "; ".join([*parts, costs])

@@ -1,0 +1,489 @@
+"""Standalone pymunk programs: same states as the engine bit for bit, reasons of refusals, and safe source."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.arrays import FloatArray
+from sandbox.engines.pymunk_adapter.colliders import SHUFFLED_FROM
+from sandbox.engines.pymunk_adapter.program import ProgramError, obstacles, program_text
+from sandbox.engines.registry import start
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import from_document, load, loads
+from sandbox.scene.files.shipped_scenes import shipped
+from tests.strategies import OUTLINES, numbers, pairs
+
+SUBSTEPS = 300
+
+REFUSED = {
+    "artillery/duel": {"world.linear_drag", "wall"},
+    "artillery/four": {"world.quadratic_drag", "wall"},
+    "benchmark/kepler": {"attraction"},
+    "games/curling": {"surface"},
+    "games/landing": {"thrust", "wall"},
+    "games/rube_goldberg": {"joint", "wall"},
+    "joints/atwood": {""},
+    "joints/cloth": {"world.linear_drag"},
+    "joints/flipper": {"drive", "wall", "post", "material"},
+    "joints/hanging_chain": {"world.linear_drag"},
+    "joints/tearing_cloth": {"joint"},
+    "particles/fireworks_100k": {"emitter"},
+    "particles/smoke": {"world.linear_drag", "world.quadratic_drag", "emitter"},
+    "particles/sparks": {"world.linear_drag", "emitter"},
+    "pinball/classic": {"drive", "zone", "wall", "material"},
+    "pinball/full": {"drive", "zone", "wall", "material"},
+    "tutorial/overpass": {"zone"},
+    "tutorial/spaceship": {"thrust"},
+}
+"""Paths of the reasons why a shipped scene is refused; billiards are played on a surface."""
+
+
+def executed(scene: Scene) -> dict[str, Any]:
+    """Return the names that the program of a scene defines."""
+    names: dict[str, Any] = {"__name__": "game"}
+    exec(compile(program_text(scene), "game.py", "exec"), names)
+    return names
+
+
+def state_of(body: Any) -> FloatArray:
+    return np.array([*body.position, *body.velocity, body.angle, body.angular_velocity])
+
+
+def differing(scene: Scene, substeps: int = SUBSTEPS) -> list[str]:
+    """Return the bodies whose final states on the engine and in the program differ in a bit."""
+    program = executed(scene)
+    space, bodies = program["make_space"]()
+    names = scene.bodies.names
+    assert sorted(bodies) == sorted(names)
+    simulation = start(scene, "pymunk")
+    for _ in range(-(-substeps // scene.solver.substeps)):
+        simulation.step()
+        program["step"](space)
+    frame = simulation.frame()
+    states = np.column_stack((frame.position, frame.velocity, frame.angle, frame.angular_velocity))
+    found = []
+    for name, state, is_present in zip(names, states, frame.present.tolist(), strict=True):
+        body = bodies[name]
+        same = state_of(body).tobytes() == state.tobytes() if is_present else body.space is None
+        found += [] if same else [name]
+    simulation.close()
+    return found
+
+
+@pytest.mark.parametrize("name", [each.name for each in shipped()])
+def test_shipped_scene_has_the_states_of_the_engine_or_is_refused(name: str) -> None:
+    (path,) = (each.path for each in shipped() if each.name == name)
+    scene = load(path)
+    refused = {"surface"} if name.startswith("billiards/") else REFUSED.get(name, set())
+    assert {each.path for each in obstacles(scene)} == refused
+    if not refused:
+        assert differing(scene) == []
+        return
+    with pytest.raises(ProgramError) as error:
+        program_text(scene)
+    assert {each.path for each in error.value.obstacles} == refused
+
+
+BASE = """
+[world]
+gravity = [0.0, -9.81]
+[solver]
+dt = 0.01
+substeps = 2
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.1, 1.0]
+restitution = 0.5
+friction = 0.6
+"""
+
+CONTENTS = {
+    "constant thrusts": """
+[[box]]
+name = "ship"
+position = [0.0, 3.0]
+size = [1.0, 0.5]
+angle = 0.3
+[[thrust]]
+body = "ship"
+force = [1.0, 12.0]
+point = [0.2, -0.25]
+[[thrust]]
+body = "ship"
+force = [0.0, 3.0]
+""",
+    "thrust on a body without contacts": """
+[[ball]]
+name = "ghost"
+position = [0.0, 3.0]
+radius = 0.5
+collides = "none"
+[[thrust]]
+body = "ghost"
+force = [2.0, 9.0]
+""",
+    "bounds": """
+[[grid]]
+origin = [0.0, 2.0]
+columns = 5
+rows = 2
+spacing = [1.0, 1.0]
+radius = 0.3
+velocity_jitter = 5.0
+""",
+    "pairs without factors": """
+[[material]]
+name = "a"
+restitution = 0.3
+[[material]]
+name = "b"
+restitution = 0.4
+[[pair]]
+between = ["a", "b"]
+restitution = 0.9
+friction = 0.2
+[[pair]]
+between = ["a", "a"]
+restitution = 0.1
+[[pair]]
+between = ["b", "b"]
+restitution = 0.2
+[[grid]]
+origin = [0.0, 1.0]
+columns = 4
+rows = 2
+spacing = [0.61, 0.7]
+radius = 0.3
+material = "a"
+jitter = 0.1
+[[grid]]
+origin = [0.1, 4.0]
+columns = 4
+rows = 2
+spacing = [0.61, 0.7]
+radius = 0.3
+material = "b"
+jitter = 0.1
+""",
+    "moving surface": """
+[[wall]]
+points = [[-5.0, 2.0], [5.0, 2.0]]
+thickness = 0.2
+friction = 0.7
+surface_speed = 2.0
+[[box]]
+position = [0.0, 2.5]
+size = [0.5, 0.5]
+friction = 0.8
+[[ball]]
+position = [2.0, 2.6]
+radius = 0.5
+friction = 0.9
+""",
+    "layers": """
+[[wall]]
+points = [[-5.0, 2.0], [5.0, 1.0]]
+layers = ["ramp"]
+[[post]]
+position = [1.0, 1.0]
+radius = 0.3
+layers = ["ground", "ramp"]
+restitution = 0.8
+[[ball]]
+position = [-2.0, 3.0]
+radius = 0.5
+layer = "ramp"
+[[ball]]
+position = [0.9, 3.0]
+radius = 0.5
+friction = 1.0
+[[ball]]
+position = [0.5, 3.0]
+radius = 0.5
+layer = "ramp"
+""",
+    "polylines and an opening": """
+[[wall]]
+name = "fence"
+points = [[-3.0, 4.0], [-1.0, 1.0], [1.0, 1.0], [3.0, 4.0]]
+thickness = 0.1
+restitution = 0.7
+[[wall]]
+points = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.5]]
+closed = true
+[[post]]
+position = [0.0, 3.0]
+radius = 1.0
+solid = false
+[[grid]]
+origin = [-1.5, 5.0]
+columns = 6
+rows = 3
+spacing = [0.5, 0.5]
+radius = 0.2
+jitter = 0.5
+""",
+    "fixed bodies that nothing can touch": """
+[[ball]]
+position = [0.0, 5.0]
+radius = 0.5
+collides = "none"
+velocity = [1.0, 0.0]
+angular_velocity = 3.0
+[[box]]
+position = [4.0, 4.0]
+size = [1.0, 1.0]
+fixed = true
+angle = 0.5
+""",
+}
+
+
+@pytest.mark.parametrize("name", CONTENTS)
+def test_program_has_the_states_of_the_engine(name: str) -> None:
+    base = BASE.replace("[solver]", "bounds = [[-3.0, -9.0], [4.0, 9.0]]\n[solver]") if name == "bounds" else BASE
+    scene = loads(base + CONTENTS[name])
+    assert differing(scene, 600) == []
+    if name == "bounds":  # some bodies must have left, or nothing was tested
+        simulation = start(scene, "pymunk")
+        for _ in range(300):
+            simulation.step()
+        assert not simulation.frame().present.all()
+
+
+def test_many_shapes_are_added_in_the_order_of_the_engine() -> None:
+    count = SHUFFLED_FROM + 10
+    posts = [{"position": [0.5 * k, 0.0], "radius": 0.1} for k in range(count)]
+    grid = {"origin": [0.0, 1.0], "columns": count, "rows": 1, "spacing": [0.3, 0.3], "radius": 0.14, "jitter": 0.3}
+    ghost = {"position": [0.0, 9.0], "radius": 0.1, "collides": "none"}
+    scene = from_document({"world": {"gravity": [0.0, -9.81]}, "post": posts, "grid": [grid], "ball": [ghost]})
+    assert differing(scene, 40) == []
+
+
+@st.composite
+def _documents(draw: st.DrawFn) -> dict[str, Any]:
+    """Small scenes of all shapes, joints, materials and pairs, close enough to collide."""
+    position, size, coefficient = pairs(-2, 2), numbers(0.1, 1), numbers(0, 1)
+    materials = draw(st.lists(st.sampled_from(["a", "b", 'c"']), unique=True, max_size=3))
+    surface: dict[str, Any] = {"restitution": coefficient, "friction": coefficient}
+    if materials:
+        surface["material"] = st.sampled_from(materials)
+    moving = {"velocity": pairs(-3, 3), "angular_velocity": numbers(-3, 3), "mass": numbers(0.1, 10)}
+    state = {"angle": numbers(-4, 4), "collides": st.sampled_from(["all", "fixed", "none"]), **surface}
+    state["layer"] = st.sampled_from(["ground", "upper"])
+    shapes: dict[str, dict[str, Any]] = {
+        "ball": {"radius": size},
+        "box": {"size": st.lists(size, min_size=2, max_size=2)},
+        "capsule": {"length": size, "radius": size},
+        "polygon": {"points": st.sampled_from(OUTLINES)},
+    }
+    document: dict[str, Any] = {"material": [{"name": name, "restitution": draw(coefficient)} for name in materials]}
+    if materials:
+        sides = st.lists(st.sampled_from(materials), min_size=2, max_size=2)
+        document["pair"] = [
+            {"between": two, "restitution": draw(coefficient), "friction": draw(coefficient)}
+            for two in draw(st.lists(sides, max_size=2, unique_by=frozenset))
+        ]
+    for kind, keys in shapes.items():
+        either = st.fixed_dictionaries({"position": position, **keys}, optional={**state, **moving})
+        fixed = st.fixed_dictionaries({"position": position, **keys, "fixed": st.just(True)}, optional=state)
+        document[kind] = draw(st.lists(either | fixed, max_size=2))
+    parts = {
+        kind: st.lists(st.fixed_dictionaries(keys, optional={"position": pairs(-1, 1)}), min_size=1, max_size=2)
+        for kind, keys in shapes.items()
+    }
+    others = {kind: those for kind, those in parts.items() if kind != "box"}
+    compound = st.fixed_dictionaries(
+        {"position": position, "box": parts["box"]}, optional={**others, **state, **moving}
+    )
+    document["body"] = draw(st.lists(compound, max_size=1))
+    names = []
+    for kind in (*shapes, "body"):
+        for k, each in enumerate(document[kind]):
+            each["name"] = f"{kind} '{k}"
+            names += [] if each.get("fixed") else [each["name"]]
+    if names:
+        document["joint"] = draw(st.lists(_joints(names), max_size=3))
+    plane = {"point": [0.0, -2.5], "normal": draw(pairs(-1, 1).filter(lambda n: abs(n[0]) + abs(n[1]) > 0.1))}
+    walls = st.fixed_dictionaries({"points": st.just([[-3.0, -2.0], [3.0, -2.2]])}, optional=surface)
+    document |= {
+        "plane": [plane | draw(st.fixed_dictionaries({}, optional=surface))],
+        "wall": draw(st.lists(walls, max_size=1)),
+    }
+    document["world"] = {"gravity": draw(pairs(-10, 10))}
+    document["solver"] = {"dt": 0.02, "substeps": draw(st.integers(1, 3)), "iterations": draw(st.integers(1, 20))}
+    return {kind: value for kind, value in document.items() if value}
+
+
+@st.composite
+def _joints(draw: st.DrawFn, names: list[str]) -> dict[str, Any]:
+    point, figure = pairs(-1, 1), numbers(0.1, 10)
+    kinds: dict[str, dict[str, Any]] = {
+        "rod": {"length": figure, "anchors": st.just([[5.0, 5.0], [0.1, -0.1]])},
+        "pivot": {"at": point},
+        "slide": {"most": figure},
+        "groove": {"groove": st.just([[0, 0], [1, 2]]), "anchor": point},
+        "rotary_limit": {"least": numbers(-3, 0), "most": numbers(0, 3)},
+        "motor": {"rate": numbers(-10, 10), "max_torque": figure},
+        "gear": {"ratio": figure},
+        "spring": {"stiffness": figure, "damping": figure, "rest_length": figure},
+        "rotary_spring": {"stiffness": figure, "rest_angle": numbers(-3, 3)},
+    }
+    kind = draw(st.sampled_from(list(kinds)))
+    between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
+    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional={"collide": st.booleans()})
+    return {"kind": kind, **draw(joint)}
+
+
+@settings(max_examples=60, deadline=None)
+@given(_documents())
+def test_random_scenes_have_the_states_of_the_engine(document: dict[str, Any]) -> None:
+    scene = from_document(document)
+    assert obstacles(scene) == []
+    assert differing(scene, 60) == []
+
+
+HOSTILE = (
+    '"""',
+    "'''",
+    "a\"b'c\\",
+    "{name}",
+    "{0} {} {{",
+    "%s %(x)s",
+    "naïve ünïcödé 球",
+    "\u202eevil\u2066",
+    "#",
+    "']; import os; os.abort() #",
+    '"]; import os; os.abort() #',
+    "-*- coding: utf-7 -*-",
+    "\\N{DIGIT ONE}",
+    "\\",
+    "INFINITY",
+    "MATERIAL_1",
+    " ",
+)
+
+
+def test_hostile_names_are_only_data() -> None:
+    line = '\n"""\r\x0cimport os\n\u2028import os\n' + "\\".join(HOSTILE)[:150]
+    balls = [
+        {"name": name, "position": [2.0 * k, 1.0], "radius": 0.5 + 0.01 * (k % 3), "collides": ("all", "none")[k % 2]}
+        for k, name in enumerate(HOSTILE)
+    ]
+    walls = [{"name": f"wall {name}", "points": [[0.0, 0.0], [1.0, -1.0 - k]]} for k, name in enumerate(HOSTILE)]
+    joints = [
+        {"kind": "pivot", "name": f"joint {name}", "between": [name], "at": [0.0, 0.1 * k]}
+        for k, name in enumerate(HOSTILE)
+    ]
+    scene = from_document(
+        {"title": line, "about": line, "ball": balls, "wall": walls, "joint": joints, "world": {"gravity": [0.0, -1.0]}}
+    )
+    text = program_text(scene, step_reason=line, warnings=[line])
+    assert text.isprintable() or set(filter(lambda letter: not letter.isprintable(), text)) == {"\n"}
+    assert imports_of(text) == {"pymunk", "pygame", "pymunk.pygame_util"}
+    assert "abort" not in {node.attr for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Attribute)}
+    assert differing(scene, 50) == []
+
+
+def imports_of(text: str) -> set[str]:
+    """Return the modules that a program imports."""
+    found = set()
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Import):
+            found |= {each.name for each in node.names}
+        assert not isinstance(node, ast.ImportFrom)
+    return found
+
+
+def test_pygame_is_imported_by_main_only() -> None:
+    text = program_text(loads(BASE + CONTENTS["layers"]))
+    top = {each.name for node in ast.parse(text).body if isinstance(node, ast.Import) for each in node.names}
+    assert top == {"pymunk"}
+    assert imports_of(text) == {"pymunk", "pygame", "pymunk.pygame_util"}
+
+
+def test_generator_becomes_data_and_a_loop() -> None:
+    grid = {"origin": [0.0, 1.0], "columns": 40, "rows": 25, "spacing": [1.0, 1.0], "radius": 0.3}
+    text = program_text(from_document({"world": {"gravity": [0.0, -9.81]}, "grid": [grid]}))
+    statements = sum(isinstance(node, ast.stmt) for node in ast.walk(ast.parse(text)))
+    assert statements < 150
+
+
+@pytest.mark.parametrize("name", [*CONTENTS, "ragdoll_stairs", "chain_of_20"])
+def test_programs_are_clean(name: str, tmp_path: Path) -> None:
+    scene = loads(BASE + CONTENTS[name]) if name in CONTENTS else load(_path_of(name))
+    path = tmp_path / "game.py"
+    path.write_text(program_text(scene), encoding="utf-8")
+    checked = subprocess.run(
+        [sys.executable, "-m", "ruff", "check", "--isolated", str(path)], capture_output=True, text=True, check=False
+    )
+    if "No module named ruff" in checked.stderr:
+        pytest.skip("ruff is not installed")
+    assert checked.returncode == 0, checked.stdout
+
+
+def _path_of(stem: str) -> Path:
+    return next(each.path for each in shipped() if each.path.stem == stem)
+
+
+@pytest.mark.parametrize("name", ["fixed bodies that nothing can touch", "layers"])
+def test_window_draws_three_frames(name: str, tmp_path: Path) -> None:
+    hidden_shapes = """
+[[capsule]]
+position = [0.0, 2.0]
+length = 1.0
+radius = 0.1
+collides = "none"
+"""
+    path = tmp_path / "game.py"
+    path.write_text(program_text(loads(BASE + CONTENTS[name] + hidden_shapes)), encoding="utf-8")
+    environment = {**os.environ, "SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
+    command = [sys.executable, "-c", "import game; game.main(frames=3); print('done')"]
+    child = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert child.returncode == 0, child.stderr
+    assert child.stdout.splitlines()[-1] == "done"
+
+
+def test_all_reasons_are_given_at_once() -> None:
+    text = BASE.replace("[solver]", "linear_drag = 0.1\n[solver]\nhalf_kick = true")
+    more = """
+[[wall]]
+name = "corner"
+points = [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]
+[[wall]]
+name = "gate"
+points = [[5.0, 0.0], [5.0, 1.0]]
+one_way = true
+[[box]]
+name = "crate"
+position = [0.0, 3.0]
+size = [1.0, 1.0]
+[[attraction]]
+toward = [0.0, 0.0]
+strength = 1.0
+[[thrust]]
+name = "late"
+body = "crate"
+force = [1.0, 0.0]
+begin = 1.0
+[[zone]]
+position = [0.0, 0.0]
+radius = 1.0
+holds = true
+"""
+    found = obstacles(loads(text + more))
+    paths = {"", "world.linear_drag", "solver.half_kick", "attraction", "thrust", "zone", "wall"}
+    assert {each.path for each in found} == paths
+    messages = " ".join(each.message for each in found)
+    assert all(name in messages for name in ("'corner'", "'gate'", "'late'"))

@@ -1,0 +1,280 @@
+"""Advice for a game: errors against closed forms, remedies, the recommended setting run again, code, recordings."""
+
+import math
+from typing import Any
+
+import pymunk
+import pytest
+
+import sandbox
+from sandbox.action import Impulse
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.advice import Advice, advise, study
+from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, game_code
+from sandbox.measure.compare.ground_truth import truth_of
+from sandbox.measure.metrics.trajectory_error import errors
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from tests.cli.test_json_schemas import assert_valid_document
+
+QUICK = {"effort": 0.2, "repeats": 1}
+FPS = 60.0
+
+FLIGHT = """
+title = "Flight"
+world = { gravity = [0.0, -10.0], duration = 2.0 }
+solver = { dt = 0.016666666666666666 }
+ball = [{ name = "shell", position = [0.0, 0.0], velocity = [3.0, 10.0], radius = 0.1 }]
+"""
+BULLET = """
+title = "Bullet"
+world = { duration = 0.2 }
+solver = { dt = 0.016666666666666666 }
+wall = [{ name = "pane", points = [[1.0, -1.0], [1.0, 1.0]], thickness = 0.01 }]
+ball = [{ name = "bullet", position = [0.0, 0.0], velocity = [20.0, 0.0], radius = 0.05, restitution = 1.0 }]
+"""
+PENDULUM = """
+title = "Pendulum"
+world = { gravity = [0.0, -9.81], duration = 3.0 }
+solver = { dt = 0.016666666666666666 }
+ball = [
+  { name = "bob", position = [1.0, 0.0], radius = 0.05, mass = 1.0, collides = "none" },
+]
+joint = [{ name = "rod", kind = "rod", between = ["bob"], anchors = [[0.0, 0.0], [0.0, 0.0]], length = 1.0 }]
+"""
+
+
+def scene_of(text: str, *changes: str) -> Scene:
+    """Return a scene with texts replaced, each as `old -> new`."""
+    for change in changes:
+        old, new = change.split(" -> ")
+        assert old in text
+        text = text.replace(old, new)
+    return sandbox.loads(text, "scene.toml")
+
+
+def advice_of(text: str, *changes: str, **options: Any) -> Advice:
+    return advise(scene_of(text, *changes), **{**QUICK, **options})
+
+
+@pytest.mark.parametrize("substeps", [1, 4])
+def test_error_of_the_present_setting_is_that_of_euler_in_flight(substeps: int) -> None:
+    advice = advice_of(
+        FLIGHT, f"dt = 0.016666666666666666 -> dt = 0.016666666666666666, substeps = {substeps}", zoom=40.0
+    )
+    assert advice.present.error_px == pytest.approx(40.0 * 10.0 / FPS / substeps * 2.0 / 2.0, rel=1e-9)  # g·h·T/2
+    assert (advice.truth, advice.is_predictable, advice.is_in_loop) == ("closed_form", True, True)
+
+
+@pytest.mark.parametrize("dt", ["0.01", "0.0041", "0.05"])
+def test_present_setting_with_another_dt_is_measured_as_it_is(dt: str) -> None:
+    advice = advice_of(FLIGHT, f"0.016666666666666666 -> {dt}", "duration = 2.0 -> duration = 2.05")
+    frames = math.floor(2.05 / float(dt) + 1e-9)
+    bound = 10.0 * float(dt) * 2.05 / 2.0  # g·h·T/2; the last, incomplete step is shorter
+    assert advice.present.settings.dt == float(dt)
+    assert not advice.is_in_loop
+    assert advice.present.error == pytest.approx(bound, rel=2.0 / frames)
+    assert advice.recommended is not None
+    assert advice.recommended.settings.dt == pytest.approx(1.0 / FPS, rel=1e-12)
+
+
+def test_every_setting_considered_has_the_dt_of_a_frame() -> None:
+    advice = advice_of(FLIGHT, fps=50.0)
+    settings = [advice.recommended, *(k.setting for k in advice.knobs), *(o.setting for o in advice.others)]
+    assert {each.settings.dt for each in settings if each is not None} == {1.0 / 50.0}
+
+
+def test_remedy_of_a_ball_that_tunnels_removes_it() -> None:
+    advice = advice_of(BULLET)
+    assert advice.present.missed_contacts == 1
+    assert not advice.is_within_tolerance(advice.present)
+    first = advice.risks[0]
+    assert (first.kind, first.element, first.is_observed, first.odds) == ("tunnelling", "bullet", True, 1.0)
+    assert first.safe_substeps == math.ceil(20.0 / FPS / (0.05 + 0.005))  # v·h ≤ r + half the thickness
+    chosen = advice.recommended
+    assert chosen is not None
+    again = sandbox.run(scene_of(BULLET), "pymunk", **chosen.asked.model_dump())
+    assert again.missed_contacts == 0
+    assert again.velocity[-1, 0, 0] < 0.0
+    safe = chosen.asked.replace(substeps=first.safe_substeps)
+    assert sandbox.run(scene_of(BULLET), "pymunk", **safe.model_dump()).missed_contacts == 0
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("text", [FLIGHT, BULLET, PENDULUM])
+def test_recommended_setting_meets_the_tolerance_when_run_again(text: str) -> None:
+    advice, scene = advice_of(text, effort=1.0), scene_of(text)
+    assert advice.recommended is not None
+    own = advice.recommended.asked
+    truth = truth_of(scene, own, 1e-4)
+    assert truth is not None
+    run = sandbox.run(scene, "pymunk", **own.model_dump())
+    found = errors(run, truth.trajectory, ~scene.bodies.fixed).until(truth.trusted_until).max_position
+    assert found == pytest.approx(advice.recommended.error, abs=1e-4)
+    assert found is not None and found <= advice.tolerance
+
+
+def test_knobs_of_a_flight_have_the_errors_of_euler() -> None:
+    knobs = {knob.change: knob for knob in advice_of(FLIGHT).knobs}
+    assert knobs["substeps 1 → 2"].error_ratio == pytest.approx(0.5, rel=1e-9)
+    kick = knobs["half_kick false → true"].setting
+    assert kick.error is not None and kick.error < 1e-9
+    assert all(knob.setting.frame_ms is not None and knob.cost_ratio is not None for knob in knobs.values())
+
+
+@pytest.mark.full
+def test_other_engines_have_a_setting_or_a_reason() -> None:
+    others = {other.engine: other for other in advice_of(PENDULUM, effort=1.0).others}
+    assert set(others) == set(ENGINES) - {"pymunk"}
+    exact = others["exact"]
+    assert exact.setting is None and exact.missing is not None and "rods" in exact.missing
+    for name in set(others) - {"exact"}:
+        assert others[name].missing is None
+        assert others[name].setting is not None
+
+
+def test_engine_that_cannot_run_the_scene_is_refused_and_the_others_are_measured() -> None:
+    advice = advice_of(PENDULUM, engine="exact")
+    assert (advice.present.status, advice.recommended, advice.code, advice.risks) == ("refused", None, None, ())
+    assert any(other.setting is not None for other in advice.others)
+    assert not advice.is_met
+
+
+def test_budget_that_no_setting_fits_leaves_the_cheapest_with_its_error() -> None:
+    advice = advice_of(FLIGHT, budget=1e-9)
+    assert advice.recommended is not None
+    assert advice.fits_budget(advice.recommended) is False
+    assert not advice.is_met
+    assert advice_of(FLIGHT, budget=1e6).is_met
+
+
+def test_tolerance_that_no_setting_meets_leaves_the_most_accurate_one() -> None:
+    advice = advice_of(PENDULUM, tolerance=1e-12)
+    assert advice.recommended is None
+    assert advice.fallback is not None and advice.fallback_kind == "accuracy"
+    assert advice.chosen is advice.fallback
+    assert advice.code is not None
+
+
+@pytest.mark.slow
+def test_errors_of_a_chaotic_scene_count_until_the_horizon() -> None:
+    advice = advise(sandbox.load("gas", ["world.duration=9.0"]), **QUICK)
+    assert advice.trusted_until is not None and advice.trusted_until < 9.0
+    assert advice.invariant == "energy"
+    assert advice.present.invariant is not None
+    assert advice.present.within_until is not None and advice.present.within_until <= advice.trusted_until
+
+
+def test_without_a_truth_position_errors_are_absent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "find_truth", lambda *_: "the test has none")
+    advice = advice_of(PENDULUM)
+    assert (advice.truth, advice.truth_about, advice.trusted_until) == (None, "the test has none", None)
+    assert advice.metric == "joint_error"
+    assert advice.metric_reason is not None
+    assert advice.present.error_px is None
+
+
+@pytest.mark.parametrize("half_kick", [False, True])
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_code_gives_a_space_the_recommended_values(substeps: int, half_kick: bool) -> None:
+    scene = scene_of(BULLET)
+    asked = Settings(dt=1.0 / FPS, substeps=substeps, iterations=17, persistence=5, bias=0.01, half_kick=half_kick)
+    resolved = ENGINES["pymunk"].resolve(scene, asked)
+    code = game_code("pymunk", resolved, FPS, 50.0, is_slop_stated=False)
+    space = pymunk.Space()
+    space.gravity = 0.0, -10.0
+    body = pymunk.Body(1.0, 1.0)
+    space.add(body)
+    steps: list[float] = []
+    step = space.step
+    namespace = {"space": space, "pymunk": pymunk}
+    space.step = lambda dt: (steps.append(dt), step(dt))  # type: ignore[method-assign,func-returns-value]
+    exec("\n".join(code.lines), namespace)
+    assert space.iterations == 17
+    assert space.collision_slop == resolved.slop == 0.0005
+    assert space.collision_bias == 0.01
+    assert space.collision_persistence == 5
+    assert steps == pytest.approx([1.0 / FPS / substeps] * substeps, rel=1e-12)
+    h = 1.0 / FPS / substeps
+    assert body.velocity.y == pytest.approx(-10.0 * (1.0 / FPS + (0.5 * h if half_kick else 0.0)), rel=1e-12)
+
+
+def test_defaults_of_pymunk_are_those_of_a_new_space() -> None:
+    space = pymunk.Space()
+    for name, value in PYMUNK_DEFAULTS.items():
+        assert getattr(space, name) == pytest.approx(value, rel=1e-5), name  # pymunk rounds them to 32 bits
+
+
+def test_code_leaves_out_values_that_are_the_defaults() -> None:
+    scene = scene_of(BULLET)
+    resolved = ENGINES["pymunk"].resolve(scene, Settings(dt=1.0 / FPS, slop=0.1))
+    assert game_code("pymunk", resolved, FPS, 50.0, is_slop_stated=True).lines == (
+        "dt = 1 / 60",
+        "space.step(dt)  # every frame",
+    )
+
+
+def test_remark_states_that_the_slop_differs_from_the_default_of_pymunk() -> None:
+    code = advice_of(BULLET).code
+    assert code is not None and code.language == "python"
+    assert any("collision_slop" in remark and "0.1" in remark for remark in code.remarks)
+
+
+def test_code_of_box2d_steps_with_the_recommended_substeps() -> None:
+    pytest.importorskip("pyb2d3")
+    advice = advice_of(FLIGHT, engine="box2d")
+    assert advice.chosen is not None and advice.code is not None
+    assert advice.code.language == "c"
+    assert f"b2World_Step(world, 1.0f / 60f, {advice.chosen.settings.substeps});" in advice.code.lines[-1]
+
+
+def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() -> None:
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.1, 0.0]")
+    push = Impulse(time=0.05, body="bullet", impulse=(19.9, 0.0))  # of 1 kg
+    recording = Recording(scene, "pymunk", scene.solver, (push,), duration=0.2)
+    advice = advise(recording, **QUICK)
+    assert (advice.engine, advice.recorded_actions, advice.duration) == ("pymunk", 1, 0.2)
+    assert advice.present.missed_contacts == 0
+    replays = {each.setting: each for each in advice.replays}
+    assert (replays["present"].status, replays["present"].missed_contacts) == ("ok", 1)
+
+
+def test_interrupted_advice_keeps_the_present_setting(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "tradeoff", interrupt)
+    advice = advice_of(FLIGHT)
+    assert advice.interrupted
+    assert advice.present.error is not None
+    assert (advice.present.frame_ms, advice.recommended, advice.knobs) == (None, None, ())
+
+
+def test_advice_interrupted_while_timing_has_no_costs(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "time_in_turns", interrupt)
+    advice = advice_of(FLIGHT)
+    assert advice.interrupted
+    assert advice.recommended is not None and advice.recommended.frame_ms is None
+    assert advice.knobs[0].cost_ratio is None
+
+
+@pytest.mark.parametrize("name", ["fps", "zoom", "tolerance", "budget", "effort", "time_limit"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
+def test_number_out_of_range_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name.split("_")[0]):
+        advice_of(FLIGHT, **{name: value})
+
+
+def test_scene_shorter_than_four_frames_is_refused() -> None:
+    with pytest.raises(ValueError, match="fewer than 4 frames"):
+        advice_of(FLIGHT, fps=1.0)
+
+
+@pytest.mark.full
+def test_document_satisfies_its_schema() -> None:
+    for advice in (advice_of(BULLET, budget=4.0), advice_of(PENDULUM, engine="exact")):
+        assert_valid_document("advise", advice.document("scene.toml"))
