@@ -241,7 +241,8 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
         (lambda s, b, c: b.apply_force_at_local_point((1, 0)), "force on body-1"),
         (lambda s, b, c: setattr(c, "elasticity", 1.5), "elasticity of 1.5"),
         (lambda s, b, c: setattr(c, "surface_velocity", (1, 0)), "surface velocities"),
-        (lambda s, b, c: setattr(c, "filter", pymunk.ShapeFilter(mask=0b1)), "categories and masks"),
+        (lambda s, b, c: setattr(next(iter(s.shapes)), "filter", pymunk.ShapeFilter(mask=0)), "categories and masks"),
+        (lambda s, b, c: setattr(next(iter(s.shapes)), "filter", pymunk.ShapeFilter(group=3)), "groups of static"),
         (lambda s, b, c: setattr(c, "sensor", True), "sensor shapes"),
         (lambda s, b, c: s.add(pymunk.RatchetJoint(s.static_body, b, 0, 1)), "a RatchetJoint"),
         (lambda s, b, c: s.add(pymunk.GearJoint(b, s.static_body, 0, 1)), "whose second body is the world"),
@@ -251,6 +252,42 @@ def test_what_a_scene_cannot_have_is_named(
     change: Callable[[pymunk.Space, pymunk.Body, pymunk.Shape], object], message: str
 ) -> None:
     assert message in omitted_of(change)
+
+
+@pytest.mark.parametrize("names", [("all", "fixed"), ("all", "fixed", "none")])
+def test_filters_that_a_scene_can_state_are_kept(names: tuple[str, ...]) -> None:
+    """Ghosts collide with the walls only, decoration with nothing, and others with everything but ghosts."""
+    space, made = space_with_walls(), []
+    filters = {
+        "all": pymunk.ShapeFilter(categories=0b01, mask=0xFFFFFFFF ^ 0b10),
+        "fixed": pymunk.ShapeFilter(categories=0b10, mask=0xFFFFFFFF ^ 0b11),
+        "none": pymunk.ShapeFilter(mask=0),
+    }
+    for wall in space.shapes:
+        wall.filter, wall.friction = pymunk.ShapeFilter(categories=0b100), 0.5
+    for k in range(12):
+        body = pymunk.Body(1, 100)
+        body.position = 9 * k - 50, 30 + 5 * k
+        circle = pymunk.Circle(body, 8)
+        circle.filter, circle.friction = filters[names[k % len(names)]], 0.5
+        space.add(body, circle)
+        made.append(names[k % len(names)])
+    captured, differences = compare(space, 150)
+    assert not captured.omitted
+    assert [ball.collides for ball in captured.scene.balls] == made
+    if "none" in names:
+        assert any("outside of its space" in each for each in captured.inexact)
+    else:
+        assert max(differences) == 0.0 and not captured.inexact
+
+
+def test_bodies_without_friction_are_kept_up_to_rounding() -> None:
+    space = balls()
+    for shape in space.shapes:
+        shape.friction = 0.0
+    captured, differences = compare(space, 20)
+    assert any("nothing can turn" in each for each in captured.inexact)
+    assert max(differences) < 1e-9  # rounding of the spin, in a few contacts
 
 
 def test_omissions_are_warnings_or_errors() -> None:

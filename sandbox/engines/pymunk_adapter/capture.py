@@ -11,22 +11,24 @@ rounding.
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import pymunk
 
 from sandbox.engines.common.base import BIAS
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
+from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import MAX_SPEED
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import MAX_SPEED, Collides
 from sandbox.scene.editing.elements import unique_name
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
+from sandbox.scene.geometry.shapes import UNTURNABLE
 
 KeyValues: TypeAlias = dict[str, Any]
-ALL_CATEGORIES = 0xFFFFFFFF
 MIN_RADIUS = 1e-9
 """m, smallest radius of a capsule, and length of a rod"""
 
@@ -96,6 +98,10 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
         scene = from_document(document, "<pymunk space>")
     except SceneError as error:
         raise CaptureError(str(error)) from error
+    setup = Setup.of(scene)
+    moves = ~setup.bodies.fixed & (setup.bodies.moment < UNTURNABLE)
+    if (moves & ~contact_matrix(setup).turnable & ~contact_matrix(setup).free).any():
+        capture.inexact.append("bodies that nothing can turn: the engine keeps their rotation free of rounding")
     return CapturedSpace(scene, tuple(dict.fromkeys(capture.omitted)), tuple(dict.fromkeys(capture.inexact)))
 
 
@@ -153,6 +159,7 @@ class SpaceElements:
                 if body is not None and (body.body_type == pymunk.Body.DYNAMIC or body in used)
             )
         )
+        self._collides = collides_by_filter({_filter_kind(shape) for shape in self._shapes})
         self.names = self._unique_names(names)
         """name of each body"""
 
@@ -166,9 +173,13 @@ class SpaceElements:
     def _unique_names(self, given: Mapping[pymunk.Body, str]) -> dict[pymunk.Body, str]:
         found: dict[pymunk.Body, str] = {}
         taken: set[str] = set()
-        for k, body in enumerate(self._bodies, 1):
-            found[body] = unique_name(given.get(body, f"body-{k}"), taken)
+        for body in (body for body in self._bodies if body in given):
+            found[body] = unique_name(given[body], taken)
             taken.add(found[body])
+        for k, body in enumerate(self._bodies, 1):
+            if body not in given:
+                found[body] = unique_name(f"body-{k}", taken)
+                taken.add(found[body])
         return found
 
     def note_space(self) -> None:
@@ -350,24 +361,27 @@ class SpaceElements:
 
     def _filter(self, name: str, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return what a body collides with."""
-        filters = {shape.filter for shape in shapes}
-        if not filters:
+        kinds = {self._collides[_filter_kind(shape)] for shape in shapes}
+        groups = {shape.filter.group for shape in shapes}
+        if not shapes:
             return {}
-        if all(not each.categories or not each.mask for each in filters):
-            return {"collides": "none"}
-        groups = {each.group for each in filters}
-        if len(groups) > 1:
-            self.omitted.append(f"the different filter groups of the shapes of {name}")
-        for shape in shapes:
-            self._note_filter(shape, is_group_known=True)
-        group = min(groups)
-        return {"group": f"group {group}"} if group else {}
+        if len(groups) > 1 or len(kinds) > 1:
+            self.omitted.append(f"the different filters of the shapes of {name}")
+        if None in kinds:
+            self._note_filters()
+        values: KeyValues = {"group": f"group {min(groups)}"} if min(groups) else {}
+        collides = next((each for each in kinds if each is not None), "all")
+        if collides == "none":
+            self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
+        return values | ({"collides": collides} if collides != "all" else {})
 
-    def _note_filter(self, shape: pymunk.Shape, *, is_group_known: bool = False) -> None:
-        found = shape.filter
-        is_everything = found.categories == found.mask == ALL_CATEGORIES
-        if not is_everything or (found.group and not is_group_known):
-            self.omitted.append("categories and masks of shape filters, and groups of static shapes")
+    def _note_filter(self, shape: pymunk.Shape) -> None:
+        """Note the filter of a wall or post that a scene cannot state."""
+        if self._collides[_filter_kind(shape)] is None or shape.filter.group:
+            self._note_filters()
+
+    def _note_filters(self) -> None:
+        self.omitted.append("categories and masks of shape filters, and groups of static shapes")
 
     # Joints
 
@@ -436,6 +450,47 @@ class SpaceElements:
                 torque = {"max_torque": float(constraint.max_force)} if math.isfinite(constraint.max_force) else {}
                 return {"kind": "motor", "rate": -float(constraint.rate) + 0.0} | torque
         return None
+
+
+class FilterKind(NamedTuple):
+    """Which shapes a shape can collide with, apart from its group."""
+
+    is_static: bool
+    categories: int
+    mask: int
+
+    def meets(self, other: "FilterKind") -> bool:
+        """Return whether shapes of two kinds can collide."""
+        can_move = not (self.is_static and other.is_static)
+        return can_move and bool(self.categories & other.mask and other.categories & self.mask)
+
+
+def _filter_kind(shape: pymunk.Shape) -> FilterKind:
+    is_static = _body_of(shape).body_type != pymunk.Body.DYNAMIC
+    return FilterKind(is_static, shape.filter.categories, shape.filter.mask)
+
+
+def collides_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, Collides | None]:
+    """Return what each kind of shapes of a space collides with, as a scene states it; None if it cannot.
+
+    Two bodies of a scene collide if both collide with all, or if one is static and the other collides with something.
+    """
+    static, moving = {kind for kind in kinds if kind.is_static}, {kind for kind in kinds if not kind.is_static}
+    found: dict[FilterKind, Collides | None] = {}
+    for kind in moving:
+        meets = {other for other in kinds if kind.meets(other)}
+        if not meets:
+            found[kind] = "none"
+        elif meets == static:
+            found[kind] = "fixed"
+        else:
+            found[kind] = "all"
+    free = {kind for kind in moving if found[kind] == "all"}
+    for kind in free:
+        if {other for other in kinds if kind.meets(other)} != static | free:
+            found[kind] = None
+    wanted = {kind for kind in moving if found[kind] != "none"}
+    return found | {kind: "all" if all(kind.meets(other) for other in wanted) else None for kind in static}
 
 
 _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}

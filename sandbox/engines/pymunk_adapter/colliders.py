@@ -99,8 +99,7 @@ def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0
         yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
         return
     shapes, element = bodies.shapes, bodies.elements[bodies.element[index]]
-    # It may be captured from a space, whose polygons need not start at the corner at which pymunk starts a hull.
-    keeps_first_corner = isinstance(element, Compound) and element.centre_of_mass is not None
+    keeps_first_corners = isinstance(element, Compound) and element.keeps_first_corners
     first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
     for piece in range(first, last):
         corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].tolist()
@@ -112,7 +111,7 @@ def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0
                 yield piece, pymunk.Segment(body, corners[0], corners[1], radius)
             case _:
                 polygon = pymunk.Poly(body, corners, radius=radius)
-                if keeps_first_corner:
+                if keeps_first_corners:
                     polygon.unsafe_set_vertices(corners)
                 yield piece, polygon
 

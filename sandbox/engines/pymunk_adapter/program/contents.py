@@ -16,6 +16,7 @@ from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Collides
+from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.geometry.shapes import UNTURNABLE, geometry_of
 
@@ -223,7 +224,12 @@ class Contents:
         for number, piece in enumerate(range(first, last), start=1):
             corners = [tuple(each) for each in pieces.corner[pieces.first[piece] : pieces.first[piece + 1]].tolist()]
             shape, columns = _shape_of(corners, float(pieces.radius[piece]), "" if last - first == 1 else f"_{number}")
-            lines += self._shape(shape, index, piece)
+            created = self._shape(shape, index, piece)
+            element = bodies.elements[bodies.element[index]]
+            if isinstance(element, Compound) and element.keeps_first_corners and len(created) == 2 and len(corners) > 2:
+                (outline,) = (name for name in columns if name.startswith("corners"))
+                created.insert(1, f"shape.unsafe_set_vertices({{{outline}}})  # starts at their first corner")
+            lines += created
             values |= columns
         return lines, values
 

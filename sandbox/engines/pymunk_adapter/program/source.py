@@ -26,7 +26,7 @@ MAX_SCALE = 1e5
 MAX_TITLE = 200
 """Characters of a title."""
 
-Box = tuple[Point, Point]
+ViewExtent = tuple[Point, Point]
 """Lower left and upper right corner, m."""
 
 
@@ -34,7 +34,7 @@ def program_text(
     start: Scene | Setup,
     settings: Settings | None = None,
     *,
-    view: Box | None = None,
+    view: ViewExtent | None = None,
     step_reason: str = "",
     warnings: Sequence[str] = (),
 ) -> str:
@@ -132,7 +132,7 @@ def _settings(setup: Setup, settings: Settings, step_reason: str, warnings: Sequ
     yield ""
 
 
-def _view(setup: Setup, view: Box | None) -> Iterator[str]:
+def _view(setup: Setup, view: ViewExtent | None) -> Iterator[str]:
     (left, bottom), (right, top) = _extent(setup) if view is None else view
     size = max((right - left) / WINDOW[0], (top - bottom) / WINDOW[1])
     scale = min(MARGIN / size, MAX_SCALE) if size > 0.0 and math.isfinite(size) else 1.0
@@ -148,7 +148,7 @@ def _view(setup: Setup, view: Box | None) -> Iterator[str]:
     yield ""
 
 
-def _extent(setup: Setup) -> Box:
+def _extent(setup: Setup) -> ViewExtent:
     """Return the box around bodies, walls, posts and the ends of joints."""
     bodies, scene = setup.bodies, setup.scene
     radius = bodies.radius[:, None]
