@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from sandbox.action import Switch
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.forecast import Risk, forecast, formula_forecast, game_notes
-from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, GameCode, game_code
+from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, SAME_VALUE, GameCode, game_code
 from sandbox.measure.advice.result import (
     Advice,
     FallbackKind,
@@ -165,8 +165,15 @@ def _check(**values: float | None) -> None:
 
 
 def _recorded_scene(recording: Recording) -> Scene:
-    """Return the scene of a recording with its duration, and with its settings as `[solver]`."""
-    return recording.whole_scene.model_copy(update={"solver": recording.settings})
+    """Return the scene of a recording with its duration, and with its settings as `[solver]`.
+
+    Settings that its engine chooses by itself are left out, so that other engines can run the scene.
+    """
+    scene, settings = recording.whole_scene, recording.settings
+    common = settings.common()
+    chosen = engine_named(recording.engine).resolve(scene, common)
+    own = {key: value for key in Settings.model_fields if (value := getattr(settings, key)) != getattr(chosen, key)}
+    return scene.model_copy(update={"solver": common.replace(**own)})
 
 
 @dataclass(frozen=True)
@@ -464,8 +471,10 @@ def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Confi
     """Return the configuration with pymunk's own slop, which a game has that does not set it."""
     if configuration.engine != "pymunk" or not space.has_contacts:
         return []
-    changed = configuration.with_option("slop", PYMUNK_DEFAULTS["collision_slop"])
-    is_new = space.is_valid(changed) and space.resolved(changed) != space.resolved(configuration)
+    slop = PYMUNK_DEFAULTS["collision_slop"]
+    changed, present = configuration.with_option("slop", slop), space.resolved(configuration).slop
+    is_known = present is not None and math.isclose(present, slop, rel_tol=SAME_VALUE)  # pymunk keeps 32 bits of it
+    is_new = space.is_valid(changed) and not is_known
     return [changed] if is_new else []
 
 
