@@ -51,7 +51,8 @@ SAMPLES: dict[str, tuple[str, ...]] = {
     "sandbox shots": ("shots 9-ball --count 20 --sensitivity --horizon --window '7:upper left pocket'",),
     "sandbox miss": ("miss duel",),
     "sandbox match": ("match straight-rail --players bot:0.5,bot:1 --turns 2",),
-    "sandbox export": ("export store --to run.csv", "export store --to run.png"),
+    "sandbox export": ("export store --to run.csv", "export store --to run.png", "export tunnel.toml --to game.py"),
+    "sandbox record": ("record --to recorded.json played.py",),
     "sandbox scenes": ("scenes",),
     "sandbox engines": ("engines",),
 }
@@ -67,6 +68,13 @@ SLOW = {
     "sandbox match",
 }
 
+PLAYED = """
+import pymunk
+space = pymunk.Space()
+body = pymunk.Body(1, 1)
+space.add(body, pymunk.Circle(body, 1))
+space.step(0.01)
+"""
 TUNNEL = """
 world = { duration = 0.2 }
 solver = { dt = 0.01 }
@@ -141,6 +149,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text(BAD)
     Path("tunnel.toml").write_text(TUNNEL)
+    Path("played.py").write_text(PLAYED)
     Path("level.svg").write_text('<svg viewBox="0 0 9 9"><circle r="5"/><text>x</text></svg>')
     limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
     Path("against.json").write_text(json.dumps({"limits": [limit]}))
@@ -165,7 +174,8 @@ def test_every_printed_key_is_documented_and_every_documented_key_is_printed(
 ) -> None:
     keys = documented(section)
     for sample in SAMPLES[section]:
-        call([*shlex.split(sample), "--json"])
+        command, *arguments = shlex.split(sample)
+        call([command, "--json", *arguments])  # `record` passes what follows its file to the game
         document = json.loads(capsys.readouterr().out)
         if section == "Faults":
             document = {"faults": document["faults"]}
