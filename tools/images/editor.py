@@ -14,7 +14,7 @@ from sandbox.window.app_state import AppState, Messages
 from .files import image_of, save_gif
 
 SIZE = (1280, 720)
-FILM = (800, 450)
+FILM = (656, 369)
 FPS = 12.5
 POINTER = [(0, 0), (0, 19), (4.5, 15), (7.5, 22), (10.5, 20.5), (7.6, 14), (13, 13.5)]
 """px, outline of the pointer, which a surface does not show"""
@@ -126,7 +126,7 @@ def _make(path: Path, folder: Path) -> None:
     hand.key(pygame.K_e, pygame.KMOD_CTRL)
     hand.film(16)
     window.close()
-    save_gif(hand.frames, path, FPS, 64, 0.8)
+    save_gif(hand.frames, path, FPS, 40, 0.8)
 
 
 def _set_friction(hand: _Hand) -> None:
