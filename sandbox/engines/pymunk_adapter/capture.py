@@ -213,9 +213,9 @@ class SpaceElements:
             tables.setdefault(table, []).append(values)
         all_balls = True
         for body, shapes in self._bodies_in_order(self._shapes[fixed_count:]):
-            ball = self._ball(body, shapes) if all_balls else None
-            all_balls = ball is not None
-            tables.setdefault("ball" if ball is not None else "body", []).append(ball or self._compound(body, shapes))
+            table, values = self._body(body, shapes, can_be_ball=all_balls)
+            all_balls = table == "ball"
+            tables.setdefault(table, []).append(values)
         joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
         return tables | ({"joint": joints} if joints else {})
 
@@ -260,8 +260,11 @@ class SpaceElements:
 
     def element_of(self, body: pymunk.Body) -> tuple[str, KeyValues]:
         """Return the table and the values of a body with the shapes that it has."""
-        shapes = [shape for shape in self._shapes if shape.body is body]
-        ball = self._ball(body, shapes)
+        return self._body(body, [shape for shape in self._shapes if shape.body is body], can_be_ball=True)
+
+    def _body(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape], *, can_be_ball: bool) -> tuple[str, KeyValues]:
+        """Return the table and the values of a body: a ball if it is one and may be one, or a body with parts."""
+        ball = self._ball(body, shapes) if can_be_ball else None
         return ("body", self._compound(body, shapes)) if ball is None else ("ball", ball)
 
     def _ball(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues | None:
@@ -389,13 +392,15 @@ class SpaceElements:
         """Yield the joint of a constraint; nothing if a scene has no such joint."""
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
-        values = self._kind_of_joint(constraint)
+        values = joint_values(constraint)
         ends = [None if self._is_world(body) else self.names[body] for body in (a, b)]
         is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint | pymunk.GearJoint)
         if values is None or ends == [None, None] or is_carried:
             self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))
             return
         self._note_constraint(constraint, kind)
+        if isinstance(constraint, pymunk.PinJoint) and values["kind"] == "pivot":
+            self.omitted.append("the length 0 of a PinJoint; the scene has a pivot instead")
         if ends[0] is None and "anchors" in values:  # a scene states the anchor of the body first
             values["anchors"].reverse()
         if ends[1] is None:
@@ -419,37 +424,6 @@ class SpaceElements:
             self.inexact.append(f"error_bias of a {kind} is not that of the space's contacts")
         if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
             self.omitted.append(f"callbacks of a {kind}")
-
-    def _kind_of_joint(self, constraint: pymunk.Constraint) -> KeyValues | None:
-        """Return the kind and the values of a joint; None if a scene has no such joint."""
-        match constraint:
-            case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
-                self.omitted.append("the length 0 of a PinJoint; the scene has a pivot instead")
-                return {"kind": "pivot"} | _anchors(constraint)
-            case pymunk.PinJoint():
-                return {"kind": "rod", "length": float(constraint.distance)} | _anchors(constraint)
-            case pymunk.PivotJoint():
-                return {"kind": "pivot"} | _anchors(constraint)
-            case pymunk.SlideJoint():
-                limits = {"least": float(constraint.min), "most": float(constraint.max)}
-                return {"kind": "slide"} | limits | _anchors(constraint)
-            case pymunk.GrooveJoint():
-                groove = [_point(constraint.groove_a), _point(constraint.groove_b)]
-                return {"kind": "groove", "groove": groove, "anchor": _point(constraint.anchor_b)}
-            case pymunk.DampedSpring():
-                values = {"rest_length": float(constraint.rest_length), "damping": float(constraint.damping)}
-                return {"kind": "spring", "stiffness": float(constraint.stiffness)} | values | _anchors(constraint)
-            case pymunk.DampedRotarySpring():
-                values = {"rest_angle": -float(constraint.rest_angle) + 0.0, "damping": float(constraint.damping)}
-                return {"kind": "rotary_spring", "stiffness": float(constraint.stiffness)} | values
-            case pymunk.RotaryLimitJoint():
-                return {"kind": "rotary_limit", "least": float(constraint.min), "most": float(constraint.max)}
-            case pymunk.GearJoint():
-                return {"kind": "gear", "ratio": float(constraint.ratio), "phase": float(constraint.phase)}
-            case pymunk.SimpleMotor():
-                torque = {"max_torque": float(constraint.max_force)} if math.isfinite(constraint.max_force) else {}
-                return {"kind": "motor", "rate": -float(constraint.rate) + 0.0} | torque
-        return None
 
 
 class FilterKind(NamedTuple):
@@ -500,6 +474,37 @@ _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment
 def _body_of(shape: pymunk.Shape) -> pymunk.Body:
     assert shape.body is not None  # it is in a space
     return shape.body
+
+
+def joint_values(constraint: pymunk.Constraint) -> KeyValues | None:
+    """Return the kind and the values of a joint; None if a scene has no such joint."""
+    match constraint:
+        case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
+            return {"kind": "pivot"} | _anchors(constraint)
+        case pymunk.PinJoint():
+            return {"kind": "rod", "length": float(constraint.distance)} | _anchors(constraint)
+        case pymunk.PivotJoint():
+            return {"kind": "pivot"} | _anchors(constraint)
+        case pymunk.SlideJoint():
+            limits = {"least": float(constraint.min), "most": float(constraint.max)}
+            return {"kind": "slide"} | limits | _anchors(constraint)
+        case pymunk.GrooveJoint():
+            groove = [_point(constraint.groove_a), _point(constraint.groove_b)]
+            return {"kind": "groove", "groove": groove, "anchor": _point(constraint.anchor_b)}
+        case pymunk.DampedSpring():
+            values = {"rest_length": float(constraint.rest_length), "damping": float(constraint.damping)}
+            return {"kind": "spring", "stiffness": float(constraint.stiffness)} | values | _anchors(constraint)
+        case pymunk.DampedRotarySpring():
+            values = {"rest_angle": -float(constraint.rest_angle) + 0.0, "damping": float(constraint.damping)}
+            return {"kind": "rotary_spring", "stiffness": float(constraint.stiffness)} | values
+        case pymunk.RotaryLimitJoint():
+            return {"kind": "rotary_limit", "least": float(constraint.min), "most": float(constraint.max)}
+        case pymunk.GearJoint():
+            return {"kind": "gear", "ratio": float(constraint.ratio), "phase": float(constraint.phase)}
+        case pymunk.SimpleMotor():
+            torque = {"max_torque": float(constraint.max_force)} if math.isfinite(constraint.max_force) else {}
+            return {"kind": "motor", "rate": -float(constraint.rate) + 0.0} | torque
+    return None
 
 
 def _point(vector: Sequence[float]) -> list[float]:

@@ -28,7 +28,7 @@ from sandbox.engines.pymunk_adapter.forces import has_drag
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BACKING, Collides, Point
+from sandbox.scene.description.base import BACKING, BodySource, Collides, Point
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
 from sandbox.scene.description.world import Settings
@@ -93,13 +93,21 @@ def fixed_shapes(
         yield pymunk.Circle(body, collider.radius, collider.position)
 
 
+def keeps_first_corners(element: BodySource) -> bool:
+    """Return whether the polygons of a body start at their first corners, and not where pymunk starts a hull.
+
+    A body with a stated centre of mass may be captured from a space; only rounding depends on the first corner.
+    """
+    return isinstance(element, Compound) and element.centre_of_mass is not None
+
+
 def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0) -> Iterator[tuple[int, pymunk.Shape]]:
     """Yield the shapes of a body, each with its index among all shapes; single discs are enlarged by `skin`."""
     if bodies.all_round:
         yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
         return
     shapes, element = bodies.shapes, bodies.elements[bodies.element[index]]
-    keeps_first_corners = isinstance(element, Compound) and element.keeps_first_corners
+    is_kept = keeps_first_corners(element)
     first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
     for piece in range(first, last):
         corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].tolist()
@@ -111,7 +119,7 @@ def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0
                 yield piece, pymunk.Segment(body, corners[0], corners[1], radius)
             case _:
                 polygon = pymunk.Poly(body, corners, radius=radius)
-                if keeps_first_corners:
+                if is_kept:
                     polygon.unsafe_set_vertices(corners)
                 yield piece, polygon
 

@@ -8,14 +8,15 @@ What actions cannot state is a remark and never left out silently, as in `captur
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Set
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import pymunk
 
 from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
-from sandbox.engines.pymunk_adapter.capture import CapturedSpace, SpaceElements, scene_of
+from sandbox.engines.pymunk_adapter.capture import CapturedSpace, SpaceElements, joint_values, scene_of
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.recording import Recording
 
@@ -42,6 +43,65 @@ class MotionState(NamedTuple):
         return cls((x, y), (vx, vy), body.angle, body.angular_velocity)
 
 
+@dataclass(frozen=True)
+class SpaceForm:
+    """What a game may change in a space that no action of a recording states."""
+
+    settings: tuple[float, ...]
+    bodies: Mapping[pymunk.Body, tuple[Any, ...]]
+    """type, mass, moment and functions of the bodies that are in the space"""
+    shapes: Mapping[pymunk.Shape, tuple[Any, ...]]
+    """body, coefficients, filter and more of each shape"""
+    joints: Mapping[pymunk.Constraint, tuple[Any, ...]]
+
+    @classmethod
+    def of(cls, space: pymunk.Space, bodies: Collection[pymunk.Body]) -> "SpaceForm":
+        """Return the form of a space; of its bodies only some."""
+        return cls(
+            (
+                space.iterations,
+                space.collision_slop,
+                space.collision_bias,
+                space.collision_persistence,
+                space.damping,
+                space.sleep_time_threshold,
+                len(getattr(space, "_handlers", ())),
+            ),
+            {
+                body: (body.body_type, body.mass, body.moment, body._velocity_func, body._position_func)
+                for body in bodies
+                if body.space is space
+            },
+            {
+                each: (each.body, each.elasticity, each.friction, each.filter, each.surface_velocity, each.sensor)
+                for each in space.shapes
+            },
+            {joint: (joint_values(joint), joint.max_force, joint.collide_bodies) for joint in space.constraints},
+        )
+
+    def changes_since(self, before: "SpaceForm", explained: Set[pymunk.Body]) -> Iterator[str]:
+        """Yield what has changed since an earlier form.
+
+        Args:
+            before: the earlier form.
+            explained: bodies that were added or removed by actions, with their shapes.
+        """
+        if self.settings != before.settings:
+            yield "settings and callbacks of the space that the game changes"
+        if any(self.bodies[body] != before.bodies[body] for body in self.bodies.keys() & before.bodies.keys()):
+            yield "types, masses, moments and functions of bodies that the game changes"
+        exchanged = {*self.shapes.items()} ^ {*before.shapes.items()}
+        if any(shape in self.shapes and shape in before.shapes for shape, _ in exchanged):
+            yield "coefficients and filters of shapes that the game changes"
+        single = [values for shape, values in exchanged if (shape in self.shapes) != (shape in before.shapes)]
+        if any(values[0] not in explained for values in single):
+            yield "shapes that the game adds to bodies or removes from them"
+        if self.joints.keys() != before.joints.keys():
+            yield "joints that the game adds or removes"
+        if any(self.joints[joint] != before.joints[joint] for joint in self.joints.keys() & before.joints.keys()):
+            yield "joints that the game changes, as the rate of a motor"
+
+
 class SpaceCapture:
     """Recording of one space, step by step.
 
@@ -59,22 +119,15 @@ class SpaceCapture:
         self._actions: list[Action] = []
         self._states = {body: MotionState.of(body) for body in self._names}
         self._forces: dict[pymunk.Body, tuple[float, float, float]] = {}
-        self._gravity, self._constraints = tuple(space.gravity), set(space.constraints)
-        self._settings = self._present_settings()
-
-    def _present_settings(self) -> tuple[float, ...]:
-        space = self.space
-        return space.iterations, space.collision_slop, space.collision_bias, space.collision_persistence, space.damping
+        self._gravity = tuple(space.gravity)
+        self._scene_bodies = set(captured.scene.bodies.names)
+        self._form = SpaceForm.of(space, self._names)
 
     def before_step(self, dt: float) -> None:
         """Note what the game has changed since the last step."""
         space = self.space
         if dt != self.dt:
             self._omitted["the step, which the game varies; a scene has a constant dt"] = None
-        if self._present_settings() != self._settings:
-            self._omitted["changes of the settings of the space during the game"] = None
-        if set(space.constraints) != self._constraints:
-            self._omitted["joints that are added or removed during the game"] = None
         if len(self._actions) > MAX_ACTIONS:
             self._omitted[f"actions after the first {MAX_ACTIONS:,}"] = None
             return
@@ -82,7 +135,9 @@ class SpaceCapture:
             self._gravity = tuple(space.gravity)
             self._actions.append(SetParameter(time=self.time, path="world.gravity", value=list(self._gravity)))
         if self.steps:
+            form, known = SpaceForm.of(space, self._names), set(self._names)
             self._note_population()
+            self._omitted |= dict.fromkeys(form.changes_since(self._form, known ^ set(self._names)))
             self._note_motion()
         self._note_forces()
 
@@ -90,6 +145,7 @@ class SpaceCapture:
         """Note the state after a step."""
         self.steps += 1
         self._states = {body: MotionState.of(body) for body in self._names}
+        self._form = SpaceForm.of(self.space, self._names)
 
     @property
     def time(self) -> float:
@@ -99,10 +155,12 @@ class SpaceCapture:
     def _note_population(self) -> None:
         """Note bodies that were added or removed. Bodies without shapes and joints are not used."""
         present = [body for body in self.space.bodies if body.shapes or body in self._names]
-        for body in [body for body in self._names if body.space is None and body in self._states]:
-            if body.body_type == pymunk.Body.DYNAMIC:
-                self._actions.append(Remove(time=self.time, body=self._names[body]))
-            self._names.pop(body)
+        for body in self._form.bodies.keys() - {*self.space.bodies, self.space.static_body}:
+            name = self._names.pop(body)
+            if name in self._scene_bodies:
+                self._actions.append(Remove(time=self.time, body=name))
+            else:
+                self._omitted["walls and posts that the game removes"] = None
         added = [body for body in present if body not in self._names]
         if not added:
             return
@@ -114,6 +172,7 @@ class SpaceCapture:
             spawned: dict[str, Any] = {table: values}
             self._actions.append(Spawn.model_validate_json(json.dumps({"time": self.time, "kind": "spawn"} | spawned)))
             self._names[body], self._states[body] = name, MotionState.of(body)
+            self._scene_bodies.add(name)
         self._omitted |= dict.fromkeys(elements.omitted)
         self._inexact |= dict.fromkeys(elements.inexact)
 

@@ -117,14 +117,6 @@ class Compound(BodySpec):
     polygons: Annotated[tuple[PolygonPart, ...], Field(alias="polygon", max_length=MAX_PARTS)] = ()
 
     @property
-    def keeps_first_corners(self) -> bool:
-        """Whether pymunk's polygons start at the first corner of their outline, and not where pymunk starts a hull.
-
-        A body with a stated centre of mass may be captured from a space; only rounding depends on the first corner.
-        """
-        return self.centre_of_mass is not None
-
-    @property
     def parts(self) -> tuple[AnyPart, ...]:
         """The parts by kind, each kind in the order of the file."""
         return self.balls + self.boxes + self.capsules + self.polygons
