@@ -208,7 +208,7 @@ class EditView:
         return True
 
     def _press_in_gesture(self, key: int) -> bool:
-        """Process a key while a gesture goes on; return whether the gesture uses it."""
+        """Process a key during a gesture; return whether the gesture uses it."""
         gesture = self.editor.gesture
         assert gesture is not None
         if key in (pygame.K_RETURN, pygame.K_KP_ENTER):

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from itertools import combinations_with_replacement
 from typing import Any, Literal
 
 from sandbox.scene.compile.generators import GeneratorError
@@ -17,21 +16,15 @@ from sandbox.scene.editing.elements import (
     bodies_of,
     element_of_body,
     exists,
-    material_users,
     name_of,
     removal,
-    renaming,
     unique_name,
 )
 from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
 from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, transformation
 from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import (
-    AddElement,
     Change,
-    RemoveElement,
-    RemoveValue,
-    SetValue,
     TextEditError,
     with_swapped_elements,
 )
@@ -58,6 +51,14 @@ from sandbox.window.editor.gestures import (
 from sandbox.window.editor.handles import EditHandle, gesture_of_handle, handle_at, handles_of
 from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointGesture, PlacementError
 from sandbox.window.editor.picking import bounds_of, bounds_of_elements, elements_at, pick_element
+from sandbox.window.editor.property_changes import (
+    element_changes,
+    fault_text,
+    new_material,
+    new_pair,
+    table_changes,
+    table_removal,
+)
 from sandbox.window.editor.snapping import REACH, anchor_of, grid_step, snap_point, surface_shift
 
 MessageCallback = Callable[[str, str], None]
@@ -209,13 +210,8 @@ class Editor:
     def _add_flipper(self, point: Point, view: ViewScale, control: bool) -> None:
         scene, tolerance = self.draft.scene, view.metres(PICK_REACH)
         name, hinge = unique_name("flipper", all_names(scene)), self._snap(point, view, control)
-        try:
-            changes = flipper_changes(scene, name, hinge, point, tolerance)
-        except PlacementError as error:
-            self._notify(str(error), "warning")
-        else:
-            if self.apply(changes, "add a flipper"):
-                self._select_driven(name)
+        if self._apply_or_notify(lambda scene: flipper_changes(scene, name, hinge, point, tolerance), "add a flipper"):
+            self._select_driven(name)
         self._pressed = self.snapped = None
 
     def _select_driven(self, drive: str) -> None:
@@ -407,7 +403,7 @@ class Editor:
         try:
             self.draft.change(changes, label, merge)
         except SceneError as error:
-            message = _fault_text(error)
+            message = fault_text(error)
             self.fault = list(self.selection) if self.tool == "select" else [], message
             self._notify(message, "error")
             return False
@@ -573,53 +569,21 @@ class Editor:
     # --- Properties ----------------------------------------------------------------------------------------------
 
     def set_property(self, keys: Collection[ElementKey], name: str, value: Any) -> str | None:
-        """Set a key of elements; return the message of a fault, or None.
-
-        Args:
-            keys: the elements.
-            name: the key; of a table within the element with a dot, such as `kick.speed`.
-            value: the new value; None removes the key.
-        """
-        scene = self.draft.scene
-        changes, taken = self._new_material(name, value), all_names(scene)
-        for key in keys:
-            if name == "name" and value is not None:
-                own = value if len(keys) == 1 else unique_name(value, taken)
-                taken.add(own)
-                changes += renaming(scene, key, own)
-            else:
-                changes.append(self._setting(key.location, name, value))
+        """Set a key of elements, as `element_changes` does; return the message of a fault, or None."""
+        changes = element_changes(self.draft.scene, self.draft.document, keys, name, value)
         return self._change_property(changes, f"set {name} of {_count(list(keys))}", name)
 
     def set_value(self, location: Location, name: str, value: Any) -> str | None:
-        """Set a key of a table at a location, as `set_property` does; an empty location is the scene itself."""
-        if len(location) == 2 and isinstance(location[1], int):
-            return self.set_property([ElementKey(str(location[0]), location[1])], name, value)
-        changes = [*self._new_material(name, value), self._setting(location, name, value)]
+        """Set a key of a table at a location, as `table_changes` does; return the message of a fault, or None."""
+        changes = table_changes(self.draft.scene, self.draft.document, location, name, value)
         return self._change_property(changes, f"set {name}", name)
-
-    def _new_material(self, name: str, value: Any) -> list[Change]:
-        """Return the change that adds a material if a key names one that the scene does not have."""
-        known = {material.name for material in self.draft.scene.materials}
-        return [AddElement("material", {"name": value})] if name == "material" and value not in {None, *known} else []
-
-    def _setting(self, location: Location, name: str, value: Any) -> Change:
-        """Return the change that sets a key, or removes it, with a table within the table that has no other key."""
-        path = (*location, *name.split("."))
-        if value is not None:
-            return SetValue(path, value)
-        table: Any = self.draft.document
-        for key in path[:-1]:
-            table = table.get(key, {}) if isinstance(table, dict) else table[key]
-        is_last = len(path) > len(location) + 1 and set(table) <= {path[-1]}
-        return RemoveValue(path[:-1] if is_last else path)
 
     def _change_property(self, changes: Sequence[Change], label: str, field: str) -> str | None:
         """Apply the changes of a property; return the message of a fault, or None."""
         try:
             self.draft.change(changes, label)
         except SceneError as error:
-            return _fault_text(error, field)
+            return fault_text(error, field)
         except TextEditError as error:
             return str(error)
         self._drop_gesture()
@@ -627,51 +591,26 @@ class Editor:
         return None
 
     def remove_table(self, location: Location) -> None:
-        """Remove a table, such as `[surface]`, a part of a rigid body, or a material that no element has."""
-        scene = self.draft.scene
-        if len(location) != 2 or not isinstance(location[1], int):
-            also = [RemoveValue(("contact_models",))] if location == ("surface",) else []
-            label = f"remove {location[-2] if len(location) > 2 else location[-1]}"
-            self.apply([RemoveValue(location), *also], label)
-            return
-        key = ElementKey(str(location[0]), location[1])
-        if not exists(scene, key):
-            return
-        users = material_users(scene, name_of(scene, key)) if key.table == "material" else []
-        if users:
-            more = f" and {len(users) - 1} more" if len(users) > 1 else ""
-            user = f"{users[0].table} {name_of(scene, users[0])}"
-            self._notify(f"material {name_of(scene, key)} is used by {user}{more}", "warning")
-            return
-        self.apply([RemoveElement(key.table, key.index)], f"remove a {key.table}")
+        """Remove a table, such as `[surface]`, a part of a rigid body, or a material that nothing has."""
+        table = location[-2] if isinstance(location[-1], int) else location[-1]
+        self._apply_or_notify(lambda scene: table_removal(scene, location), f"remove a {table}")
 
     def add_material(self) -> None:
         """Add a material with a new name."""
-        self.apply(
-            [AddElement("material", {"name": unique_name("material", all_names(self.draft.scene))})], "add a material"
-        )
+        self._apply_or_notify(lambda scene: [new_material(scene)], "add a material")
 
     def add_pair(self) -> None:
-        """Add coefficients of the first two materials, or of one with itself, that have none yet."""
-        scene = self.draft.scene
-        known = {frozenset(pair.between) for pair in scene.pairs}
-        names = sorted(
-            combinations_with_replacement([each.name for each in scene.materials], 2), key=lambda two: two[0] == two[1]
-        )
-        free = next((list(two) for two in names if frozenset(two) not in known), None)
-        if free is None:
-            self._notify("all pairs of materials have coefficients", "info")
-            return
-        self.apply([AddElement("pair", {"between": free})], "add a pair")
+        """Add coefficients of a pair of materials that has none yet."""
+        self._apply_or_notify(lambda scene: [new_pair(scene)], "add a pair")
 
-
-def _fault_text(error: SceneError, field: str = "") -> str:
-    """Return the messages of at most two faults, with the path of each that is not at the edited field."""
-    texts = [
-        fault.message if not field or fault.path.endswith(field) else f"{fault.path}: {fault.message}"
-        for fault in error.faults
-    ]
-    return "; ".join(list(dict.fromkeys(texts))[:2])
+    def _apply_or_notify(self, changes: Callable[[Scene], list[Change]], label: str) -> bool:
+        """Apply the changes of a scene, or show why there are none; return whether they were applied."""
+        try:
+            found = changes(self.draft.scene)
+        except PlacementError as error:
+            self._notify(str(error), "warning")
+            return False
+        return bool(found) and self.apply(found, label)
 
 
 def _count(keys: Sequence[ElementKey]) -> str:

@@ -266,7 +266,7 @@ def test_closing_ends_the_threads_of_the_editor(open_on: Callable[[str], Hand]) 
     hand.view.close(is_lost=True)
     for thread in begun:
         if thread.name in ("sandbox check", "sandbox ghost path"):
-            thread.join(20.0)
+            thread.join(120.0)  # it may be compiling kernels for the first time
             assert not thread.is_alive()
 
 
