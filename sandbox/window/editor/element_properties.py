@@ -13,7 +13,7 @@ from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import ElementKey, body_names, element_at, elements_of_table, name_of, table_values
 from sandbox.scene.editing.fields import fields_of
 from sandbox.scene.errors import Location
-from sandbox.window.editor.property_panel import PropertyRow, PropertySection
+from sandbox.window.editor.property_rows import PropertyRow, PropertySection
 
 ATTACHED_TABLES = ("drive", "shot")
 """Elements without a place of their own, which are shown with their body"""

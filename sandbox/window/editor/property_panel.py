@@ -6,67 +6,45 @@ Rows are positions and values, not widgets: a scene has hundreds of them, and on
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import pygame
 
-from sandbox.scene.editing.fields import FieldSpec, format_value, parse, summary
+from sandbox.scene.editing.fields import format_value, parse
+from sandbox.window.editor.property_rows import (
+    DIMMED,
+    TYPED_KINDS,
+    VALUE_SIZE,
+    PropertyRow,
+    PropertySection,
+    draw_check_box,
+    draw_choice,
+    draw_heading_button,
+    draw_swatch,
+    draw_value_box,
+    is_typed,
+    shown_text,
+    text_room,
+)
 from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import (
-    BACKGROUND,
     FAINT,
     INK,
     LINE,
     PANEL,
     PANEL_RAISED,
-    SKY,
     WARNING,
-    RgbColour,
-    mix_colours,
 )
 from sandbox.window.render.text import draw_hint, draw_text, ellipsis, text_size, wrap_text
 from sandbox.window.ui.panel import MAX_WIDTH_FRACTION, PANEL_WIDTH, SCROLL_STEP
 
-LABEL_SIZE, VALUE_SIZE, UNIT_SIZE, ERROR_SIZE, NOTE_SIZE = 12.0, 11.5, 10.5, 11.0, 12.0
+LABEL_SIZE, UNIT_SIZE, ERROR_SIZE, NOTE_SIZE = 12.0, 10.5, 11.0, 12.0
 """px at UI scale 1, font sizes"""
 ROW_HEIGHT, BOX_HEIGHT, HEADING_HEIGHT, SECTION_GAP = 24, 20, 26, 8
 """px at UI scale 1"""
 MAX_ERROR_LINES, MAX_NOTE_LINES = 5, 8
-LEFT_OUT, MIXED = "–", "…"
-"""Text of a field without a value, and of one whose values differ."""
-DIMMED: RgbColour = mix_colours(FAINT, BACKGROUND, 0.15)
-"""Colour of defaults and units."""
-TYPED_KINDS = frozenset({"number", "integer", "text", "numbers", "name", "list", "either"})
-"""Kinds of fields that are edited as text."""
-MAX_SHOWN_ITEMS, MAX_EDITED_ITEMS = 8, 200
-"""Longer lists are shown by their length, or are edited in the file or by their corners only."""
 _ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
 _MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
-
-
-@dataclass(frozen=True)
-class PropertyRow:
-    """A field and its present value."""
-
-    spec: FieldSpec
-    value: Any
-    """None if the key is left out; must not be changed in place"""
-    is_mixed: bool = False
-    """whether several elements are selected whose values differ"""
-
-
-@dataclass(frozen=True)
-class PropertySection:
-    """Rows under a heading, such as those of one element."""
-
-    title: str
-    key: str
-    """unique; passed to callbacks"""
-    rows: tuple[PropertyRow, ...]
-    is_open: bool = True
-    """whether it is initially unfolded"""
-    button: Literal["", "add", "remove"] = ""
-    """button of its heading: a plus that adds a table of its kind, or a cross that removes what it shows"""
 
 
 class RowId(NamedTuple):
@@ -182,7 +160,7 @@ class PropertyPanel:
         rows = {RowId(section.key, row.spec.key): row for section in shown for row in section.rows}
         if self._editing is not None:
             row = rows.get(self._editing.row)
-            if row is None or not _is_typed(row):
+            if row is None or not is_typed(row):
                 self._end_editing()
         self._rejected = {
             key: rejected
@@ -366,7 +344,7 @@ class PropertyPanel:
         here = self.focused
         if here is None or not self._apply():
             return
-        typed = [item for item in self._items if item.row is not None and _is_typed(item.row)]
+        typed = [item for item in self._items if item.row is not None and is_typed(item.row)]
         self._end_editing()
         index = next((k for k, item in enumerate(typed) if item.row_id == here), None)
         if index is not None:
@@ -503,7 +481,7 @@ class PropertyPanel:
         elif is_on_box and item.row.spec.kind in ("flag", "choice"):
             if button in (1, 3):
                 self._cycle(item, 1 if button == 1 else -1)
-        elif is_on_box and button == 1 and _is_typed(item.row):
+        elif is_on_box and button == 1 and is_typed(item.row):
             self._start_editing(item)
 
     def _drag(self, at: tuple[int, int]) -> None:
@@ -561,16 +539,11 @@ class PropertyPanel:
         if pointer[0] < box.left:
             is_whole = self._label(spec.key) == spec.key
             return spec.description if is_whole else f"{spec.key}: {spec.description}"
-        text = self._shown_text(item.row)[0]
+        text = shown_text(item.row)[0]
         is_mono = spec.kind in TYPED_KINDS
-        is_whole = text_size(text, VALUE_SIZE * self.ui_scale, mono=is_mono)[0] <= self._room(item.row, box)
+        room = text_room(item.row, box, self.ui_scale)
+        is_whole = text_size(text, VALUE_SIZE * self.ui_scale, mono=is_mono)[0] <= room
         return "" if spec.kind == "flag" or not box.collidepoint(pointer) or is_whole else f"{text} {spec.unit}".strip()
-
-    def _room(self, row: PropertyRow, box: pygame.Rect) -> int:
-        """Return the width of the text of a value in its box without the unit, px."""
-        pad = self._px(6)
-        arrow = pad + 0.28 * VALUE_SIZE * self.ui_scale if row.spec.kind == "choice" else 0
-        return round(box.width - 2 * pad - arrow)
 
     def _label(self, key: str) -> str:
         return ellipsis(key, LABEL_SIZE * self.ui_scale, self._label_width - self._px(6))
@@ -622,22 +595,11 @@ class PropertyPanel:
         size = 11.5 * ui_scale
         if item.section.button:
             width -= self._button(item).width
-            self._draw_button(self._button(item), item.section.button == "add", colour)
+            draw_heading_button(sheet, self._button(item), item.section.button == "add", colour, ui_scale)
         title = ellipsis(item.section.title, size, width - self._px(30), bold=True)
         word = draw_text(sheet, title, (start, y), size, colour, "midleft", bold=True)
         if word.right + self._px(8) < left + width:
             pygame.draw.line(sheet, LINE, (word.right + self._px(8), y), (left + width, y), max(self._px(1), 1))
-
-    def _draw_button(self, box: pygame.Rect, is_plus: bool, colour: RgbColour) -> None:
-        """Draw a plus or a cross."""
-        x, y = box.center
-        arm, line_width = 3.5 * self.ui_scale, max(self._px(1.4), 1)
-        if is_plus:
-            pygame.draw.line(self._sheet, colour, (x - 1.3 * arm, y), (x + 1.3 * arm, y), line_width)
-            pygame.draw.line(self._sheet, colour, (x, y - 1.3 * arm), (x, y + 1.3 * arm), line_width)
-            return
-        pygame.draw.line(self._sheet, colour, (x - arm, y - arm), (x + arm, y + arm), line_width)
-        pygame.draw.line(self._sheet, colour, (x - arm, y + arm), (x + arm, y - arm), line_width)
 
     def _draw_row(self, item: PanelItem, row: PropertyRow) -> None:
         sheet, left, box = self._sheet, self._column[0], self._box(item)
@@ -646,9 +608,9 @@ class PropertyPanel:
         colour = INK if is_set else FAINT
         draw_text(sheet, self._label(row.spec.key), (left, box.centery), LABEL_SIZE * self.ui_scale, colour, "midleft")
         if row.spec.kind == "flag":
-            self._draw_check_box(item, row, box)
+            draw_check_box(sheet, box, row, item.row_id == self._hovered, self.ui_scale)
         elif row.spec.kind == "choice":
-            self._draw_choice(item, row, box)
+            draw_choice(sheet, box, row, item.row_id == self._hovered, self.ui_scale)
         else:
             self._draw_value(item, row, box)
         for k, line in enumerate(item.error):
@@ -657,35 +619,25 @@ class PropertyPanel:
         if rejected is not None:
             pygame.draw.rect(sheet, WARNING, box, max(self._px(1), 1), border_radius=self._px(3))
 
-    def _shown_text(self, row: PropertyRow) -> tuple[str, RgbColour]:
-        """Return the text of a value and its colour; the default, dimmed, of a key that is left out."""
-        if row.is_mixed:
-            return MIXED, INK
-        if row.value is not None:
-            if isinstance(row.value, list) and len(row.value) > MAX_SHOWN_ITEMS:
-                return summary(row.value), INK if _is_typed(row) else FAINT
-            return format_value(row.spec, row.value) or LEFT_OUT, INK
-        return format_value(row.spec, row.spec.default) or LEFT_OUT, DIMMED
-
     def _draw_value(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
         """Draw the value of a field that is edited as text, or of one that cannot be edited."""
         sheet, size = self._sheet, VALUE_SIZE * self.ui_scale
         rejected, pad = self._rejected.get(item.row_id), self._px(6)
-        text, colour = self._shown_text(row)
+        text, colour = shown_text(row)
         if rejected is not None and rejected.text is not None:
             text, colour = rejected.text, INK
-        if not _is_typed(row):
-            text = ellipsis(text, size, self._room(row, box))
+        if not is_typed(row):
+            text = ellipsis(text, size, text_room(row, box, self.ui_scale))
             draw_text(sheet, text, (box.left + pad, box.centery), size, colour, "midleft")
             return
         is_edited = item.row_id == self.focused
-        self._draw_box(item, box, is_edited)
+        draw_value_box(sheet, box, item.row_id == self._hovered, is_edited, self.ui_scale)
         if is_edited:
             self._draw_edit(text, box.inflate(-2 * pad, 0))
             return
         unit, unit_size = row.spec.unit, UNIT_SIZE * self.ui_scale
         unit_width = text_size(unit, unit_size)[0] + self._px(5) if unit else 0
-        room = self._room(row, box)
+        room = text_room(row, box, self.ui_scale)
         if unit and self._value_width(text) + unit_width > room:
             unit_width = 0  # the number is more important than its unit, which the tooltip has too
         elif unit:
@@ -693,15 +645,8 @@ class PropertyPanel:
         text = ellipsis(text, size, room - unit_width, mono=True)
         x = box.left + pad
         if row.spec.pattern.startswith("^#") and re.search(row.spec.pattern, text):
-            x += self._draw_swatch(text, box)
+            x += draw_swatch(sheet, box, text, self.ui_scale)
         draw_text(sheet, text, (x, box.centery), size, colour, "midleft", mono=True)
-
-    def _draw_box(self, item: PanelItem, box: pygame.Rect, is_edited: bool = False) -> None:
-        is_lit = is_edited or item.row_id == self._hovered
-        pygame.draw.rect(self._sheet, BACKGROUND if is_edited else PANEL_RAISED, box, border_radius=self._px(3))
-        if is_lit:
-            edge = SKY if is_edited else LINE
-            pygame.draw.rect(self._sheet, edge, box, max(self._px(1), 1), border_radius=self._px(3))
 
     def _draw_edit(self, placeholder: str, area: pygame.Rect) -> None:
         """Draw the edited text in an area; before anything is typed, a placeholder if it is empty."""
@@ -710,52 +655,6 @@ class PropertyPanel:
         if not editing.edit.text and not editing.is_touched:
             draw_text(self._sheet, placeholder, (area.left, area.centery), size, DIMMED, "midleft", mono=True)
         editing.shift = draw_text_edit(self._sheet, editing.edit, area, size, editing.shift)
-
-    def _draw_check_box(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
-        sheet, side = self._sheet, self._px(14)
-        value = row.spec.default if row.value is None else row.value
-        is_on = bool(value) and not row.is_mixed
-        is_default = row.value is None and not row.is_mixed
-        square = pygame.Rect(box.left, box.centery - side // 2, side, side)
-        fill = (mix_colours(SKY, PANEL, 0.55) if is_default else SKY) if is_on else PANEL_RAISED
-        radius = self._px(3.5)
-        pygame.draw.rect(sheet, fill, square, border_radius=radius)
-        edge = SKY if is_on or item.row_id == self._hovered else LINE
-        pygame.draw.rect(sheet, edge, square, max(self._px(1), 1), border_radius=radius)
-        if is_on:
-            tick = [
-                (square.left + x * side, square.top + y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
-            ]
-            pygame.draw.lines(sheet, BACKGROUND, False, tick, max(self._px(2), 1))
-        elif row.is_mixed or value is None:
-            dash = pygame.Rect(0, 0, round(0.5 * side), max(self._px(2), 1))
-            dash.center = square.center
-            pygame.draw.rect(sheet, INK if row.is_mixed else FAINT, dash)
-
-    def _draw_choice(self, item: PanelItem, row: PropertyRow, box: pygame.Rect) -> None:
-        sheet, size = self._sheet, VALUE_SIZE * self.ui_scale
-        text, colour = self._shown_text(row)
-        self._draw_box(item, box)
-        pad, height = self._px(6), round(0.28 * size)
-        text = ellipsis(text, size, self._room(row, box))
-        draw_text(sheet, text, (box.left + pad, box.centery), size, colour, "midleft")
-        if len(row.spec.choices) + row.spec.is_optional > 1:
-            x, y = box.right - pad, box.centery
-            arrow = [(x - height, y - height), (x, y), (x - height, y + height)]
-            pygame.draw.lines(sheet, SKY, False, arrow, max(self._px(1.6), 1))
-
-    def _draw_swatch(self, colour: str, box: pygame.Rect) -> int:
-        """Draw a sample of a colour `#rrggbb` at the left of a box; return the width that it takes, px."""
-        side = self._px(11)
-        sample = pygame.Rect(box.left + self._px(6), box.centery - side // 2, side, side)
-        pygame.draw.rect(self._sheet, pygame.Color(colour), sample, border_radius=self._px(2))
-        return side + self._px(6)
-
-
-def _is_typed(row: PropertyRow) -> bool:
-    """Return whether the value of a row can be edited as text."""
-    is_long = isinstance(row.value, list) and len(row.value) > MAX_EDITED_ITEMS
-    return row.spec.kind in TYPED_KINDS and not is_long
 
 
 def _accept(*_: object) -> None:

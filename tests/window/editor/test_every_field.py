@@ -11,7 +11,7 @@ from sandbox.scene.editing.fields import format_value, parse
 from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import location_of, property_sections
-from sandbox.window.editor.property_panel import PropertyRow, PropertySection
+from sandbox.window.editor.property_rows import PropertyRow, PropertySection
 
 pytestmark = pytest.mark.full  # thousands of changes
 

@@ -14,7 +14,9 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.world import Settings, World
 from sandbox.scene.editing.fields import fields_of
-from sandbox.window.editor.property_panel import PropertyPanel, PropertyRow, PropertySection, TextEdit
+from sandbox.window.editor.property_panel import PropertyPanel
+from sandbox.window.editor.property_rows import PropertyRow, PropertySection
+from sandbox.window.editor.text_edit import TextEdit
 from sandbox.window.render.palette import WARNING
 from sandbox.window.ui.panel import SidePanel
 from tests.window.pressing import FOCUS_LOST, key, move, press, release, wheel
