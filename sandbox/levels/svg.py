@@ -36,10 +36,12 @@ from sandbox.levels.outlines import (
 )
 from sandbox.levels.safe_xml import MAX_XML_ELEMENTS, XmlNode, parse_xml, read_text, refuse
 from sandbox.levels.svg_paths import PathError, Subpath, subpaths
-from sandbox.levels.svg_style import IGNORED, StyleSheet, inherit
 from sandbox.levels.svg_values import (
+    IGNORED,
     ElementError,
     EmptyElementError,
+    StyleSheet,
+    inherit,
     length_of,
     parse_colour,
     parse_length,

@@ -10,7 +10,7 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.cli.advise import LENGTH_UNITS, TIME_UNITS, Quantity
 from sandbox.cli.main import call
-from sandbox.measure.advice import study
+from sandbox.measure.advice import scoring, study
 from sandbox.recording import Recording
 from tests.cli.calling import DROP, FAULTY, json_of, lines_of, write_scene
 from tests.cli.test_json_schemas import assert_valid_document
@@ -182,7 +182,7 @@ def test_interrupt_keeps_what_is_finished(
     assert (document["present"]["frame_ms"], document["recommended"]["ratio"]) == (None, None)
     assert err == ["interrupted: what was measured so far is kept"]
     assert page.exists()
-    monkeypatch.setattr(study, "find_truth", interrupt)
+    monkeypatch.setattr(scoring, "find_truth", interrupt)
     status, out, err = lines_of(capfd, "advise", write_scene(tmp_path, BULLET), *QUICK)
     assert (status, out, err[-1]) == (130, [], "interrupted")
 

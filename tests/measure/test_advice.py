@@ -167,7 +167,7 @@ def test_errors_of_a_chaotic_scene_count_until_the_horizon() -> None:
 
 
 def test_without_a_truth_position_errors_are_absent(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "find_truth", lambda *_: "the test has none")
+    monkeypatch.setattr(scoring, "find_truth", lambda *_: "the test has none")
     advice = advice_of(PENDULUM)
     assert (advice.truth, advice.truth_about, advice.trusted_until) == (None, "the test has none", None)
     assert advice.metric == "joint_error"

@@ -6,28 +6,25 @@ a game steps once a frame and substeps divide the step.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from fractions import Fraction
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
-
-from pydantic import ValidationError
 
 from sandbox.action import Switch
 from sandbox.engines.registry import ENGINES, able, engine_named
-from sandbox.measure.advice.forecast import Risk, forecast, formula_forecast, game_notes
-from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, SAME_VALUE, GameCode, game_code
+from sandbox.measure.advice.assembly import (
+    AdviceMeasurements,
+    assemble_advice,
+    evaluation_key,
+    settings_change,
+)
+from sandbox.measure.advice.forecast import forecast, game_notes
+from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, SAME_VALUE
 from sandbox.measure.advice.result import (
     Advice,
     FallbackKind,
-    Knob,
-    KnobStart,
-    MeasuredSetting,
-    OtherEngine,
     ReplayedActions,
 )
-from sandbox.measure.compare.ground_truth import Truth, find_truth
-from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
 from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
 from sandbox.measure.run.recorder import TooLargeError, require_memory
 from sandbox.measure.run.runner import run
@@ -40,16 +37,14 @@ from sandbox.measure.tradeoff.configuration import (
     evaluate,
     refused_evaluation,
 )
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
-from sandbox.measure.tradeoff.objective import DEFAULT_TOLERANCES, Objective, choose_metric
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.objective import Objective
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
-    format_value,
     nearest_to_tolerance,
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Tradeoff
 from sandbox.measure.tradeoff.search import MIN_RUN_COST, RUN_FRACTION
 from sandbox.measure.tradeoff.study import (
     DEFAULT_EFFORT,
@@ -60,7 +55,6 @@ from sandbox.measure.tradeoff.study import (
 )
 from sandbox.measure.tradeoff.timing import TimedRun, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
-from sandbox.provenance import machine, versions
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -70,16 +64,6 @@ DEFAULT_FPS, DEFAULT_ZOOM = 60.0, 50.0
 """Frames per second, and px/m."""
 MIN_FPS, MAX_FPS = 0.1, 1e6
 """Bounds of the frame rate: dt = 1/fps must be a valid setting."""
-MIN_TRUSTED_FRAMES = 10
-"""Frames that a truth must be trusted for at least, so that errors are those of a motion."""
-SAME_STEP = 1e-9
-"""Relative: a dt that differs from a frame by less is that of a frame."""
-MAX_DENOMINATOR = 1_000_000
-"""Of a dt as a fraction of a second."""
-MAX_SHARED_FACTOR = 64
-"""Frames of a truth in a frame of the game, so that its frames are also those of the present dt."""
-MAX_SHARED_FRAMES = 1_000_000
-"""Frames × bodies of such a truth."""
 SEARCH_REPEATS = 2
 """Timings of a setting during the search; the settings of the advice are then timed again, all in turns."""
 
@@ -137,7 +121,7 @@ def advise(
     if played.world.duration * fps < MIN_STEPS * (1.0 - SAME_STEP):
         raise ValueError(f"the scene lasts {played.world.duration:g} s, fewer than {MIN_STEPS} frames at {fps:g} fps")
     assert tolerance is not None
-    request = _Request(
+    request = AdviceRequest(
         scene=played,
         engine=engine,
         recording=recording,
@@ -176,107 +160,7 @@ def _recorded_scene(recording: Recording) -> Scene:
     return scene.model_copy(update={"solver": common.replace(**own)})
 
 
-@dataclass(frozen=True)
-class _Request:
-    """Arguments of `advise` after their check."""
-
-    scene: Scene
-    engine: str
-    recording: Recording | None
-    fps: float
-    length: float
-    """m, largest accepted error of a position"""
-    budget: float | None
-    zoom: float
-    effort: float
-    deadline: float
-    repeats: int
-    on_progress: ProgressCallback
-
-    @property
-    def frame(self) -> float:
-        """Duration of a frame, s."""
-        return 1.0 / self.fps
-
-    @property
-    def present(self) -> Settings:
-        """The present setting; it is recorded about once a frame."""
-        own = self.scene.solver
-        every = max(1, math.floor(self.frame / own.dt * (1.0 + SAME_STEP)))
-        return own.replace(record_every=every)
-
-    @property
-    def is_in_loop(self) -> bool:
-        """Whether the present dt is that of a frame."""
-        return abs(self.scene.solver.dt * self.fps - 1.0) <= SAME_STEP
-
-    @property
-    def loop(self) -> Settings:
-        """The present setting with the dt of a frame; without substeps, unless it has that dt already."""
-        substeps = self.scene.solver.substeps if self.is_in_loop else 1
-        return self.scene.solver.replace(dt=self.frame, substeps=substeps, record_every=1)
-
-
-class _Score(NamedTuple):
-    """Metric and tolerance of the errors, and the context that they are measured in."""
-
-    metric: str
-    tolerance: float
-    """in the unit of the metric"""
-    reason: str | None
-    """reason why errors are no positions; None if they are"""
-    invariant: str | None
-    """metric that also holds beyond the predictability horizon; None if it is not needed"""
-    invariant_tolerance: float | None
-    """in its unit"""
-    context: EvaluationContext
-    """context at the frames of the game"""
-    present: EvaluationContext
-    """context at the frames of the present dt"""
-    truth: Truth | str
-    """truth at the frames of the game, or the reason why there is none"""
-
-
-@dataclass
-class _Measured:
-    """What has been measured so far; after Ctrl-C the advice is made of it."""
-
-    risks: list[Risk]
-    notes: list[str]
-    present: Evaluation
-    found: Tradeoff | None = None
-    recommended: Evaluation | None = None
-    fallback: Evaluation | None = None
-    fallback_kind: FallbackKind | None = None
-    knob_start: KnobStart | None = None
-    knobs: list[Evaluation] = field(default_factory=list)
-    others: dict[str, Evaluation] = field(default_factory=dict)
-    replays: list[ReplayedActions] = field(default_factory=list)
-    untried_knobs: int = 0
-    within_until: dict[tuple[str, str], float] = field(default_factory=dict)
-    """s, time from which on the error exceeds the tolerance, by `_key`"""
-    timed: dict[tuple[str, str], Evaluation] = field(default_factory=dict)
-    """evaluations with the costs that were timed together, by `_key`"""
-    interrupted: bool = False
-
-    @property
-    def start(self) -> Evaluation | None:
-        """The setting that the knobs are changed from."""
-        starts = {"present": self.present, "recommended": self.recommended, "fallback": self.fallback}
-        return None if self.knob_start is None else starts[self.knob_start]
-
-    def settings(self) -> list[Evaluation]:
-        """Return every setting of the advice, each once."""
-        found = [self.present, self.recommended, self.fallback, *self.knobs, *self.others.values()]
-        return list({_key(each): each for each in found if each is not None}.values())
-
-
-def _key(point: Evaluation) -> tuple[str, str]:
-    """Return engine and settings of an evaluation, which are equal for equal runs."""
-    return point.engine, point.asked.model_dump_json()
-
-
-def _advise(request: _Request) -> Advice:
+def _advise(request: AdviceRequest) -> Advice:
     """Measure, and return the advice; after Ctrl-C, of what was measured before."""
     scene, engine = request.scene, request.engine
     require_memory(scene, request.present, 4 * len(scene.bodies))
@@ -284,9 +168,9 @@ def _advise(request: _Request) -> Advice:
     is_able = not ENGINES[engine].missing(scene, scene.solver)
     risks = forecast(scene, scene.solver, engine, request.fps) if is_able else []
     request.on_progress(Progress("the truth"))
-    score = _score(request)
+    score = find_score(request)
     request.on_progress(Progress("the present setting"))
-    measured = _Measured(risks, game_notes(scene, engine), _evaluate_present(request, score))
+    measured = AdviceMeasurements(risks, game_notes(scene, engine), _evaluate_present(request, score))
     try:
         _search(request, score, measured)
         if not measured.interrupted:
@@ -296,63 +180,10 @@ def _advise(request: _Request) -> Advice:
             _time_settings(request, measured)
     except KeyboardInterrupt:
         measured.interrupted = True
-    return _advice(request, score, measured)
+    return assemble_advice(request, score, measured)
 
 
-def _score(request: _Request) -> _Score:
-    """Find the truth and choose the metric: positions, or an invariant if no truth is trusted for some frames."""
-    scene, present, loop = request.scene, request.present, request.loop
-    tolerance = min(default_tolerance(scene), request.length)
-    shared = _shared_settings(request)
-    truth = find_truth(scene, shared or loop, tolerance)
-    own = truth if shared is not None else find_truth(scene, present, tolerance)
-    context, present_context = (_context(scene, each, request.zoom) for each in (truth, own))
-    trusted = truth.trusted_until if isinstance(truth, Truth) else 0.0
-    metric, reason = choose_metric(context)
-    if trusted >= min(MIN_TRUSTED_FRAMES * request.frame, scene.world.duration) and context.moving.any():
-        invariant = metric.name if trusted < scene.world.duration and metric.name != "max_position" else None
-        limit = None if invariant is None else _limit(metric, request)
-        return _Score("max_position", request.length, None, invariant, limit, context, present_context, truth)
-    if metric.name == "max_position":  # until a time at which hardly anything has moved
-        metric = METRICS["energy"]
-    return _Score(metric.name, _limit(metric, request), reason, None, None, context, present_context, truth)
-
-
-def _limit(metric: Metric, request: _Request) -> float:
-    """Return the tolerance of a metric: that of positions for a length, otherwise the default."""
-    return request.length if metric.unit == "m" else DEFAULT_TOLERANCES[metric.unit]
-
-
-def _context(scene: Scene, truth: Truth | str, zoom: float) -> EvaluationContext:
-    known, doubt = (truth, None) if isinstance(truth, Truth) else (None, truth)
-    return EvaluationContext(scene, known, zoom, doubt)
-
-
-def _shared_settings(request: _Request) -> Settings | None:
-    """Return settings whose frames contain those of the game and of the present setting.
-
-    None if these would be too many frames: each then has a truth of its own.
-    """
-    if request.is_in_loop:
-        return request.loop
-    steps = [Fraction(each).limit_denominator(MAX_DENOMINATOR) for each in (request.frame, request.scene.solver.dt)]
-    if any(
-        abs(float(each) * rate - 1.0) > SAME_STEP
-        for each, rate in zip(steps, (request.fps, 1.0 / request.scene.solver.dt), strict=True)
-    ):
-        return None
-    a, b = steps
-    shared = Fraction(math.gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator)
-    frames = request.scene.world.duration / float(shared) * len(request.scene.bodies)
-    if a / shared > MAX_SHARED_FACTOR or frames > MAX_SHARED_FRAMES:
-        return None
-    try:
-        return request.loop.replace(dt=float(shared))
-    except ValidationError:  # shorter than a dt may be
-        return None
-
-
-def _evaluate_present(request: _Request, score: _Score) -> Evaluation:
+def _evaluate_present(request: AdviceRequest, score: AdviceScore) -> Evaluation:
     """Measure the present setting, with its own dt."""
     scene, engine, present = request.scene, request.engine, request.present
     missing = ENGINES[engine].missing(scene, present)
@@ -363,7 +194,7 @@ def _evaluate_present(request: _Request, score: _Score) -> Evaluation:
     return evaluate(space.starts()[0], space, [score.present], score.metric, limit)
 
 
-def _search(request: _Request, score: _Score, measured: _Measured) -> None:
+def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> None:
     """Search for the cheapest setting of every engine, and choose the recommended one of the present engine."""
     left = request.deadline - clock_without_compilation()
     if left <= 0.0:
@@ -402,7 +233,7 @@ def _search(request: _Request, score: _Score, measured: _Measured) -> None:
 
 
 def _fallback(
-    points: Sequence[Evaluation], objective: Objective, score: _Score, has_cheapest: bool
+    points: Sequence[Evaluation], objective: Objective, score: AdviceScore, has_cheapest: bool
 ) -> tuple[Evaluation | None, FallbackKind | None]:
     """Return another setting, in case that the recommended one is missing or over the budget.
 
@@ -417,7 +248,7 @@ def _fallback(
             objective.budget is None or kept.point.frame_time(objective.fps) <= objective.budget
         )
         if kept is not None and is_affordable:
-            return next(point for point in points if _key(point) == _key(kept.point)), "invariant"
+            return next(point for point in points if evaluation_key(point) == evaluation_key(kept.point)), "invariant"
     affordable = recommend_most_accurate(points, objective, (), lambda point: point.ranking_error)
     if affordable is not None:
         return affordable.point, "budget"
@@ -425,7 +256,7 @@ def _fallback(
     return (None, None) if nearest is None else (nearest.point, "accuracy")
 
 
-def _turn_knobs(request: _Request, score: _Score, measured: _Measured) -> None:
+def _turn_knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> None:
     """Measure every single change of the present setting, or of the recommended one if the present dt is no frame."""
     if request.is_in_loop and measured.present.status == "ok":
         measured.knob_start = "present"
@@ -445,7 +276,9 @@ def _turn_knobs(request: _Request, score: _Score, measured: _Measured) -> None:
         if clock_without_compilation() > request.deadline:
             measured.untried_knobs += 1
             continue
-        request.on_progress(Progress(f"knobs: {_change(space.resolved(configuration), space.resolved(neighbour))}"))
+        request.on_progress(
+            Progress(f"knobs: {settings_change(space.resolved(configuration), space.resolved(neighbour))}")
+        )
         limit = max(RUN_FRACTION * request.effort, 2.0 * measured.start.counted_seconds)
         measured.knobs.append(evaluate(neighbour, space, [score.context], score.metric, limit, request.deadline))
     if measured.recommended is None and not is_random(request.scene):  # other seeds would have to confirm it
@@ -453,7 +286,7 @@ def _turn_knobs(request: _Request, score: _Score, measured: _Measured) -> None:
         measured.recommended = min(within, key=lambda each: each.counted_seconds, default=None)
 
 
-def _find_excess(request: _Request, score: _Score, measured: _Measured) -> None:
+def _find_excess(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> None:
     """Find the time from which on the errors of the present setting and of the fallback exceed the tolerance."""
     if score.metric != "max_position":
         return
@@ -464,7 +297,7 @@ def _find_excess(request: _Request, score: _Score, measured: _Measured) -> None:
         found, _ = bounded_run(request.scene, point.engine, point.asked, limit, audit=False)
         excess = context.errors(found).first_above(score.tolerance, context.until)
         if excess is not None:
-            measured.within_until[_key(point)] = excess
+            measured.within_until[evaluation_key(point)] = excess
 
 
 def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Configuration]:
@@ -478,7 +311,7 @@ def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Confi
     return [changed] if is_new else []
 
 
-def _replay_actions(request: _Request, measured: _Measured) -> None:
+def _replay_actions(request: AdviceRequest, measured: AdviceMeasurements) -> None:
     """Run the present and the recommended setting with the actions of a recording."""
     if request.recording is None or not request.recording.actions:
         return
@@ -498,7 +331,7 @@ def _replay_actions(request: _Request, measured: _Measured) -> None:
             measured.replays.append(ReplayedActions(name, found.status, found.reason, missed))
 
 
-def _time_settings(request: _Request, measured: _Measured) -> None:
+def _time_settings(request: AdviceRequest, measured: AdviceMeasurements) -> None:
     """Time every setting of the advice in turns, so that their ratios do not depend on the load of the machine."""
     request.on_progress(Progress("timing"))
     successful = [each for each in measured.settings() if each.status == "ok"]
@@ -507,138 +340,7 @@ def _time_settings(request: _Request, measured: _Measured) -> None:
     repeats = min(request.repeats, max(MIN_REPEATS, affordable))
     timings = time_in_turns([TimedRun(request.scene, each.engine, each.asked) for each in successful], repeats)
     measured.timed = {
-        _key(each): each.with_timing(timing)
+        evaluation_key(each): each.with_timing(timing)
         for each, timing in zip(successful, timings, strict=True)
         if timing is not None
     }
-
-
-def _advice(request: _Request, score: _Score, measured: _Measured) -> Advice:
-    """Return the advice of what was measured."""
-    scene, truth, found, metric = request.scene, score.truth, measured.found, METRICS[score.metric]
-    present = _measured_setting(measured.present, score, measured, request)
-    recommended, fallback = (
-        None if each is None else _measured_setting(each, score, measured, request)
-        for each in (measured.recommended, measured.fallback)
-    )
-    chosen = recommended or fallback
-    advice = Advice(
-        scene=scene.title,
-        engine=request.engine,
-        fps=request.fps,
-        zoom=request.zoom,
-        metric=metric.name,
-        metric_about=metric.about,
-        metric_reason=score.reason,
-        unit=metric.unit,
-        tolerance=score.tolerance,
-        tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
-        budget=request.budget,
-        invariant=score.invariant,
-        invariant_tolerance=score.invariant_tolerance,
-        truth=truth.kind if isinstance(truth, Truth) else None,
-        truth_about=truth.about if isinstance(truth, Truth) else truth,
-        trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
-        duration=scene.world.duration,
-        risks=tuple(measured.risks),
-        notes=tuple(measured.notes),
-        present=present,
-        is_in_loop=request.is_in_loop,
-        recommended=recommended,
-        fallback=fallback,
-        fallback_kind=measured.fallback_kind,
-        remaining_risks=_remaining_risks(request, chosen),
-        knob_start=measured.knob_start,
-        knob_setting=None if measured.start is None else _measured_setting(measured.start, score, measured, request),
-        knobs=_knobs(request, score, measured),
-        others=_other_engines(request, score, measured),
-        code=_code(request, chosen),
-        recorded_actions=0 if request.recording is None else len(request.recording.actions),
-        replays=tuple(measured.replays),
-        tried=0 if found is None else sum(point.status != "refused" for point in found.points),
-        untried=measured.untried_knobs + (0 if found is None else found.untried),
-        out_of_time=clock_without_compilation() > request.deadline,
-        interrupted=measured.interrupted,
-        machine=machine(),
-        versions=versions(),
-    )
-    return replace(advice, fallback=None, fallback_kind=None) if advice.is_met else advice
-
-
-def _measured_setting(point: Evaluation, score: _Score, measured: _Measured, request: _Request) -> MeasuredSetting:
-    """Return an evaluation with its error on the screen, and its cost if it was timed."""
-    is_length = METRICS[score.metric].unit == "m"
-    timed, present = measured.timed.get(_key(point)), measured.timed.get(_key(measured.present))
-    return MeasuredSetting(
-        engine=point.engine,
-        settings=point.settings,
-        asked=point.asked,
-        status=point.status,
-        reason=point.reason,
-        error=point.error,
-        error_px=point.error * request.zoom if is_length and point.error is not None else None,
-        invariant=None if score.invariant is None else point.metrics.get(score.invariant),
-        missed_contacts=point.metrics.get("missed_contacts"),
-        within_until=measured.within_until.get(_key(point)),
-        frame_ms=None if timed is None else timed.frame_time(request.fps),
-        ratio=_ratio(None if timed is None else timed.cost_median, None if present is None else present.cost_median),
-        repeats=0 if timed is None else timed.repeats,
-    )
-
-
-def _ratio(value: float | None, base: float | None) -> float | None:
-    """Return value / base; None if one is unknown or the base is 0."""
-    return value / base if value is not None and base else None
-
-
-def _remaining_risks(request: _Request, chosen: MeasuredSetting | None) -> tuple[Risk, ...]:
-    if chosen is None:
-        return ()
-    return tuple(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps))
-
-
-def _code(request: _Request, chosen: MeasuredSetting | None) -> GameCode | None:
-    if chosen is None:
-        return None
-    is_slop_stated = request.scene.solver.slop is not None
-    return game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
-
-
-def _knobs(request: _Request, score: _Score, measured: _Measured) -> tuple[Knob, ...]:
-    """Return the effect of each knob that was measured."""
-    if measured.start is None:
-        return ()
-    start, found = _measured_setting(measured.start, score, measured, request), []
-    for point in measured.knobs:
-        setting = _measured_setting(point, score, measured, request)
-        cost_ratio = _ratio(setting.frame_ms, start.frame_ms)
-        error_ratio = _ratio(setting.error, start.error)
-        found.append(Knob(_change(start.settings, setting.settings), setting, cost_ratio, error_ratio))
-    return tuple(found)
-
-
-def _change(before: Settings, after: Settings) -> str:
-    """Return the differences of two resolved settings: `substeps 4 → 8`."""
-    old, new = before.model_dump(), after.model_dump()
-    names = [key for key in old if old[key] != new[key] and key not in ("dt", "record_every")]
-    return ", ".join(f"{key} {_value(old[key])} → {_value(new[key])}" for key in names)
-
-
-def _value(value: object) -> str:
-    return "default" if value is None else format_value(value)
-
-
-def _other_engines(request: _Request, score: _Score, measured: _Measured) -> tuple[OtherEngine, ...]:
-    """Return the price of every engine but the present one."""
-    if measured.found is None:
-        return ()
-    refused = {point.engine: point.reason for point in measured.found.points if point.status == "refused"}
-    found = []
-    for name in ENGINES:
-        point = measured.others.get(name)
-        if name == request.engine:
-            continue
-        setting = None if point is None else _measured_setting(point, score, measured, request)
-        is_within = setting is not None and setting.error is not None and setting.error <= score.tolerance
-        found.append(OtherEngine(name, setting, is_within, refused.get(name)))
-    return tuple(found)

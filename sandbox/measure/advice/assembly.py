@@ -1,0 +1,201 @@
+"""Measurements of an advice, and the advice made of them; after Ctrl-C of those that there are."""
+
+from dataclasses import dataclass, field, replace
+
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.advice.forecast import Risk, formula_forecast
+from sandbox.measure.advice.game_code import GameCode, game_code
+from sandbox.measure.advice.result import (
+    Advice,
+    FallbackKind,
+    Knob,
+    KnobStart,
+    MeasuredSetting,
+    OtherEngine,
+    ReplayedActions,
+)
+from sandbox.measure.advice.scoring import AdviceRequest, AdviceScore
+from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.run.bounded_run import clock_without_compilation
+from sandbox.measure.tradeoff.configuration import (
+    Evaluation,
+)
+from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.recommendation import (
+    format_value,
+)
+from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.provenance import machine, versions
+from sandbox.scene.description.world import Settings
+
+
+@dataclass
+class AdviceMeasurements:
+    """What has been measured so far; after Ctrl-C the advice is made of it."""
+
+    risks: list[Risk]
+    notes: list[str]
+    present: Evaluation
+    found: Tradeoff | None = None
+    recommended: Evaluation | None = None
+    fallback: Evaluation | None = None
+    fallback_kind: FallbackKind | None = None
+    knob_start: KnobStart | None = None
+    knobs: list[Evaluation] = field(default_factory=list)
+    others: dict[str, Evaluation] = field(default_factory=dict)
+    replays: list[ReplayedActions] = field(default_factory=list)
+    untried_knobs: int = 0
+    within_until: dict[tuple[str, str], float] = field(default_factory=dict)
+    """s, time from which on the error exceeds the tolerance, by `evaluation_key`"""
+    timed: dict[tuple[str, str], Evaluation] = field(default_factory=dict)
+    """evaluations with the costs that were timed together, by `evaluation_key`"""
+    interrupted: bool = False
+
+    @property
+    def start(self) -> Evaluation | None:
+        """The setting that the knobs are changed from."""
+        starts = {"present": self.present, "recommended": self.recommended, "fallback": self.fallback}
+        return None if self.knob_start is None else starts[self.knob_start]
+
+    def settings(self) -> list[Evaluation]:
+        """Return every setting of the advice, each once."""
+        found = [self.present, self.recommended, self.fallback, *self.knobs, *self.others.values()]
+        return list({evaluation_key(each): each for each in found if each is not None}.values())
+
+
+def evaluation_key(point: Evaluation) -> tuple[str, str]:
+    """Return engine and settings of an evaluation, which are equal for equal runs."""
+    return point.engine, point.asked.model_dump_json()
+
+
+def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> Advice:
+    """Return the advice of what was measured."""
+    scene, truth, found, metric = request.scene, score.truth, measured.found, METRICS[score.metric]
+    present = _measured_setting(measured.present, score, measured, request)
+    recommended, fallback = (
+        None if each is None else _measured_setting(each, score, measured, request)
+        for each in (measured.recommended, measured.fallback)
+    )
+    chosen = recommended or fallback
+    advice = Advice(
+        scene=scene.title,
+        engine=request.engine,
+        fps=request.fps,
+        zoom=request.zoom,
+        metric=metric.name,
+        metric_about=metric.about,
+        metric_reason=score.reason,
+        unit=metric.unit,
+        tolerance=score.tolerance,
+        tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
+        budget=request.budget,
+        invariant=score.invariant,
+        invariant_tolerance=score.invariant_tolerance,
+        truth=truth.kind if isinstance(truth, Truth) else None,
+        truth_about=truth.about if isinstance(truth, Truth) else truth,
+        trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
+        duration=scene.world.duration,
+        risks=tuple(measured.risks),
+        notes=tuple(measured.notes),
+        present=present,
+        is_in_loop=request.is_in_loop,
+        recommended=recommended,
+        fallback=fallback,
+        fallback_kind=measured.fallback_kind,
+        remaining_risks=_remaining_risks(request, chosen),
+        knob_start=measured.knob_start,
+        knob_setting=None if measured.start is None else _measured_setting(measured.start, score, measured, request),
+        knobs=_knobs(request, score, measured),
+        others=_other_engines(request, score, measured),
+        code=_code(request, chosen),
+        recorded_actions=0 if request.recording is None else len(request.recording.actions),
+        replays=tuple(measured.replays),
+        tried=0 if found is None else sum(point.status != "refused" for point in found.points),
+        untried=measured.untried_knobs + (0 if found is None else found.untried),
+        out_of_time=clock_without_compilation() > request.deadline,
+        interrupted=measured.interrupted,
+        machine=machine(),
+        versions=versions(),
+    )
+    return replace(advice, fallback=None, fallback_kind=None) if advice.is_met else advice
+
+
+def _measured_setting(
+    point: Evaluation, score: AdviceScore, measured: AdviceMeasurements, request: AdviceRequest
+) -> MeasuredSetting:
+    """Return an evaluation with its error on the screen, and its cost if it was timed."""
+    is_length = METRICS[score.metric].unit == "m"
+    timed, present = measured.timed.get(evaluation_key(point)), measured.timed.get(evaluation_key(measured.present))
+    return MeasuredSetting(
+        engine=point.engine,
+        settings=point.settings,
+        asked=point.asked,
+        status=point.status,
+        reason=point.reason,
+        error=point.error,
+        error_px=point.error * request.zoom if is_length and point.error is not None else None,
+        invariant=None if score.invariant is None else point.metrics.get(score.invariant),
+        missed_contacts=point.metrics.get("missed_contacts"),
+        within_until=measured.within_until.get(evaluation_key(point)),
+        frame_ms=None if timed is None else timed.frame_time(request.fps),
+        ratio=_ratio(None if timed is None else timed.cost_median, None if present is None else present.cost_median),
+        repeats=0 if timed is None else timed.repeats,
+    )
+
+
+def _ratio(value: float | None, base: float | None) -> float | None:
+    """Return value / base; None if one is unknown or the base is 0."""
+    return value / base if value is not None and base else None
+
+
+def _remaining_risks(request: AdviceRequest, chosen: MeasuredSetting | None) -> tuple[Risk, ...]:
+    if chosen is None:
+        return ()
+    return tuple(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps))
+
+
+def _code(request: AdviceRequest, chosen: MeasuredSetting | None) -> GameCode | None:
+    if chosen is None:
+        return None
+    is_slop_stated = request.scene.solver.slop is not None
+    return game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
+
+
+def _knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> tuple[Knob, ...]:
+    """Return the effect of each knob that was measured."""
+    if measured.start is None:
+        return ()
+    start, found = _measured_setting(measured.start, score, measured, request), []
+    for point in measured.knobs:
+        setting = _measured_setting(point, score, measured, request)
+        cost_ratio = _ratio(setting.frame_ms, start.frame_ms)
+        error_ratio = _ratio(setting.error, start.error)
+        found.append(Knob(settings_change(start.settings, setting.settings), setting, cost_ratio, error_ratio))
+    return tuple(found)
+
+
+def settings_change(before: Settings, after: Settings) -> str:
+    """Return the differences of two resolved settings: `substeps 4 → 8`."""
+    old, new = before.model_dump(), after.model_dump()
+    names = [key for key in old if old[key] != new[key] and key not in ("dt", "record_every")]
+    return ", ".join(f"{key} {_value(old[key])} → {_value(new[key])}" for key in names)
+
+
+def _value(value: object) -> str:
+    return "default" if value is None else format_value(value)
+
+
+def _other_engines(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> tuple[OtherEngine, ...]:
+    """Return the price of every engine but the present one."""
+    if measured.found is None:
+        return ()
+    refused = {point.engine: point.reason for point in measured.found.points if point.status == "refused"}
+    found = []
+    for name in ENGINES:
+        point = measured.others.get(name)
+        if name == request.engine:
+            continue
+        setting = None if point is None else _measured_setting(point, score, measured, request)
+        is_within = setting is not None and setting.error is not None and setting.error <= score.tolerance
+        found.append(OtherEngine(name, setting, is_within, refused.get(name)))
+    return tuple(found)
