@@ -9,7 +9,7 @@ import pytest
 import sandbox
 from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.advice import Advice, advise, study
+from sandbox.measure.advice import Advice, advise, scoring, study
 from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, game_code
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
