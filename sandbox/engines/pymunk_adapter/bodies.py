@@ -24,7 +24,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides, Point
 from sandbox.scene.description.world import Settings
-from sandbox.scene.geometry.shapes import UNTURNABLE
 
 if TYPE_CHECKING:
     from sandbox.engines.tabletop.stepper import TabletopStepper
@@ -267,7 +266,7 @@ class PymunkBodies:
         self.particles.rebuild_arrays(*state, bodies)
         self.particles.join(indices[is_particle & ~bodies.fixed[indices]])
         # In the space, a body that nothing can turn gets no moment. A particle keeps it, for torques of actions.
-        moment = np.where(matrix.turnable & (bodies.moment < UNTURNABLE), bodies.moment, math.inf)
+        moment = np.where(matrix.turnable, bodies.moment, math.inf)
         in_space = indices[~is_particle]
         position, velocity, angle, spin = (array[in_space] for array in state)
         self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])

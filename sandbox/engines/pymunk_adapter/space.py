@@ -34,7 +34,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
-from sandbox.scene.geometry.shapes import UNTURNABLE
 
 
 class SpaceBodies(SpaceBodyTable):
@@ -246,8 +245,7 @@ class SpaceBodies(SpaceBodyTable):
         for index, (_, shapes) in self._members.items():
             for piece, shape in shapes:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
-            is_turnable = matrix.turnable[index] and self._moments[index] < UNTURNABLE
-            needs_moment = is_turnable and math.isinf(self.moment(index))
+            needs_moment = matrix.turnable[index] and math.isinf(self.moment(index))
             if needs_moment and index not in self.drives.indices:
                 self.give_moment(index, float(self._moments[index]))
         if self.drives.driven_bodies:

@@ -14,13 +14,14 @@ from sandbox.scene.compile.potential import both_present, is_broken_at, turned_b
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.shapes import UNTURNABLE
 from sandbox.schedule import frame_count
 from sandbox.trajectory import Trajectory
 
 AT_REST_FRACTION = 1e-4
-"""A scene with other bodies than balls counts as at rest if its kinetic energy is below this fraction of the energy
-that lifts all bodies by their own width. Its motion is then an artefact of the solver, and a relative drift means
-nothing.
+"""A scene with other bodies than balls that can turn counts as at rest if its kinetic energy is below this fraction of
+the energy that lifts all bodies by their own width. Its motion is then an artefact of the solver, and a relative drift
+means nothing.
 """
 
 
@@ -56,7 +57,9 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
         scale = float(truth_energy.kinetic.max())
         if trusted:
             change -= float(truth_energy.total[-1] - truth_energy.total[0])
-    if not scene.bodies.round.all() and scale < AT_REST_FRACTION * _lift_energy(scene):
+    bodies = scene.bodies
+    can_rest = not bodies.round.all() or (bodies.moment >= UNTURNABLE).any()  # a ball on a slope rolls
+    if can_rest and scale < AT_REST_FRACTION * _lift_energy(scene):
         return EnergyDrift(0.0 if change == 0.0 else None, against)
     return EnergyDrift(_ratio(change, scale), against)
 

@@ -26,7 +26,7 @@ from sandbox.scene.description.base import BodySource, HasMaterial
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.description.world import Kick
-from sandbox.scene.geometry.shapes import geometry_of
+from sandbox.scene.geometry.shapes import UNTURNABLE, geometry_of
 
 
 class ContactMaterial(NamedTuple):
@@ -316,7 +316,9 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
         can_enter_zone=_can_enter_zone(scene, bodies, reached) & ~is_driven(scene, bodies),
-        turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True)) & ~bodies.fixed,
+        turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True))
+        & ~bodies.fixed
+        & (bodies.moment < UNTURNABLE),
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
         solid=np.isin(np.arange(size), surface[can_touch & ~kinds.ball]),

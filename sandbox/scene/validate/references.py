@@ -163,6 +163,8 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
         yield "body", f"{drive.body!r} already has a drive; a body can have one drive only"
     if single.fixed:
         yield "body", f"{drive.body!r} is fixed; remove `fixed`, because the drive holds the body"
+    if single.fixed_rotation and not isinstance(drive, PlungerDrive):
+        yield "body", f"{drive.body!r} has a fixed rotation; remove `fixed_rotation`, because the drive turns the body"
     if any(single.velocity) or single.angular_velocity:
         yield "body", f"{drive.body!r} has an initial velocity; a driven body must start at rest"
     if any(thrust.body == drive.body for thrust in scene.thrusts):

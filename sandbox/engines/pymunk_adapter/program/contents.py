@@ -17,7 +17,7 @@ from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Collides
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
-from sandbox.scene.geometry.shapes import UNTURNABLE, geometry_of
+from sandbox.scene.geometry.shapes import geometry_of
 
 
 def literal(value: object) -> str:
@@ -195,7 +195,7 @@ class Contents:
         else:
             new = "body = pymunk.Body({mass}, {moment})"
             moment = float(bodies.moment[index])
-            is_turnable = self._matrix.turnable[index] and moment < UNTURNABLE
+            is_turnable = self._matrix.turnable[index]
             values |= {
                 "velocity": literal(tuple(bodies.velocity[index].tolist())),
                 "angular_velocity": literal(float(bodies.angular_velocity[index])),
