@@ -442,7 +442,6 @@ def test_generator_becomes_data_and_a_loop() -> None:
 
 @pytest.mark.parametrize("name", [*CONTENTS, "ragdoll_stairs", "chain_of_20"])
 def test_programs_are_clean(name: str, tmp_path: Path) -> None:
-    pytest.importorskip("ruff")
     scene = loads(BASE + CONTENTS[name]) if name in CONTENTS else load(_path_of(name))
     path = tmp_path / "game.py"
     path.write_text(program_text(scene), encoding="utf-8")
