@@ -12,7 +12,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.compile.filters import bits_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import mask_of
 from sandbox.scene.geometry.neighbours import near_pairs

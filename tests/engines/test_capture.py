@@ -227,6 +227,16 @@ def omitted_of(change: Callable[[pymunk.Space, pymunk.Body, pymunk.Shape], objec
     return "\n".join(captured.omitted)
 
 
+def add_many_categories(space: pymunk.Space) -> None:
+    """Add a ring of balls, each of which collides with its neighbours only."""
+    for k in range(12):
+        body = pymunk.Body(1, 1)
+        body.position = 20 * k, 1000
+        circle = pymunk.Circle(body, 1)
+        circle.filter = pymunk.ShapeFilter(categories=1 << k, mask=1 << (k + 1) % 12 | 1 << (k - 1) % 12)
+        space.add(body, circle)
+
+
 def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
     pymunk.Body.update_velocity(body, gravity, damping, dt)
 
@@ -241,8 +251,11 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
         (lambda s, b, c: b.apply_force_at_local_point((1, 0)), "force on body-1"),
         (lambda s, b, c: setattr(c, "elasticity", 1.5), "elasticity of 1.5"),
         (lambda s, b, c: setattr(c, "surface_velocity", (1, 0)), "surface velocities"),
-        (lambda s, b, c: setattr(next(iter(s.shapes)), "filter", pymunk.ShapeFilter(mask=0)), "categories and masks"),
-        (lambda s, b, c: setattr(next(iter(s.shapes)), "filter", pymunk.ShapeFilter(group=3)), "groups of static"),
+        (
+            lambda s, b, c: [setattr(each, "filter", pymunk.ShapeFilter(group=3)) for each in s.shapes],
+            "groups of static",
+        ),
+        (lambda s, b, c: add_many_categories(s), "categories and masks of shape filters, of which more than 10 differ"),
         (lambda s, b, c: setattr(c, "sensor", True), "sensor shapes"),
         (lambda s, b, c: s.add(pymunk.RatchetJoint(s.static_body, b, 0, 1)), "a RatchetJoint"),
         (lambda s, b, c: s.add(pymunk.GearJoint(b, s.static_body, 0, 1)), "whose second body is the world"),
@@ -278,6 +291,28 @@ def test_filters_that_a_scene_can_state_are_kept(names: tuple[str, ...]) -> None
     if "none" in names:
         assert any("outside of its space" in each for each in captured.inexact)
     else:
+        assert max(differences) == 0.0 and not captured.inexact
+
+
+@settings(max_examples=10, deadline=None)
+@given(
+    filters=st.lists(st.tuples(st.integers(0, 0b1111), st.integers(0, 0b1111)), min_size=3, max_size=6),
+    walls=st.tuples(st.integers(0, 0b1111), st.integers(0, 0b1111)),
+)
+def test_categories_and_masks_are_kept(filters: list[tuple[int, int]], walls: tuple[int, int]) -> None:
+    space, rng = space_with_walls(), random.Random(5)
+    for wall in space.shapes:
+        wall.filter, wall.friction = pymunk.ShapeFilter(categories=walls[0], mask=walls[1]), 0.5
+    for k in range(15):
+        body = pymunk.Body(1, 100)
+        body.position = rng.uniform(-80, 80), rng.uniform(20, 120)
+        circle = pymunk.Circle(body, 8)
+        categories, mask = filters[k % len(filters)]
+        circle.filter, circle.friction = pymunk.ShapeFilter(categories=categories, mask=mask), 0.5
+        space.add(body, circle)
+    captured, differences = compare(space, 60)
+    assert not captured.omitted
+    if not any("outside of its space" in each for each in captured.inexact):
         assert max(differences) == 0.0 and not captured.inexact
 
 

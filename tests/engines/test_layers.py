@@ -12,7 +12,8 @@ import sandbox
 from sandbox.action import ActionError, Launch, Spawn, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.scene.compile.contacts import contact_matrix, reachable_layers
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.filters import reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document

@@ -281,6 +281,14 @@ PROOFS: dict[Demand, Proof] = {
         ),
         both(position(2.0, 0.0), position(0.75, 0.7, body=1)),
     ),
+    # the first wall is not in the ball's mask, the second one is
+    Demand.CATEGORIES: Proof(
+        scene(
+            ball=[ball(vx=2.0, mask=["wall"], restitution=1.0)],
+            wall=[{**WALL, "categories": ["curtain"]}, {"points": [[1.5, -9.0], [1.5, 9.0]], "restitution": 1.0}],
+        ),
+        position(0.5, 0.0),
+    ),
     # the second ball stands in the way of the first, which passes it
     Demand.GROUPS: Proof(
         scene(ball=[ball(vx=2.0, group="a"), ball(1.0, group="a", name="passed"), ball(1.0, 5.0, name="apart")]),

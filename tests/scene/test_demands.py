@@ -168,6 +168,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.CURL, True, {"surface": {"bodies": "pucks", "sliding_friction": 0.2, "curl": 0.1}}, "κ = 0.1"),
     (Demand.CURL, False, {"surface": {"bodies": "pucks", "curl": 0.1}, "ball": [BALL]}, "no puck curls"),
     (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
+    (Demand.CATEGORIES, True, {"ball": [{**BALL, "categories": ["player"], "mask": ["enemy"]}]}, "player, enemy"),
+    (Demand.CATEGORIES, False, {"ball": [BALL]}, "no object names a category"),
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.GROUPS, False, {"ball": [BALL]}, "no body names a group"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),

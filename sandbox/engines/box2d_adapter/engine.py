@@ -9,6 +9,7 @@ from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS
 from sandbox.engines.box2d_adapter.materials import unmixable
 from sandbox.engines.box2d_adapter.requirements import joint_faults, size_faults, surfaces_in_use
 from sandbox.engines.common.base import slop_of
+from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import BALLS, Demand, unmodelled
@@ -39,6 +40,9 @@ ABSENT = {
 }
 """Settings that Box2D does not have, with the reason"""
 
+FILTER_BITS = 64
+"""Bits of Box2D's collision filters."""
+
 OWN = frozenset(
     {
         Demand.POLYGONS,
@@ -55,6 +59,7 @@ OWN = frozenset(
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
+        Demand.CATEGORIES,
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
@@ -97,7 +102,7 @@ class Box2DEngine:
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that Box2D does not support."""
         setup = Setup.of(start)
-        missing = unmodelled(setup, self.capabilities)
+        missing = [*unmodelled(setup, self.capabilities), *too_many_categories(setup.scene, FILTER_BITS)]
         for key, method in FIXED_METHODS.items():
             stated = getattr(settings, key)
             if stated not in (None, method):

@@ -32,10 +32,10 @@ from sandbox.engines.box2d_adapter.materials import ShapeMaterials, shape_materi
 from sandbox.engines.box2d_adapter.requirements import surfaces_in_use
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.colliders import wall_segments
-from sandbox.engines.common.collision_bits import collision_bits
+from sandbox.engines.common.collision_bits import bits_of_body, bits_of_static, collision_bits
 from sandbox.engines.common.contact_log import ContactBatch
 from sandbox.scene.description.base import BACKING
-from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
+from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
 from sandbox.scene.description.world import Settings
 
 
@@ -236,14 +236,15 @@ class Box2DWorld:
 
     def _roles(self, index: int) -> list[ShapeRole]:
         """Return the role of each kind of shape that a body has: one, or one for each kind of partner."""
-        bodies, layers = self._store.bodies, 1 << int(self._store.layer[index])
-        fixed, collides = bool(bodies.fixed[index]), bodies.elements[bodies.element[index]].collides
-        categories, mask = collision_bits(fixed, collides, layers)
-        if fixed:
+        store = self._store
+        categories, mask = bits_of_body(store.scene, store.bodies, index, int(store.layer[index]))
+        if store.bodies.fixed[index]:
             return [ShapeRole(categories, mask, "static")]
         if not self._materials.is_split:
             return [ShapeRole(categories, mask, "against_moving")]
-        static, _ = collision_bits(True, collides, layers)
+        count = len(store.scene.categories)
+        every_layer, every_category = (1 << len(store.scene.layers)) - 1, (1 << max(count, 1)) - 1
+        static, _ = collision_bits(True, "all", every_layer, every_category, count=count)
         roles = (
             ShapeRole(categories, mask & static, "against_static"),
             ShapeRole(categories, mask & ~static, "against_moving"),
@@ -302,7 +303,7 @@ class Box2DWorld:
         self._shapes[index] = []
         if isinstance(collider, Plane) or collider.solid:
             surface = int(self._store.contact_matrix.surfaces.of_fixed[k])
-            role = ShapeRole(*collision_bits(True, "all", mask_of(collider.layers, scene.layers)), "static")
+            role = ShapeRole(*bits_of_static(scene, collider), "static")
             for geometry in self._static_geometries(collider):
                 shape = body.create_shape(self._shape_def(index, surface, role), geometry)
                 self._shapes[index].append((role, shape))

@@ -443,6 +443,10 @@ def _spawn(action: Spawn, target: ActionTarget) -> None:
         raise ActionError(f"a body or fixed object is already named {name!r}")
     if single.layer not in scene.layers:
         raise ActionError(f"no layer is named {single.layer!r}; layers: {', '.join(scene.layers)}")
+    unknown = [name for name in (*(single.categories or ()), *(single.mask or ())) if name not in scene.categories]
+    if unknown:
+        known = ", ".join(scene.categories) or "none"
+        raise ActionError(f"no category is named {unknown[0]!r}; categories of the scene: {known}")
     if len(target.bodies) >= MAX_BODIES:
         raise ActionError(f"the scene already has {MAX_BODIES:,} bodies, which is the limit")
     alone_scene = scene_of_one_body(scene, single)

@@ -1,22 +1,76 @@
-"""Collision filters as bits: categories and masks of bodies and static colliders, for engines that filter by them."""
+"""Collision filters as bits: categories and masks of bodies and static colliders, for engines that filter by them.
 
+An engine's category stands for a kind of body on one layer and in one category of the scene. Two shapes then collide
+exactly if their kinds, layers and categories all allow it, because each side of that condition is an intersection.
+"""
+
+from collections.abc import Iterator
+
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.filters import bits_of_categories
 from sandbox.scene.description.base import Collides
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.scene import SceneDescription
 
 STATIC, COLLIDES_ALL, COLLIDES_FIXED = 0b001, 0b010, 0b100
-"""Collision categories: static and fixed bodies; bodies that collide with everything; bodies that collide with the
-first category only."""
+"""Kinds: static and fixed bodies; bodies that collide with everything; bodies that collide with the first kind only."""
 
-CATEGORIES_PER_LAYER = 3
-"""number of categories on each layer: those of layer k are shifted by 3·k bits"""
+KINDS = 3
+"""number of kinds; bit 3·(C·layer + category) + kind belongs to a kind, with C categories in the scene"""
 
 
-def collision_bits(fixed: bool, collides: Collides, layers: int = 1) -> tuple[int, int]:
-    """Return the categories of a shape on some layers, given as bits, and the categories that it collides with."""
+def bits_of_body(scene: SceneDescription, bodies: Bodies, index: int, layer: int) -> tuple[int, int]:
+    """Return the categories of a body on a layer, and those that it collides with."""
+    element = bodies.elements[bodies.element[index]]
+    names = bits_of_categories(element, scene.categories)
+    return collision_bits(bool(bodies.fixed[index]), element.collides, 1 << layer, *names, len(scene.categories))
+
+
+def bits_of_static(scene: SceneDescription, collider: Plane | Wall | Post) -> tuple[int, int]:
+    """Return the categories of a static collider, and those that it collides with: none if it is not solid."""
+    is_solid = isinstance(collider, Plane) or collider.solid
+    names = bits_of_categories(collider, scene.categories)
+    layers = mask_of(collider.layers, scene.layers)
+    return collision_bits(True, "all" if is_solid else "none", layers, *names, len(scene.categories))
+
+
+def collision_bits(
+    fixed: bool, collides: Collides, layers: int = 1, categories: int = 1, mask: int = 1, count: int = 1
+) -> tuple[int, int]:
+    """Return the categories of a shape as an engine has them, and those that it collides with.
+
+    Args:
+        fixed: whether its body never moves.
+        collides: what it collides with.
+        layers: that it is on, as bits.
+        categories: of the scene that it belongs to, as bits.
+        mask: categories of the scene that it collides with, as bits.
+        count: number of categories in the scene; 0 is one, to which all belong.
+    """
     if fixed:
-        categories, mask = STATIC, COLLIDES_ALL | COLLIDES_FIXED if collides == "all" else 0
+        kind, kinds = STATIC, COLLIDES_ALL | COLLIDES_FIXED if collides == "all" else 0
     elif collides == "all":
-        categories, mask = COLLIDES_ALL, STATIC | COLLIDES_ALL
+        kind, kinds = COLLIDES_ALL, STATIC | COLLIDES_ALL
     else:
-        categories, mask = COLLIDES_FIXED, STATIC
-    layer_bits = sum(1 << CATEGORIES_PER_LAYER * k for k in range(layers.bit_length()) if layers >> k & 1)
-    return categories * layer_bits, mask * layer_bits
+        kind, kinds = COLLIDES_FIXED, STATIC
+    return _repeated(kind, layers, categories, count), _repeated(kinds, layers, mask, count)
+
+
+def _repeated(kinds: int, layers: int, categories: int, count: int) -> int:
+    """Return the bits of some kinds on some layers and in some categories."""
+    return sum(kinds << KINDS * (max(count, 1) * layer + k) for layer in _ones(layers) for k in _ones(categories))
+
+
+def _ones(bits: int) -> Iterator[int]:
+    """Yield the positions of the bits that are set."""
+    return (k for k in range(bits.bit_length()) if bits >> k & 1)
+
+
+def too_many_categories(scene: SceneDescription, max_bits: int) -> list[str]:
+    """Return why the filters of an engine have too few bits for a scene; nothing if they have enough."""
+    layers, categories = len(scene.layers), max(len(scene.categories), 1)
+    if KINDS * layers * categories <= max_bits:
+        return []
+    of_layers = f" on {layers} layers" if layers > 1 else ""
+    most = max_bits // (KINDS * layers)
+    return [f"{categories} categories{of_layers} are not supported; its collision filters have bits for {most}"]

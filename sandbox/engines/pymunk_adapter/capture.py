@@ -18,7 +18,8 @@ from typing import Any, NamedTuple, TypeAlias
 import pymunk
 
 from sandbox.engines.common.base import BIAS
-from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
+from sandbox.engines.common.collision_bits import KINDS
+from sandbox.engines.pymunk_adapter.engine import FILTER_BITS, PERSISTENCE
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -29,6 +30,9 @@ from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
 KeyValues: TypeAlias = dict[str, Any]
+MAX_CATEGORIES = FILTER_BITS // KINDS
+"""Largest number of collision categories that the engine `pymunk` can have."""
+
 MIN_RADIUS = 1e-9
 """m, smallest radius of a capsule, and length of a rod"""
 
@@ -159,7 +163,10 @@ class SpaceElements:
                 if body is not None and (body.body_type == pymunk.Body.DYNAMIC or body in used)
             )
         )
-        self._collides = collides_by_filter({_filter_kind(shape) for shape in self._shapes})
+        kinds = {_filter_kind(shape) for shape in self._shapes}
+        self._collides = collides_by_filter(kinds)
+        self._categories = categories_by_filter(kinds) if None in self._collides.values() else {}
+        self._moving_groups = {each.filter.group for each in self._shapes if not _filter_kind(each).is_static}
         self.names = self._unique_names(names)
         """name of each body"""
 
@@ -236,8 +243,9 @@ class SpaceElements:
 
     def _collider(self, shape: pymunk.Shape) -> tuple[str, KeyValues]:
         """Return the table and the values of a wall or post."""
-        values = self._surface(shape)
-        self._note_filter(shape)
+        values = self._surface(shape) | self._categories_of(shape)
+        if shape.filter.group and shape.filter.group in self._moving_groups:
+            self.omitted.append("groups of static shapes")
         if isinstance(shape, pymunk.Circle):
             return "post", {"position": _point(shape.offset), "radius": float(shape.radius)} | values
         assert isinstance(shape, pymunk.Segment)
@@ -364,27 +372,30 @@ class SpaceElements:
 
     def _filter(self, name: str, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return what a body collides with."""
-        kinds = {self._collides[_filter_kind(shape)] for shape in shapes}
-        groups = {shape.filter.group for shape in shapes}
         if not shapes:
             return {}
-        if len(groups) > 1 or len(kinds) > 1:
+        filters = [
+            (shape.filter.group, self._collides[_filter_kind(shape)], self._categories_of(shape)) for shape in shapes
+        ]
+        if any(each != filters[0] for each in filters):
             self.omitted.append(f"the different filters of the shapes of {name}")
-        if None in kinds:
-            self._note_filters()
-        values: KeyValues = {"group": f"group {min(groups)}"} if min(groups) else {}
-        collides = next((each for each in kinds if each is not None), "all")
+        group, collides, values = filters[0]
+        if group:
+            values["group"] = f"group {group}"
         if collides == "none":
             self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
-        return values | ({"collides": collides} if collides != "all" else {})
+            return values | {"collides": "none"}
+        return values | ({"collides": collides} if collides == "fixed" and not self._categories else {})
 
-    def _note_filter(self, shape: pymunk.Shape) -> None:
-        """Note the filter of a wall or post that a scene cannot state."""
-        if self._collides[_filter_kind(shape)] is None or shape.filter.group:
-            self._note_filters()
-
-    def _note_filters(self) -> None:
-        self.omitted.append("categories and masks of shape filters, and groups of static shapes")
+    def _categories_of(self, shape: pymunk.Shape) -> KeyValues:
+        """Return the categories and the mask of a shape, where `collides` alone cannot state them."""
+        if not self._categories:
+            return {}
+        if len(_category_names(self._categories)) > MAX_CATEGORIES:
+            self.omitted.append(f"categories and masks of shape filters, of which more than {MAX_CATEGORIES} differ")
+            return {}
+        categories, mask = self._categories[_filter_kind(shape)]
+        return {"categories": list(categories), "mask": list(mask)}
 
     # Joints
 
@@ -448,6 +459,7 @@ def collides_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, Collides | No
     """Return what each kind of shapes of a space collides with, as a scene states it; None if it cannot.
 
     Two bodies of a scene collide if both collide with all, or if one is static and the other collides with something.
+    Other filters need categories.
     """
     static, moving = {kind for kind in kinds if kind.is_static}, {kind for kind in kinds if not kind.is_static}
     found: dict[FilterKind, Collides | None] = {}
@@ -465,6 +477,32 @@ def collides_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, Collides | No
             found[kind] = None
     wanted = {kind for kind in moving if found[kind] != "none"}
     return found | {kind: "all" if all(kind.meets(other) for other in wanted) else None for kind in static}
+
+
+def categories_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, tuple[list[str], list[str]]]:
+    """Return the categories and the mask of each kind of shapes, as names.
+
+    Bits that the same kinds have in their categories, and the same in their masks, are one category. It is called by
+    the number of the first of these bits. Bits that no kind collides with, or none has, are left out.
+    """
+    ordered = sorted(kinds)
+    names: dict[tuple[tuple[bool, ...], tuple[bool, ...]], str] = {}
+    for bit in range(32):
+        members = tuple(bool(kind.categories >> bit & 1) for kind in ordered)
+        seekers = tuple(bool(kind.mask >> bit & 1) for kind in ordered)
+        if any(members) and any(seekers):
+            names.setdefault((members, seekers), f"bit {bit}")
+    return {
+        kind: (
+            [name for (members, _), name in names.items() if members[k]],
+            [name for (_, seekers), name in names.items() if seekers[k]],
+        )
+        for k, kind in enumerate(ordered)
+    }
+
+
+def _category_names(of_kind: Mapping[FilterKind, tuple[list[str], list[str]]]) -> set[str]:
+    return {name for lists in of_kind.values() for names in lists for name in names}
 
 
 _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}

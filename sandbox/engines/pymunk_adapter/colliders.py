@@ -20,7 +20,7 @@ import pymunk
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.colliders import straightened, wall_segments
-from sandbox.engines.common.collision_bits import collision_bits
+from sandbox.engines.common.collision_bits import bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.common.restitution import segment_fractions
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayWalls
@@ -28,9 +28,9 @@ from sandbox.engines.pymunk_adapter.forces import has_drag
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BACKING, BodySource, Collides, Point
+from sandbox.scene.description.base import BACKING, BodySource, Point
 from sandbox.scene.description.bodies import Compound
-from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
+from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
 from sandbox.scene.description.world import Settings
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
@@ -59,9 +59,8 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def shape_filter(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
-    """Return the filter of shapes on some layers, given as bits. Shapes of one group other than 0 do not collide."""
-    categories, mask = collision_bits(fixed, collides, layers)
+def shape_filter(categories: int, mask: int, group: int = 0) -> pymunk.ShapeFilter:
+    """Return the filter of shapes. Shapes of one group other than 0 do not collide."""
     return pymunk.ShapeFilter(group, categories=categories, mask=mask)
 
 
@@ -244,7 +243,7 @@ class StaticShapes:
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = self._shapes(collider, body, centre, reach)
             for shape in shapes:
-                shape.filter = _filter(collider, scene)
+                shape.filter = shape_filter(*bits_of_static(scene, collider))
                 self._setter.set_surface(shape, index)
             self._space.add(body)
             self._colliders.append((body, shapes))
@@ -326,7 +325,7 @@ class StaticShapes:
     def rebuild(self, scene: Scene, surface: IntArray) -> None:
         """Update the surfaces (F,) and filters of the static colliders."""
         for (_, shapes), collider, index in zip(self._colliders, scene.fixed, surface.tolist(), strict=False):
-            chosen = _filter(collider, scene)
+            chosen = shape_filter(*bits_of_static(scene, collider))
             for shape in shapes:
                 self._setter.set_surface(shape, index)
                 if shape.filter != chosen:
@@ -360,12 +359,6 @@ def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:
     """Return the surfaces of walls of several segments; `surface` (F,) are those of the static colliders."""
     walls = zip(scene.walls, surface[len(scene.planes) :].tolist(), strict=False)
     return {index for wall, index in walls if len(wall.points) > 2}
-
-
-def _filter(collider: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
-    """Return the collision filter of a static collider."""
-    solid = isinstance(collider, Plane) or collider.solid
-    return shape_filter(True, "all" if solid else "none", layers=mask_of(collider.layers, scene.layers))
 
 
 def shuffled(count: int) -> list[int]:

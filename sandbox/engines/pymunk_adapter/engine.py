@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
+from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.resource_limits import SPACE_SIZE
@@ -25,11 +26,15 @@ OWN = frozenset(
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
+        Demand.CATEGORIES,
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
     }
 )
+
+FILTER_BITS = 30
+"""Bits of pymunk's collision filters that bodies and static colliders may use; zones use the other two."""
 
 PERSISTENCE = 3
 """pymunk's default, substeps"""
@@ -55,7 +60,7 @@ class PymunkEngine:
         """Return each demand and setting that pymunk does not support."""
         setup = Setup.of(start)
         scene = setup.scene
-        missing = unmodelled(setup, self.capabilities)
+        missing = [*unmodelled(setup, self.capabilities), *too_many_categories(scene, FILTER_BITS)]
         for key, method in FIXED_METHODS.items():
             stated = getattr(settings, key)
             if stated not in (None, method):

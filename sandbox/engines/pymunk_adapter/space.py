@@ -8,6 +8,7 @@ import pymunk
 
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST
+from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader
 from sandbox.engines.pymunk_adapter.body_table import ConstantForces, SpaceBody, SpaceBodyTable
@@ -170,9 +171,8 @@ class SpaceBodies(SpaceBodyTable):
         self._members[index] = SpaceBody(body, shapes)
 
     def _filter(self, index: int, bodies: Bodies) -> pymunk.ShapeFilter:
-        collides = bodies.elements[bodies.element[index]].collides
-        layers = 1 << int(self.layer[index])
-        return shape_filter(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
+        bits = bits_of_body(self._scene, bodies, index, int(self.layer[index]))
+        return shape_filter(*bits, int(bodies.group[index]))
 
     def set_layer(self, index: int, bodies: Bodies) -> None:
         """Apply a body's changed collision layer from now on. Its contacts on the old layer end."""

@@ -84,6 +84,7 @@ class ReferenceEngine:
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
+        Demand.CATEGORIES,
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,

@@ -1,4 +1,4 @@
-"""Collision filtering: layers, bodies held by zones, and one-way walls.
+"""Collision filtering: layers, categories, bodies held by zones, and one-way walls.
 
 A one-way wall is solid on its left. A body that first overlaps it from the right passes until they separate. The side
 is that of the body's centre at the beginning of the piece of a substep in which the overlap begins. The decision holds
@@ -6,8 +6,8 @@ until they separate: a body that turns round inside the wall returns freely, and
 depth. For a polyline the nearest segment decides; at a vertex, where two segments are equally near, the sum of their
 normals does (Bærentzen & Aanæs 2005, pseudonormals).
 
-`CollisionFilter` removes candidate pairs by layer, by one-way walls, and pairs in which neither body can move (held,
-kinematic, or fixed). Scenes without these have no filter.
+`CollisionFilter` removes candidate pairs by layer, by category, by one-way walls, and pairs in which neither body can
+move (held, kinematic, or fixed). Scenes without these have no filter.
 """
 
 import numpy as np
@@ -16,6 +16,7 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.broad_phase import FIRST, SECOND, CandidatePairs
 from sandbox.engines.reference.manifold import KIND, Manifolds
+from sandbox.scene.compile.filters import collision_filters
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall, mask_of
 
@@ -111,21 +112,24 @@ class CollisionFilter:
 
     def __init__(self, store: BodyStore) -> None:
         self._store, scene = store, store.scene
+        planes = slice(len(scene.planes))
         self._collider_bits: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
         every = (1 << len(scene.layers)) - 1
-        self._filters_planes = bool((self._collider_bits[: len(scene.planes)] != every).any())
+        self._filters_planes = bool((self._collider_bits[planes] != every).any() or (scene.categories and scene.planes))
         self.walls = OneWayWalls(store) if any(wall.one_way for wall in scene.walls) else None
         """the one-way walls, if there are any"""
         self.rebuild(store.position)
 
     @staticmethod
     def is_needed(scene: Scene) -> bool:
-        """Return whether a scene has layers, one-way walls, or zones that hold."""
-        return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
+        """Return whether a scene has layers, categories, one-way walls, or zones that hold."""
+        has_parts = len(scene.layers) > 1 or bool(scene.categories) or any(wall.one_way for wall in scene.walls)
+        return has_parts or any(zone.holds for zone in scene.zones)
 
     def rebuild(self, position: FloatArray) -> None:
         """Update after a change of the body store; positions are (N, ≥ 2) m."""
         self._bits: IntArray = 1 << self._store.layer
+        self._filters = collision_filters(self._store.scene, self._store.bodies)
         self._is_movable: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
         self._segment_collider = self._store.fixtures.segment_collider
         if self.walls is not None:
@@ -136,20 +140,21 @@ class CollisionFilter:
         balls, segments = near
         if len(balls):
             a, b = owner[balls >> FIRST], owner[balls & SECOND]
-            balls = balls[(self._is_movable[a] | self._is_movable[b]) & (self._bits[a] & self._bits[b] != 0)]
+            collides = (self._is_movable[a] | self._is_movable[b]) & (self._bits[a] & self._bits[b] != 0)
+            balls = balls[collides & self._filters.share_categories(a, b)]
         if len(segments):
             body, collider = owner[segments >> FIRST], self._segment_collider[segments & SECOND]
-            collides = self._bits[body] & self._collider_bits[collider] != 0
+            collides = self._meets(body, collider)
             if self.walls is not None:
                 collides[collides] = self.walls.stop(body[collides], collider[collides])
             segments = segments[collides]
         return CandidatePairs(balls, segments)
 
     def at_one_way_walls(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
-        """Return only the candidate pairs with one-way walls on a common layer."""
+        """Return only the candidate pairs with one-way walls that collide by layer and category."""
         assert self.walls is not None
         body, collider = owner[near.segments >> FIRST], self._segment_collider[near.segments & SECOND]
-        collides = self.walls.is_one_way[collider] & (self._bits[body] & self._collider_bits[collider] != 0)
+        collides = self.walls.is_one_way[collider] & self._meets(body, collider)
         return CandidatePairs(near.balls[:0], near.segments[collides])
 
     def is_one_way(self, second: IntArray) -> BoolArray:
@@ -158,18 +163,22 @@ class CollisionFilter:
         return np.asarray(self.walls.is_one_way[np.maximum(-1 - second, 0)] & (second < 0))
 
     def drop_filtered_planes(self, contacts: Manifolds) -> Manifolds:
-        """Return contacts without those of planes on other layers; every body is a candidate for every plane."""
+        """Return contacts without those of filtered planes; every body is a candidate for every plane."""
         if not self._filters_planes:
             return contacts
         collider = np.maximum(-1 - contacts.second, 0)
-        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._collider_bits[collider] != 0))
+        return contacts.of((contacts.second >= 0) | self._meets(contacts.first, collider))
 
     def with_filtered_planes(self, keys: IntArray, can_touch: BoolArray) -> IntArray:
-        """Return keys, ascending, together with those of all pairs of balls and planes on different layers."""
+        """Return keys, ascending, together with those of all pairs of a ball and a plane that cannot collide."""
         if not self._filters_planes:
             return keys
-        filtered = can_touch[:, None] & (
-            self._bits[:, None] & self._collider_bits[self._store.fixtures.plane_collider] == 0
-        )
+        body = np.arange(len(self._bits))[:, None]
+        filtered = can_touch[:, None] & ~self._meets(body, self._store.fixtures.plane_collider)
         ball, plane = np.nonzero(filtered)
         return np.union1d(keys, (1 << KIND) + (ball << FIRST) + plane)
+
+    def _meets(self, bodies: IntArray, colliders: IntArray) -> BoolArray:
+        """Return which pairs of a body and a static collider collide by layer and category."""
+        on_layer = self._bits[bodies] & self._collider_bits[colliders] != 0
+        return np.asarray(on_layer & self._filters.share_categories_with_fixed(bodies, colliders))

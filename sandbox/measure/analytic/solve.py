@@ -105,7 +105,8 @@ def solution(scene: Scene) -> Solution | None:
     It is never an approximation. If no two moving bodies can collide or are joined, each body is solved separately;
     otherwise all are solved together.
     """
-    if on_floor(scene) or scene.zones or len(scene.layers) > 1 or scene.bodies.groups:  # no formula includes them
+    has_filters = len(scene.layers) > 1 or scene.categories or scene.bodies.groups
+    if on_floor(scene) or scene.zones or has_filters:  # no formula includes them
         return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:

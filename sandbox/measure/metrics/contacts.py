@@ -11,7 +11,8 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.metrics.clearance import IndexPair, clearance, plane_clearance
-from sandbox.scene.compile.contacts import contact_matrix, reachable_layers
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.filters import collision_filters, reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane, mask_of
 from sandbox.scene.geometry.neighbours import near_pairs
@@ -160,8 +161,10 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
     """
     bodies = scene.bodies
     found = np.zeros(len(run.time))
-    able = np.flatnonzero(contact_matrix(scene).touches & ~bodies.fixed)
-    for plane in scene.planes:
+    able_bodies, filters = contact_matrix(scene).touches & ~bodies.fixed, collision_filters(scene, bodies)
+    all_able = np.flatnonzero(able_bodies)
+    for k, plane in enumerate(scene.planes):
+        able = np.flatnonzero(able_bodies & filters.meets_fixed(k))
         point, normal = np.asarray(plane.point), np.asarray(plane.normal) / math.hypot(*plane.normal)
         discs = able[bodies.round[able]]
         if len(discs):
@@ -171,10 +174,12 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
             above = plane_clearance(bodies, number, run.position[:, number], run.angle[:, number], point, normal)
             found = np.maximum(found, -above)
     others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane) and thing.solid]
-    pairs = [(number, thing) for number in able[:MAX_PAIRED_BODIES].tolist() for thing in others]
+    paired = all_able[:MAX_PAIRED_BODIES]
+    pairs = [(body, thing) for thing in others for body in paired[filters.meets_fixed(-1 - thing)[paired]].tolist()]
     mutual = contact_matrix(scene).mutual and len(scene.layers) == 1  # bodies on different layers can pass each other
-    if mutual and not bodies.round[able].all():
-        pairs += _initial_neighbours(scene)
+    if mutual and not bodies.round[all_able].all():
+        neighbours = np.asarray(_initial_neighbours(scene), np.int64).reshape(-1, 2)
+        pairs += [(a, b) for a, b in neighbours[filters.meets(*neighbours.T)].tolist()]
     # A body that can change its layer can be above another without colliding: only bodies that cannot are examined.
     if len(scene.layers) > 1:
         reachable = reachable_layers(scene, bodies)
@@ -186,9 +191,9 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
         max_distance = 2.0 * float(bodies.radius[colliding].max())
         for k, position in enumerate(run.position[:, colliding]):
             for i, j in near_pairs(position, max_distance):
-                apart = (
-                    np.hypot(*(position[i] - position[j]).T) - bodies.radius[colliding[i]] - bodies.radius[colliding[j]]
-                )
+                a, b = colliding[i], colliding[j]
+                apart = np.hypot(*(position[i] - position[j]).T) - bodies.radius[a] - bodies.radius[b]
+                apart[~filters.meets(a, b)] = np.inf
                 found[k] = max(found[k], -float(apart.min(initial=np.inf)))
     return found
 

@@ -25,9 +25,9 @@ from sandbox.measure.preflight.tunnelling import (
     is_continuous,
     tunnelling_risks,
 )
-from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reachable_layers
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.filters import collision_filters
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.fixed import Plane, mask_of
 from sandbox.scene.description.world import Settings
 
 
@@ -197,12 +197,12 @@ def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
     if settings.detection not in (None, "discrete") or context.is_continuous:
         return
     bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
-    layers = reachable_layers(scene, bodies)
+    filters = collision_filters(scene, bodies)
     movers = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0)
     found: dict[tuple[str, float], tuple[str, float, int]] = {}
-    for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
-        able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
-        if not isinstance(plane, Plane) or not len(able):
+    for index, (plane, name) in enumerate(zip(scene.planes, scene.fixed_names, strict=False)):
+        able = np.flatnonzero(movers & filters.meets_fixed(index))
+        if not len(able):
             continue
         speed = speeds.toward(plane)[able]
         k = int(np.argmax(speed / bodies.thin[able]))

@@ -11,10 +11,11 @@ from sandbox.measure.metrics.clearance import bounding_clearances, clearance, hu
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.preflight.tunnelling import collide_with_all
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import ContactMatrix, reachable_layers
+from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.filters import collision_filters
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, OVERLAP_BUDGET, count_overlaps
 
@@ -46,13 +47,13 @@ def initial_contacts(scene: Scene) -> InitialContacts:
     apart = {(a, b) for a, b in scene.links.apart().tolist()}
     if len(colliding) < 2 or bodies.round[colliding].all():
         return InitialContacts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-    examined = 0
+    examined, filters = 0, collision_filters(scene, bodies)
     for i, j in near_pairs(bodies.position[colliding], 2.05 * float(bodies.radius[colliding].max())):
         a, b = np.minimum(colliding[i], colliding[j]), np.maximum(colliding[i], colliding[j])
         slack = CONTACT_FRACTION * np.minimum(bodies.thin[a], bodies.thin[b])
         away = np.hypot(*(bodies.position[a] - bodies.position[b]).T) - bodies.radius[a] - bodies.radius[b]
-        able = (bodies.group[a] == 0) | (bodies.group[a] != bodies.group[b])
-        able &= (away < slack) & ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
+        able = filters.meets(a, b) & (away < slack)
+        able &= ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
         for first, second, limit in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
             examined += 1
             if examined > MAX_PAIRS:
@@ -122,6 +123,8 @@ def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
     max_pairs = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(balls)  # a scene with more is refused
     owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[balls]
     position, radius = bodies.position[balls], bodies.radius[balls]
+    if scene.categories:
+        return _filtered_balls(scene, balls)
     count = count_overlaps(position, radius, max_pairs, owner)
     first, second = scene.links.apart().T
     joined = np.isin(first, balls) & np.isin(second, balls)
@@ -135,6 +138,24 @@ def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
     keys = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
     deepest, i, j = _deepest(position, radius, owner, balls, keys, len(bodies))
     return count, (deepest, bodies.names[i], bodies.names[j])
+
+
+def _filtered_balls(scene: Scene, balls: IntArray) -> tuple[int, Overlap]:
+    """Return the number of overlapping pairs among some balls that can collide by their filters, and the deepest."""
+    bodies, filters = scene.bodies, collision_filters(scene, scene.bodies)
+    apart = {(min(pair), max(pair)) for pair in scene.links.apart().tolist()}
+    count, deepest, examined = 0, (0.0, "", ""), 0
+    for i, j in near_pairs(bodies.position[balls], 2.0 * float(bodies.radius[balls].max(initial=0.0))):
+        a, b = np.minimum(balls[i], balls[j]), np.maximum(balls[i], balls[j])
+        depth = bodies.radius[a] + bodies.radius[b] - np.hypot(*(bodies.position[a] - bodies.position[b]).T)
+        overlaps = filters.meets(a, b) & (depth > 0.0)
+        for row in zip(depth[overlaps].tolist(), a[overlaps].tolist(), b[overlaps].tolist(), strict=True):
+            if row[1:] not in apart:
+                count, deepest = count + 1, max(deepest, (row[0], bodies.names[row[1]], bodies.names[row[2]]))
+        examined += len(i)
+        if examined > OVERLAP_BUDGET:
+            break
+    return count, deepest
 
 
 def _deepest(
@@ -172,13 +193,13 @@ def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overl
     """
     if scene.surface is not None:
         return
-    bodies, layers = scene.bodies, reachable_layers(scene, scene.bodies)
+    bodies, filters = scene.bodies, collision_filters(scene, scene.bodies)
     able = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
     examined = measured = 0
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if (not isinstance(thing, Plane) and not thing.solid) or (isinstance(thing, Wall) and thing.one_way):
             continue
-        candidates = np.flatnonzero(able & (layers & mask_of(thing.layers, scene.layers) != 0) & _near(bodies, thing))
+        candidates = np.flatnonzero(able & filters.meets_fixed(k) & _near(bodies, thing))
         examined += len(candidates) * (len(thing.points) if isinstance(thing, Wall) else 1)
         if examined > OVERLAP_BUDGET:
             return

@@ -16,7 +16,8 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reachable_layers
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.filters import collision_filters, reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
@@ -136,11 +137,10 @@ def tunnelling_risks(scene: Scene, matrix: ContactMatrix | None = None) -> list[
         if fastest.safe_h < groups[0].safe_h * (1.0 - ROUNDING):
             found.append(fastest)
 
-    layers = reachable_layers(scene, bodies)[movers]
-    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
+    filters = collision_filters(scene, bodies)
+    for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if isinstance(thing, Plane) or thing.solid:
-            same_layer = layers & mask_of(thing.layers, scene.layers) != 0
-            add(same_layer, half + _half_depth(thing), speeds.toward(thing)[movers], name)
+            add(filters.meets_fixed(k)[movers], half + _half_depth(thing), speeds.toward(thing)[movers], name)
     fixed = np.flatnonzero(bodies.fixed & matrix.touches)
     if matrix.mutual and len(fixed):
         thinnest = fixed[bodies.thin[fixed].argmin()]
@@ -194,11 +194,13 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     if only_two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
-    other, _ = _shortest_safe(reach, closing)
+    meets = collision_filters(scene, bodies).meets(number[:, None], number)
+    other, _ = _shortest_safe(reach, np.where(meets, closing, 0.0))
     rows = np.arange(len(number))
-    found = _groups(bodies.names, number, reach[rows, other], closing[rows, other], another)
+    speed = np.where(meets[rows, other], closing[rows, other], 0.0)
+    found = _groups(bodies.names, number, reach[rows, other], speed, another)
     found = [replace(found[0], others=0)] if len(number) == 2 else found
-    closing = struck[:, None] + struck
+    closing = np.where(meets, struck[:, None] + struck, 0.0)
     other, safe = _shortest_safe(reach, closing)
     k = int(safe.argmin())
     last = other[k]

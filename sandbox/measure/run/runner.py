@@ -23,7 +23,7 @@ from sandbox.measure.run.loop import RunCallbacks, RunEnd, WorkCallback, run_loo
 from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
 from sandbox.progress import ProgressCallback
 from sandbox.provenance import versions
-from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.compile.filters import bits_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_STEPS

@@ -100,7 +100,10 @@ def rotated(offset: FloatArray, angle: float) -> FloatArray:
     return np.column_stack(rotate(x, y, np.cos(angle), np.sin(angle)))
 
 
-SURFACE = ("material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour", "collides", "layer")
+SURFACE = (
+    *("material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour"),
+    *("collides", "categories", "mask", "layer"),
+)
 
 
 def elements_of(source: BodySource) -> tuple[BodySource, ...]:

@@ -10,7 +10,7 @@ that the values of two sides add. Surface speeds add as well: each surface runs 
 one-way walls belong to one side.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
@@ -20,6 +20,7 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.filters import CollisionFilters, collision_filters
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, HasMaterial
@@ -256,6 +257,10 @@ class Kinds(NamedTuple):
     """(K,) of bodies whose `collides` is not `none`"""
     layers: IntArray
     """(K,) bit mask of all layers that they can reach"""
+    categories: IntArray
+    """(K,) bit mask of the collision categories that they belong to"""
+    mask: IntArray
+    """(K,) bit mask of the collision categories that they collide with"""
     ball: BoolArray
     """(K,) is a single disc"""
     alone: BoolArray
@@ -283,20 +288,28 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     """Derive the contact matrix of a setup with given bodies."""
     scene = setup.scene
     surfaces = pair_table(scene, bodies)
-    reached = reachable_layers(scene, bodies)
-    kinds = _kinds(bodies, surfaces, reached)
+    filters = collision_filters(scene, bodies)
+    kinds = _kinds(bodies, surfaces, filters)
     surface, to_all = kinds.surface, kinds.to_all
     moving, static = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
     pair = np.outer(moving & to_all, moving & to_all) & ~(np.eye(len(surface), dtype=bool) & kinds.alone)
     pair |= np.outer(moving, static & to_all) | np.outer(static & to_all, moving)
     pair &= (kinds.layers[:, None] & kinds.layers) != 0
+    accepts = (kinds.categories[:, None] & kinds.mask) != 0
+    pair &= accepts & accepts.T
 
     size = len(surfaces.surfaces)
     touching = np.zeros((size, size), dtype=bool)
     rows, columns = np.nonzero(pair)
     touching[surface[rows], surface[columns]] = True
     has_friction = surfaces.friction > 0
-    ground = [(moving & ((kinds.layers & mask) != 0), rows) for mask, rows in _by_layers(scene)]
+    ground = [
+        (
+            moving & (kinds.layers & layers != 0) & (kinds.categories & mask != 0) & (kinds.mask & categories != 0),
+            rows,
+        )
+        for (layers, categories, mask), rows in _equal_colliders(filters)
+    ]
     can_touch: BoolArray = np.asarray(pair.any(axis=1))
     for able, _ in ground:
         can_touch |= able
@@ -315,7 +328,7 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
         surfaces=surfaces,
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
-        can_enter_zone=_can_enter_zone(scene, bodies, reached) & ~is_driven(scene, bodies),
+        can_enter_zone=_can_enter_zone(scene, bodies, filters.layers) & ~is_driven(scene, bodies),
         turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True))
         & ~bodies.fixed
         & (bodies.moment < UNTURNABLE),
@@ -333,27 +346,6 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     )
 
 
-def reachable_layers(scene: Scene, bodies: Bodies) -> IntArray:
-    """Return the bit mask of all layers that each body can reach from its own, (N,)."""
-    layers = scene.layers
-    if len(layers) == 1:
-        return np.ones(len(bodies), np.int64)
-    of_layer = [1 << k for k in range(len(layers))]
-    transitions = [
-        (mask_of(z.layers, layers), 1 << layers.index(z.to_layer)) for z in scene.zones if z.to_layer is not None
-    ]
-    for _ in layers:  # a path between two layers is no longer than their number
-        for mask, to in transitions:
-            of_layer = [bits | to if bits & mask else bits for bits in of_layer]
-    can_move = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
-    return np.asarray(np.where(can_move, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
-
-
-def bits_of(layer: IntArray | None, count: int) -> IntArray:
-    """Return the layers of bodies as bit masks, (N,), from a frame's indices; default: the first layer."""
-    return np.ones(count, np.int64) if layer is None else 1 << layer
-
-
 def _can_enter_zone(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
     """Return which bodies zones can detect, (N,)."""
     if not scene.zones:
@@ -366,14 +358,25 @@ def _can_enter_zone(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArra
     return np.asarray(detectable & ((reached & zone_layers != 0) | still_inside))
 
 
-def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:
-    """Return each bit mask of layers of static colliders, with the indices of those that have it."""
-    masks = np.asarray([mask_of(collider.layers, scene.layers) for collider in scene.fixed], dtype=np.int64)
-    return [(mask, np.flatnonzero(masks == mask)) for mask in np.unique(masks).tolist()]
+def _equal_colliders(filters: CollisionFilters) -> Iterator[tuple[tuple[int, int, int], IntArray]]:
+    """Yield the layers, categories and masks of static colliders as bits, with the indices of those that have them."""
+    distinct, row = _distinct_rows(filters.fixed_layers, filters.fixed_categories, filters.fixed_mask)
+    for k, (layers, categories, mask) in enumerate(distinct.tolist()):
+        yield (layers, categories, mask), np.flatnonzero(row == k)
 
 
-def _kinds(bodies: Bodies, surfaces: PairTable, reached: IntArray) -> Kinds:
-    """Group pieces by (surface, layers, ball, fixed, collides with all, collides with any)."""
+def _distinct_rows(*columns: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the distinct rows of C columns (N,) as (K, C), and for each row the index of its equal, (N,)."""
+    code = np.zeros(len(columns[0]), np.int64)
+    for column in columns:  # much faster than sorting rows
+        values, index = np.unique(column, return_inverse=True)
+        code = code * len(values) + index.reshape(-1)
+    _, first, row = np.unique(code, return_index=True, return_inverse=True)
+    return np.column_stack([column[first] for column in columns]), row.reshape(-1)
+
+
+def _kinds(bodies: Bodies, surfaces: PairTable, filters: CollisionFilters) -> Kinds:
+    """Group pieces by (surface, layers, categories, mask, ball, fixed, collides with all, collides with any)."""
     collides = [element.collides for element in bodies.elements]
     collides_with_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
     collides_with_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
@@ -384,18 +387,21 @@ def _kinds(bodies: Bodies, surfaces: PairTable, reached: IntArray) -> Kinds:
         | collides_with_any
     )
     body = _body_of_piece(bodies)
-    masks, layers = np.unique(reached, return_inverse=True)
-    traits |= layers.reshape(-1) << 4
-    count = max(len(masks), 1)
+    distinct, row = _distinct_rows(filters.layers, filters.categories, filters.mask)
+    traits |= row << 4
+    count = max(len(distinct), 1)
     code = surfaces.of_shape * (count << 4) + (traits if body is None else traits[body])
     counts = np.bincount(code if body is None else np.unique(np.column_stack((code, body)), axis=0)[:, 0])
     present = np.flatnonzero(counts)
     row_of = np.zeros(len(counts), np.int64)
     row_of[present] = np.arange(len(present))
     bits = [(present >> k & 1).astype(bool) for k in range(4)]
+    layers, categories, mask = (distinct[(present >> 4) % count] if len(distinct) else distinct).T
     return Kinds(
         surface=(present >> 4) // count,
-        layers=masks[(present >> 4) % count] if len(masks) else np.empty(0, np.int64),
+        layers=layers,
+        categories=categories,
+        mask=mask,
         fixed=bits[2],
         to_all=bits[1],
         to_any=bits[0],

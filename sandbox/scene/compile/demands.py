@@ -57,6 +57,7 @@ class Demand(StrEnum):
     PUCKS = "pucks"
     CURL = "curl"
     LAYERS = "layers"
+    CATEGORIES = "categories"
     GROUPS = "groups"
     ZONES = "zones"
 
@@ -172,6 +173,8 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     yield from _floor(setup)
     has_layers = len(scene.layers) > 1
     yield Demand.LAYERS, has_layers, ", ".join(scene.layers) if has_layers else "all bodies are in one layer"
+    categories = scene.categories
+    yield Demand.CATEGORIES, bool(categories), ", ".join(categories) if categories else "no object names a category"
     yield Demand.GROUPS, bool(bodies.groups), ", ".join(bodies.groups) if bodies.groups else "no body names a group"
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"

@@ -99,7 +99,21 @@ class HasMaterial(Part):
     """colour in the window, `#rrggbb`"""
 
 
-class BodySource(HasMaterial):
+Categories = Annotated[tuple[Name, ...], Field(max_length=32)]
+"""Collision categories, by name."""
+
+
+class Collider(HasMaterial):
+    """Object that can collide: a body, or a static collider."""
+
+    categories: Categories | None = None
+    """collision categories that it belongs to; default: all. Two objects collide only if the mask of each has a
+    category of the other."""
+    mask: Categories | None = None
+    """collision categories that it collides with; default: all"""
+
+
+class BodySource(Collider):
     """Element with bodies: a single body, or a generator of many."""
 
     mass: Mass | None = None

@@ -1,4 +1,4 @@
-"""Static elements: planes, walls, posts and zones; collision layers.
+"""Static elements: planes, walls, posts and zones; collision layers and categories.
 
 A visit of a zone begins when the centre of a body is inside the zone while the body is in one of the zone's layers. It
 ends when the centre is outside. A change of layer does not end it; each visit is recorded once. Bodies with
@@ -9,7 +9,7 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
-from sandbox.scene.description.base import GROUND, Acceleration, Colour, HasMaterial, Name, Part, Point, Radius, Vector
+from sandbox.scene.description.base import GROUND, Acceleration, Collider, Colour, Name, Part, Point, Radius, Vector
 from sandbox.scene.description.world import Kick
 
 Layers = Annotated[tuple[Name, ...], Field(min_length=1, max_length=10)]
@@ -23,6 +23,9 @@ MAX_ZONES = 1000
 
 AWAY, INSIDE, HELD, RELEASED = range(4)
 """State of a body in a zone: outside; inside; held at the centre; released and still inside."""
+
+MAX_CATEGORIES = 32
+"""Largest number of collision categories of a scene, as many as pymunk's filters have bits."""
 
 Width = Annotated[float, Field(gt=0, le=1e9)]
 
@@ -69,7 +72,7 @@ PlaneReach: TypeAlias = tuple[float, float, float]
 """Centre (x, y) of the start positions, and the distance from it within which half-planes are exact, m."""
 
 
-class Plane(HasMaterial):
+class Plane(Collider):
     """A half-plane, solid behind its normal."""
 
     point: Point
@@ -80,7 +83,7 @@ class Plane(HasMaterial):
     """layers in which it is solid; default: all"""
 
 
-class Wall(HasMaterial):
+class Wall(Collider):
     """A polyline with round ends, solid on both sides."""
 
     points: Course
@@ -101,7 +104,7 @@ class Wall(HasMaterial):
     """whether bodies collide with it; an action can change this"""
 
 
-class Post(HasMaterial):
+class Post(Collider):
     """A fixed circle."""
 
     position: Point

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 from pydantic import Field, StringConstraints
 
-from sandbox.scene.description.base import GROUND, BodySource, HasMaterial, Part
+from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMaterial, Part
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
@@ -121,6 +121,14 @@ class SceneDescription(_Header):
         for source in self.body_sources:
             named[source.layer] = None
         return tuple(named)
+
+    @cached_property
+    def categories(self) -> tuple[str, ...]:
+        """Names of the collision categories in the order in which static colliders, then bodies, name them."""
+        colliders: tuple[Collider, ...] = (*self.fixed, *self.body_sources)
+        return tuple(
+            dict.fromkeys(name for each in colliders for name in (*(each.categories or ()), *(each.mask or ())))
+        )
 
     @cached_property
     def fixed_names(self) -> tuple[str, ...]:

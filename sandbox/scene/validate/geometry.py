@@ -13,7 +13,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Point
 from sandbox.scene.description.bodies import AnyPart, BallPart, BoxPart, CapsulePart, Compound, PolygonPart
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES, Plane, Wall, Zone
+from sandbox.scene.description.fixed import MAX_CATEGORIES, MAX_LAYERS, MAX_ZONES, Plane, Wall, Zone
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.polygon import OutlineError, anticlockwise, extent_of, outline_fault, signed_area
 from sandbox.scene.geometry.shapes import contains, geometry_of, middle_of
@@ -208,6 +208,18 @@ def check_layers(scene: Scene) -> Iterator[LocatedMessage]:
         yield (), f"uses {len(layers)} layers, {', '.join(layers)}; the limit is {MAX_LAYERS}"
     if len(layers) > 1 and scene.surface is not None:
         yield (), f"has a [surface] and the layer {layers[1]!r}; a scene with a [surface] has a single layer"
+
+
+def check_categories(scene: Scene) -> Iterator[LocatedMessage]:
+    """Yield the faults of collision categories."""
+    categories = scene.categories
+    if len(categories) > MAX_CATEGORIES:
+        yield (), f"uses {len(categories)} categories; the limit is {MAX_CATEGORIES}"
+    if categories and scene.surface is not None:
+        yield (
+            (),
+            f"has a [surface] and the category {categories[0]!r}; balls and pucks on a [surface] have no categories",
+        )
 
 
 def _check_zone_shape(k: int, zone: Zone) -> Iterator[LocatedMessage]:

@@ -23,6 +23,7 @@ from sandbox.scene.validate.bodies import (
 )
 from sandbox.scene.validate.geometry import (
     MAX_REPEATS,
+    check_categories,
     check_layers,
     check_outlines,
     check_repeats,
@@ -51,6 +52,7 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_zones(scene)
     if len(scene.layers) > 1:
         found += check_layers(scene)
+    found += check_categories(scene)
     found += [*shapeless, *_check_world(scene)]
     if shapeless:  # the other checks need the bodies
         return [*found, *_check_names_only(scene, {location[:2] for location, _ in shapeless})]

@@ -8,15 +8,15 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.common.colliders import wall_segments
-from sandbox.engines.common.collision_bits import COLLIDES_ALL, COLLIDES_FIXED, STATIC, collision_bits
+from sandbox.engines.common.collision_bits import COLLIDES_ALL, COLLIDES_FIXED, STATIC, bits_of_body, bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, keeps_first_corners, reach_of, shuffled
 from sandbox.engines.pymunk_adapter.program.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BACKING, Collides
-from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.base import BACKING
+from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.shapes import geometry_of
 
 
@@ -95,7 +95,7 @@ FILTER_NAMES = {
     (COLLIDES_ALL, STATIC | COLLIDES_ALL): "MOVING",
     (COLLIDES_FIXED, STATIC): "MOVING_AMONG_FIXED",
 }
-"""Names of the filters of scenes with one collision layer, by categories and mask."""
+"""Names of the filters of scenes with one collision layer and no categories, by categories and mask."""
 
 
 @dataclass
@@ -104,9 +104,8 @@ class Filters:
 
     _names: dict[tuple[int, int, int], str] = field(default_factory=dict)
 
-    def name(self, fixed: bool, collides: Collides, group: int, layers: int) -> str:
+    def name(self, categories: int, mask: int, group: int = 0) -> str:
         """Return the name of the constant for a filter."""
-        categories, mask = collision_bits(fixed, collides, layers)
         known = FILTER_NAMES.get((categories, mask)) if group == 0 else None
         return self._names.setdefault((group, categories, mask), known or f"FILTER_{len(self._names) + 1}")
 
@@ -156,8 +155,7 @@ class Contents:
         static = ("body = pymunk.Body(body_type=pymunk.Body.STATIC)", "space.add(body)")
         surfaces = self.surfaces.of_fixed.tolist()
         for collider, name, surface in zip(scene.fixed, scene.fixed_names, surfaces, strict=False):
-            title, is_solid = literal(name), isinstance(collider, Plane) or collider.solid
-            chosen = self.filters.name(True, "all" if is_solid else "none", 0, mask_of(collider.layers, scene.layers))
+            title, chosen = literal(name), self.filters.name(*bits_of_static(scene, collider))
             added = f"{add}(with_surface(shape, {self.surfaces.name(surface, title)}, {chosen}))"
             match collider:
                 case Plane():
@@ -237,10 +235,8 @@ class Contents:
         if not self._has_shapes[index]:  # outside the space it costs no time
             return [f"{shape}  # only drawn"]
         bodies = self.setup.bodies
-        collides = bodies.elements[bodies.element[index]].collides
-        chosen = self.filters.name(
-            bool(bodies.fixed[index]), collides, int(bodies.group[index]), 1 << int(bodies.layer[index])
-        )
+        bits = bits_of_body(self.setup.scene, bodies, index, int(bodies.layer[index]))
+        chosen = self.filters.name(*bits, int(bodies.group[index]))
         material = self.surfaces.name(int(self.surfaces.of_shape[piece]), literal(bodies.names[index]))
         return [f"shape = {shape}", f"space.add(with_surface(shape, {material}, {chosen}))"]
 
