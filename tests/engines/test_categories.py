@@ -135,7 +135,7 @@ def test_tunnelling_is_forecast_only_through_objects_that_can_be_hit() -> None:
     bullet = ball(0.0, 500.0, categories=["shot"])
 
     def hit(wall: dict[str, Any]) -> list[object]:
-        found = warnings(scene_with(ball=[bullet], wall=[wall]))
+        found = warnings(from_document({"ball": [bullet], "wall": [wall]}))
         return [each.details["thing"] for each in found if each.kind == "tunnelling"]
 
     assert "wall-1" in hit(wall)
