@@ -8,9 +8,10 @@ import pytest
 
 import sandbox
 from sandbox.action import Impulse
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice import Advice, advise, scoring, study
-from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, game_code
+from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.recording import Recording
@@ -202,7 +203,7 @@ def test_code_gives_a_space_the_recommended_values(substeps: int, half_kick: boo
 
 def test_defaults_of_pymunk_are_those_of_a_new_space() -> None:
     space = pymunk.Space()
-    for name, value in PYMUNK_DEFAULTS.items():
+    for name, value in SPACE_DEFAULTS.items():
         assert getattr(space, name) == pytest.approx(value, rel=1e-5), name  # pymunk rounds them to 32 bits
 
 

@@ -310,12 +310,11 @@ class SpaceElements:
             case pymunk.Circle():
                 return {"radius": float(shape.radius), "position": _point(shape.offset)} | values
             case pymunk.Segment():
-                if shape.radius < MIN_RADIUS:
-                    self.inexact.append(
-                        f"a segment of {self.names[body]} has no radius; the scene has {MIN_RADIUS:g} m"
-                    )
+                smallest = _smallest_radius(body)
+                if shape.radius < smallest:
+                    self.inexact.append(f"a segment of {self.names[body]} has no radius; the scene has {smallest:g} m")
                 ends = [_point(shape.a), _point(shape.b)]
-                return {"radius": max(float(shape.radius), MIN_RADIUS), "ends": ends} | values
+                return {"radius": max(float(shape.radius), smallest), "ends": ends} | values
             case pymunk.Poly():
                 rounding = {"radius": float(shape.radius)} if shape.radius else {}
                 return {"points": [_point(each) for each in shape.get_vertices()]} | rounding | values
@@ -435,6 +434,23 @@ class SpaceElements:
             self.inexact.append(f"error_bias of a {kind} is not that of the space's contacts")
         if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
             self.omitted.append(f"callbacks of a {kind}")
+
+
+def _smallest_radius(body: pymunk.Body) -> float:
+    """Return the smallest radius of a capsule that a scene allows, m: it follows from the extent of the body."""
+    reach = 0.0
+    for shape in body.shapes:
+        for corner in shape.get_vertices() if isinstance(shape, pymunk.Poly) else _ends_of(shape):
+            reach = max(reach, math.hypot(*corner) + shape.radius)
+    return max(MIN_RADIUS, 2.0 * MIN_RADIUS * reach)
+
+
+def _ends_of(shape: pymunk.Shape) -> tuple[pymunk.Vec2d, ...]:
+    """Return the ends of a segment, or the centre of a circle, in the frame of the body."""
+    if isinstance(shape, pymunk.Segment):
+        return shape.a, shape.b
+    assert isinstance(shape, pymunk.Circle)
+    return (shape.offset,)
 
 
 class FilterKind(NamedTuple):

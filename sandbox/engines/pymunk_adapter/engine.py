@@ -33,6 +33,22 @@ OWN = frozenset(
     }
 )
 
+SPACE_ATTRIBUTES = {
+    "iterations": "iterations",
+    "slop": "collision_slop",
+    "bias": "collision_bias",
+    "persistence": "collision_persistence",
+}
+"""Attribute of `pymunk.Space` for each setting"""
+
+SPACE_DEFAULTS = {
+    "iterations": 10,
+    "collision_slop": 0.1,
+    "collision_bias": (1.0 - 0.1) ** 60,
+    "collision_persistence": 3,
+}
+"""Values of these attributes in a new space (pymunk 7.3.1)"""
+
 FILTER_BITS = 30
 """Bits of pymunk's collision filters that bodies and static colliders may use; zones use the other two."""
 

@@ -4,20 +4,12 @@ import math
 from dataclasses import dataclass
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS, scale_for
+from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS
 from sandbox.formatting import format_quantity
 from sandbox.scene.description.world import Settings
 
-PYMUNK_DEFAULTS = {
-    "iterations": 10,
-    "collision_slop": 0.1,
-    "collision_bias": (1.0 - 0.1) ** 60,
-    "collision_persistence": 3,
-}
-"""Attributes of a new `pymunk.Space` (7.3.1)."""
 SAME_VALUE = 1e-5
 """Relative: pymunk rounds its defaults to 32-bit numbers."""
-SPACE_ATTRIBUTES = {"slop": "collision_slop", "bias": "collision_bias", "persistence": "collision_persistence"}
-"""Attributes of `pymunk.Space` by the name of the setting, where they differ"""
 
 
 @dataclass(frozen=True)
@@ -51,11 +43,11 @@ def game_code(engine: str, settings: Settings, fps: float, zoom: float, is_slop_
 
 def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bool) -> GameCode:
     """Return lines for a `pymunk.Space` named `space`; only attributes that differ from pymunk's defaults are set."""
-    values = {SPACE_ATTRIBUTES.get(key, key): getattr(settings, key) for key in ("iterations", *SPACE_ATTRIBUTES)}
+    values = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
     lines = [
         f"space.{name} = {value!r}"
         for name, value in values.items()
-        if not math.isclose(value, PYMUNK_DEFAULTS[name], rel_tol=SAME_VALUE)
+        if not math.isclose(value, SPACE_DEFAULTS[name], rel_tol=SAME_VALUE)
     ]
     lines.append(f"dt = 1 / {fps:.17g}")
     count = settings.substeps
@@ -74,7 +66,7 @@ def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bo
 
 def _pymunk_remarks(settings: Settings, zoom: float, is_slop_stated: bool) -> list[str]:
     assert settings.slop is not None
-    default = PYMUNK_DEFAULTS["collision_slop"]
+    default = SPACE_DEFAULTS["collision_slop"]
     if math.isclose(settings.slop, default, rel_tol=SAME_VALUE):
         return []
     source = "stated in the scene" if is_slop_stated else "the sandbox's default, 1 % of the smallest radius"

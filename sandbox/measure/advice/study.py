@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sandbox.action import Switch
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.assembly import (
     AdviceMeasurements,
@@ -18,7 +19,7 @@ from sandbox.measure.advice.assembly import (
     settings_change,
 )
 from sandbox.measure.advice.forecast import forecast, game_notes
-from sandbox.measure.advice.game_code import PYMUNK_DEFAULTS, SAME_VALUE
+from sandbox.measure.advice.game_code import SAME_VALUE
 from sandbox.measure.advice.result import (
     Advice,
     FallbackKind,
@@ -304,7 +305,7 @@ def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Confi
     """Return the configuration with pymunk's own slop, which a game has that does not set it."""
     if configuration.engine != "pymunk" or not space.has_contacts:
         return []
-    slop = PYMUNK_DEFAULTS["collision_slop"]
+    slop = SPACE_DEFAULTS["collision_slop"]
     changed, present = configuration.with_option("slop", slop), space.resolved(configuration).slop
     is_known = present is not None and math.isclose(present, slop, rel_tol=SAME_VALUE)  # pymunk keeps 32 bits of it
     is_new = space.is_valid(changed) and not is_known

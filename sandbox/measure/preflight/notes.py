@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 
 from sandbox.engines.box2d_adapter.engine import Box2DEngine
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, MAX_TURN, scale_for
+from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, PymunkEngine
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
@@ -21,14 +23,16 @@ MAX_OUTLINES = 20
 
 
 def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
-    """Return notes: units that look like pixels, concave outlines, limits of the audit, predictability.
+    """Return notes: names of settings, units that look like pixels, concave outlines, limits of the audit and others.
 
     Args:
         scene: the scene.
-        engine: with "box2d", its 32-bit numbers and lengths for this scene too.
+        engine: with "box2d", its 32-bit numbers and lengths for this scene too; with "pymunk", its settings by their
+            names in pymunk.
     """
     return [
         *(_box2d(scene) if engine == "box2d" else ()),
+        *_pymunk(scene, engine),
         *_pixels(scene),
         *_flight(scene),
         *_outlines(scene),
@@ -135,6 +139,35 @@ def _box2d(scene: Scene) -> Iterator[Diagnostic]:
     details: Details = {"slop": slop, "margin": margin, "spacing": spacing, "scale": scale}
     yield Diagnostic("box2d", message, details)
 
+
+def _pymunk(scene: Scene, engine: str | None) -> Iterator[Diagnostic]:
+    """Yield the attributes of a `pymunk.Space` with the settings of a scene, and its defaults where these differ.
+
+    Without an engine, only a slop that is large for the scene is noted, such as pymunk's own in a scene in metres.
+    """
+    matrix = contact_matrix(scene)
+    moving = matrix.touches & ~scene.bodies.fixed & (scene.bodies.thin > 0.0)
+    if engine not in (None, "pymunk") or not moving.any():
+        return
+    settings = PymunkEngine().resolve(scene, scene.solver)
+    half, slop = float(scene.bodies.thin[moving].min()), settings.slop
+    assert slop is not None
+    if engine is None and slop <= LARGE_SLOP * half:
+        return
+    values: Details = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
+    texts = []
+    for name, value in values.items():
+        own = SPACE_DEFAULTS[name]
+        is_own = math.isclose(cast(float, value), own, rel_tol=1e-5)  # pymunk rounds its defaults to 32 bits
+        texts.append(f"space.{name} = {value:.3g}" + ("" if is_own else f" (pymunk's default: {own:.3g})"))
+    message = (
+        f"pymunk: {', '.join(texts)}; bodies may overlap by {100.0 * slop / half:.3g} % of the narrowest half width"
+    )
+    yield Diagnostic("pymunk", message, {**values, "half_width": half})
+
+
+LARGE_SLOP = 0.05
+"""Fraction of the narrowest half width from which on a slop is noted"""
 
 MARGIN_SLOPS = 4.0
 """Distance, in slops, from which on Box2D counts bodies as touching: `B2_SPECULATIVE_DISTANCE`"""

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pymunk
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -19,7 +20,7 @@ from sandbox.measure.preflight import (
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import from_document, loads
 from tests import strategies
 
 pytestmark = pytest.mark.full  # long runs and sweeps
@@ -625,3 +626,25 @@ def test_first_order_flight_is_noted_with_its_error() -> None:
     assert error == pytest.approx(float(note.details["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
     exact = scene.model_copy(update={"solver": scene.solver.replace(integrator="velocity_verlet", detection="bisect")})
     assert "flight" not in [each.kind for each in notes(exact)]
+
+
+BALL_ABOVE = {"position": [0, 1], "radius": 0.5}
+
+
+def test_settings_are_noted_by_their_names_in_pymunk_with_its_defaults_where_they_differ() -> None:
+    scene = from_document(
+        {"ball": [{"position": [0, 1], "radius": 0.5}], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
+    )
+    (note,) = (each for each in notes(scene, "pymunk") if each.kind == "pymunk")
+    assert "space.collision_slop = 0.005 (pymunk's default: 0.1)" in note.message
+    assert "space.iterations = 10, " in note.message  # the same in pymunk
+    space = pymunk.Space()
+    for name in ("iterations", "collision_bias", "collision_persistence"):
+        assert note.details[name] == pytest.approx(getattr(space, name), rel=1e-5)  # pymunk rounds to 32 bits
+    assert not [each for each in notes(scene) if each.kind == "pymunk"]
+
+
+def test_slop_that_is_large_for_the_bodies_is_noted_on_any_engine() -> None:
+    table = {"ball": [BALL_ABOVE], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
+    (note,) = (each for each in notes(from_document({**table, "solver": {"slop": 0.1}})) if each.kind == "pymunk")
+    assert "overlap by 20 % of the narrowest half width" in note.message
