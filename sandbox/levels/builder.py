@@ -266,7 +266,7 @@ class LevelBuilder:
         if isinstance(shape, CircleShape):
             numbers.append(shape.radius)
         elif isinstance(shape, RectangleShape):
-            numbers += shape.size
+            numbers += (*shape.size, shape.radius)
         elif isinstance(shape, LineShape):
             numbers.append(shape.thickness)
         if not all(abs(each) <= MAX_POSITION for each in numbers):  # also finds NaN

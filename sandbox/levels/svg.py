@@ -28,6 +28,7 @@ from sandbox.levels.outlines import (
     LevelShape,
     LineShape,
     PolygonShape,
+    RectangleShape,
     contains_point,
     ellipse_shape,
     outline_of,
@@ -314,14 +315,16 @@ class _Drawing:
             self._builder.add(pieces, context.role, context.label or _label(node), context.keys, element)
 
     def _painted(self, shapes: Iterator[LevelShape], context: _Context) -> Iterator[LevelShape]:
-        """Yield shapes, with the outlines of static ones that are not filled as walls."""
+        """Yield shapes: static ones without a fill as walls along their outlines, rounded zones as polygons."""
         style = context.style
         is_hollow = style["fill"] == "none" and style["stroke"] != "none" and context.role == "static"
         for shape in shapes:
-            if not is_hollow or isinstance(shape, LineShape):
+            if context.role == "zone" and isinstance(shape, RectangleShape) and shape.radius:
+                yield PolygonShape(outline_of(shape, self._tolerance))
+            elif not is_hollow or isinstance(shape, LineShape):
                 yield shape
-                continue
-            yield LineShape(outline_of(shape, self._tolerance), _stroke_width(context), closed=True)
+            else:
+                yield LineShape(outline_of(shape, self._tolerance), _stroke_width(context), closed=True)
 
     @property
     def _tolerance(self) -> float:

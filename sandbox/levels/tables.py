@@ -87,11 +87,12 @@ def table_of(shape: LevelShape, role: LevelRole, rounding: LengthRounding) -> tu
         case CircleShape(centre, radius):
             table = {"static": "post", "dynamic": "ball", "zone": "zone"}[role]
             return table, {"position": rounding.point(centre, radius), "radius": rounding.length(radius)}
-        case RectangleShape(centre, size, angle) if role != "zone":
+        case RectangleShape(centre, size, angle, radius) if role != "zone":
             position, (width, height) = rounding.point(centre, max(size)), size
             values = {"position": position, "size": (rounding.length(width), rounding.length(height))}
+            round_corners = {"radius": rounding.length(radius)} if radius else {}
             turned = round(angle, 12)
-            return "box", values | ({"angle": turned} if turned else {}) | fixed
+            return "box", values | round_corners | ({"angle": turned} if turned else {}) | fixed
         case RectangleShape():
             extent = max(shape.size)
             return "zone", {"points": tuple(rounding.point(each, extent) for each in outline_of(shape, extent))}
@@ -117,6 +118,9 @@ def bounds_of(shape: LevelShape) -> Sequence[Point]:
     match shape:
         case CircleShape((x, y), radius):
             return ((x - radius, y - radius), (x + radius, y + radius))
+        case RectangleShape(radius=radius) if radius:
+            corners = outline_of(shape._replace(radius=0.0), 0.0)
+            return [(x + side * radius, y + side * radius) for x, y in corners for side in (-1.0, 1.0)]
         case _:
             return outline_of(shape, 0.0)
 
