@@ -214,7 +214,7 @@ def rectangle_shape(
     tolerance: float = 0.0,
     radii: tuple[float, float] = (0.0, 0.0),
 ) -> RectangleShape | PolygonShape:
-    """Return the image of a rectangle with sides along x and y: a polygon if it is sheared, or its corners no circles.
+    """Return the image of a rectangle with sides along x and y: a polygon if it is sheared or its corners are elliptic.
 
     Rectangles whose round corners leave no straight side become polygons too, because a box has a width and a height.
 

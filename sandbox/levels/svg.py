@@ -16,7 +16,6 @@ from sandbox.levels.builder import (
     ROLES,
     ImportedLevel,
     LevelBuilder,
-    LevelElement,
     LevelOptions,
     LevelPiece,
     ShapeKeys,
@@ -36,6 +35,7 @@ from sandbox.levels.outlines import (
     translation,
 )
 from sandbox.levels.safe_xml import MAX_XML_ELEMENTS, XmlNode, parse_xml, read_text, refuse
+from sandbox.levels.scene_text import LevelElement
 from sandbox.levels.svg_paths import PathError, Subpath, subpaths
 from sandbox.levels.svg_values import (
     IGNORED,
