@@ -17,6 +17,7 @@ from sandbox.echo import printable
 SCENE_ENDINGS = (".toml",)
 SESSION_ENDINGS = (".toml", ".json")
 RUN_ENDINGS = (".npz", ".json")
+LEVEL_ENDINGS = (".svg", ".tmx", ".json")
 
 Words = Callable[[click.Context, str], Iterable[str]]
 
@@ -132,6 +133,10 @@ def _runs(_ctx: click.Context, incomplete: str) -> Iterable[str]:
     return _files(incomplete, RUN_ENDINGS)
 
 
+def _levels(_ctx: click.Context, incomplete: str) -> Iterable[str]:
+    return _files(incomplete, LEVEL_ENDINGS)
+
+
 def _folders(_ctx: click.Context, incomplete: str) -> Iterable[str]:
     return _files(incomplete, ())
 
@@ -201,6 +206,7 @@ _WORDS: dict[str, Words] = {
     "scene": _scenes,
     "scenes": _scenes,
     "run": _runs,
+    "level": _levels,
     "folder": _folders,
     "engine": _engines,
     "engines": _several_engines,

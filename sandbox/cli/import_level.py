@@ -1,4 +1,4 @@
-"""Command `import`: convert a level drawn in another program to a scene file."""
+"""Command `import`: convert a level of another program to a scene file."""
 
 import math
 import re
@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
+from click.core import ParameterSource
 
 from sandbox.atomic_write import atomic_write
 from sandbox.cli.common import exit_with_errors, plural, reasons_not_writable
@@ -21,12 +22,14 @@ from sandbox.scene.errors import Fault, SceneError
 OTHER_FORMATS = {
     ".svgz": "is compressed; save it as plain SVG (.svg)",
     ".tmj": "is a map in JSON; save it as .tmx",
-    ".json": "is a map in JSON; save it as .tmx",
+    ".msgpack": "is binary; save the shot as .json",
     ".tsx": "is a tileset; import the map (.tmx) that uses it",
     ".toml": "is a scene already; use `sandbox run`",
 }
 """Messages for files of related formats, by suffix."""
-
+SUFFIXES = (".svg", ".tmx", ".json")
+OF_DRAWINGS = ("scale", "tolerance", "gravity", "origin")
+"""Options that do not apply to a shot, which is in metres and has a gravity."""
 
 MAX_WARNINGS = 100
 """Warnings that are printed, one per line."""
@@ -44,7 +47,7 @@ class ImportDocument:
     toml: str | None = None
     """text of the scene, if no file was written"""
     scale: float
-    """m for each user unit or pixel"""
+    """m for each user unit or pixel; 1 for a shot"""
     counts: Mapping[str, int] = field(default_factory=dict)
     """elements by table of the scene"""
     warnings: Sequence[Fault] = ()
@@ -82,22 +85,24 @@ def import_command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Convert a level drawn in another program to a scene file.
+    """Convert a level of another program to a scene file.
 
-    LEVEL is a drawing (.svg, as of Inkscape) or a map of Tiled (.tmx). Shapes are static unless they, or a layer or
-    group around them, are marked: by data-body="dynamic" or a label with the word "dynamic" in a drawing, by the
-    property dynamic or the class "dynamic" in a map. Further words are "zone" and "ignore". Keys of a scene, such as
-    friction, are attributes data-friction in a drawing, and properties in a map. Parts that cannot be imported are
-    listed on standard error.
+    LEVEL is a drawing (.svg, as of Inkscape), a map of Tiled (.tmx), or a saved shot of pooltool (.json). Shapes of
+    drawings and maps are static unless they, or a layer or group around them, are marked: by data-body="dynamic" or a
+    label with the word "dynamic" in a drawing, by the property dynamic or the class "dynamic" in a map. Further words
+    are "zone" and "ignore". Keys of a scene, such as friction, are attributes data-friction in a drawing, and
+    properties in a map. Parts that cannot be imported are listed on standard error.
     """
     faults: list[Fault] = []
     options = LevelOptions(scale=scale, tolerance=tolerance, gravity=_gravity(gravity, faults), origin=origin)
     faults += options.faults()
     suffix = Path(level).suffix.lower()
-    if suffix not in (".svg", ".tmx"):
-        faults.append(
-            Fault(level, None, "", OTHER_FORMATS.get(suffix, "is no level; its name must end in .svg or .tmx"))
-        )
+    if suffix not in SUFFIXES:
+        message = OTHER_FORMATS.get(suffix, "is no level; its name must end in .svg, .tmx or .json")
+        faults.append(Fault(level, None, "", message))
+    if suffix == ".json":
+        faults += _faults_for_a_shot()
+        scale = 1.0
     faults += _target_faults(level, target, force)
     imported: ImportedLevel | None = None
     if not faults:
@@ -137,9 +142,20 @@ def _import(level: str, suffix: str, options: LevelOptions) -> ImportedLevel:
         from sandbox.levels.svg import import_svg
 
         return import_svg(Path(level), options)
-    from sandbox.levels.tiled import import_tmx
+    if suffix == ".tmx":
+        from sandbox.levels.tiled import import_tmx
 
-    return import_tmx(level, options)
+        return import_tmx(level, options)
+    from sandbox.levels.pooltool import import_pooltool
+
+    return import_pooltool(Path(level))
+
+
+def _faults_for_a_shot() -> list[Fault]:
+    """Return a fault for each option of the command line that does not apply to a shot."""
+    source_of = click.get_current_context().get_parameter_source
+    given = [name for name in OF_DRAWINGS if source_of(name) is ParameterSource.COMMANDLINE]
+    return [Fault(f"--{name}", None, "", "does not apply to a shot of pooltool; leave it out") for name in given]
 
 
 def _summary(imported: ImportedLevel) -> str:

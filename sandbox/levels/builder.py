@@ -1,11 +1,10 @@
 """Builds a scene from the shapes of a level: names, roles, keys, the text with its comments, and faults by element."""
 
-import bisect
 import difflib
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
 from sandbox.echo import MAX_NAMED, printable, short_repr, shorten
@@ -18,6 +17,7 @@ from sandbox.levels.outlines import (
     is_straight,
     without_repeats,
 )
+from sandbox.levels.scene_text import LevelBlock, LevelElement, clean_text, compose_scene, toml_text
 from sandbox.levels.tables import (
     MODELS,
     PART_MODELS,
@@ -27,9 +27,7 @@ from sandbox.levels.tables import (
     colour_values,
     keys_of,
     parse_value,
-    table_lines,
     table_of,
-    toml_text,
 )
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_POSITION, Part, Point
@@ -37,8 +35,7 @@ from sandbox.scene.description.bodies import (
     MAX_CORNERS,
     MAX_PARTS,
 )
-from sandbox.scene.errors import Fault, SceneError, quoted
-from sandbox.scene.files.load import loads
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.geometry.polygon import outline_fault
 
 ROLES: tuple[str, ...] = get_args(LevelRole)
@@ -93,17 +90,6 @@ class ImportedLevel:
     """number of elements by table of the scene"""
 
 
-class LevelElement(NamedTuple):
-    """Element of a level, as messages name it."""
-
-    path: str
-    """such as `rect#crate`"""
-    line: int | None
-    """line in the file, from 1"""
-    file: str = ""
-    """file of the element, if it is not the level itself"""
-
-
 @dataclass(frozen=True)
 class ShapeKeys:
     """Keys that an element, and the groups around it, give to its shapes."""
@@ -127,14 +113,6 @@ class LevelPiece(NamedTuple):
     shape: LevelShape
     keys: ShapeKeys
     colour: str | None
-    element: LevelElement
-
-
-class _Block(NamedTuple):
-    """One table of the scene."""
-
-    table: str
-    values: dict[str, Any]
     element: LevelElement
 
 
@@ -174,7 +152,7 @@ class LevelBuilder:
         self.warnings: list[Fault] = []
         self.faults: list[Fault] = []
         self._unit = unit
-        self._blocks: list[_Block] = []
+        self._blocks: list[LevelBlock] = []
         self._names: set[str] = set()
         self._copies: Counter[str] = Counter()
         self._materials: dict[str, None] = {}
@@ -226,7 +204,7 @@ class LevelBuilder:
                 continue
             known = self._values(piece_keys, table, element)
             named = {"name": self._unique(name or table)}
-            self._blocks.append(_Block(table, named | values | colour_values(colour) | known, element))
+            self._blocks.append(LevelBlock(table, named | values | colour_values(colour) | known, element))
 
     def _add_compound(self, pieces: Sequence[LevelPiece], name: str, keys: ShapeKeys, element: LevelElement) -> None:
         """Add a rigid body of several shapes, with its position at the centre of their bounding box."""
@@ -250,7 +228,7 @@ class LevelBuilder:
             own = ShapeKeys({key: text for key, text in part_keys.all.items() if keys.all.get(key) != text})
             known = self._values(own, table, part_element, PART_MODELS[table])
             parts[table].append(part | colour_values(colour) | known)
-        self._blocks.append(_Block("body", values | {key: those for key, those in parts.items() if those}, element))
+        self._blocks.append(LevelBlock("body", values | {key: those for key, those in parts.items() if those}, element))
 
     def _checked(self, piece: LevelPiece) -> LevelPiece | None:
         """Return a piece with a shape that a scene accepts, or None after a note of its fault."""
@@ -266,7 +244,7 @@ class LevelBuilder:
         if isinstance(shape, CircleShape):
             numbers.append(shape.radius)
         elif isinstance(shape, RectangleShape):
-            numbers += shape.size
+            numbers += (*shape.size, shape.radius)
         elif isinstance(shape, LineShape):
             numbers.append(shape.thickness)
         if not all(abs(each) <= MAX_POSITION for each in numbers):  # also finds NaN
@@ -354,17 +332,13 @@ class LevelBuilder:
         blocks = sorted(self._blocks, key=lambda block: order[block.table])
         for material in self._materials:
             self.warn(level, f"material {short_repr(material)} has no coefficients yet; add them under [[material]]")
-        text, starts = self._text(title, blocks)
-        try:
-            scene = loads(text, self.file)
-        except SceneError as error:
-            raise SceneError([self._located(fault, blocks, starts) for fault in error.faults]) from None
+        scene, text = compose_scene(self._head(title), blocks, self.file)
         if all(getattr(body, "fixed", False) for body in scene.body_sources):
             self.warn(level, 'nothing moves: mark dynamic bodies, see "sandbox import --help"')
         return ImportedLevel(scene, text, tuple(dict.fromkeys(self.warnings)), Counter(block.table for block in blocks))
 
-    def _text(self, title: str, blocks: Sequence[_Block]) -> tuple[str, list[int]]:
-        """Return the text of the scene, and the line (from 1) of the heading of each block."""
+    def _head(self, title: str) -> list[str]:
+        """Return the lines of the scene before its shapes."""
         options = self.options
         gravity = options.gravity or self.gravity or (0.0, -9.81)
         corner = {"lower-left": "lower left corner", "upper-left": "upper left corner", "centre": "centre"}
@@ -373,34 +347,11 @@ class LevelBuilder:
             f"# 1 {self._unit} is {options.scale:g} m; (0, 0) is the {corner[options.origin]}; y points up.",
             f"# Curves are polygons within {options.tolerance:g} {self._unit}s.",
             "",
-            f"title = {toml_text(_clean(self.title)[:200] or _clean(title)[:200])}",
+            f"title = {toml_text(clean_text(self.title)[:200] or clean_text(title)[:200])}",
         ]
         if self.about:
-            lines.append(f"about = {toml_text(_clean(self.about)[:2000])}")
+            lines.append(f"about = {toml_text(clean_text(self.about)[:2000])}")
         lines += ["", "[world]", f"gravity = {toml_text(list(gravity))}"]
         for material in self._materials:
             lines += ["", "[[material]]", f"name = {toml_text(material)}"]
-        starts = []
-        for block in blocks:
-            lines.append("")
-            starts.append(len(lines) + 1)
-            line = "" if block.element.line is None else f", line {block.element.line}"
-            comment = f"  # {shorten(printable(block.element.path))}{line}" if block.element.path else ""
-            lines.append(f"[[{block.table}]]{comment}")
-            lines += table_lines(block.values)
-        return "\n".join(lines) + "\n", starts
-
-    def _located(self, fault: Fault, blocks: Sequence[_Block], starts: Sequence[int]) -> Fault:
-        """Return a fault of the scene as a fault of the element of the level."""
-        index = bisect.bisect_right(starts, fault.line or 0) - 1
-        if index < 0:
-            return replace(fault, line=None)
-        block = blocks[index]
-        rest = fault.path.removeprefix(f"{block.table}.{quoted(block.values['name'])}").lstrip(".")
-        path = f"{block.element.path}.{rest}" if rest and block.element.path else block.element.path or fault.path
-        return Fault(block.element.file or self.file, block.element.line, path, fault.message)
-
-
-def _clean(text: str) -> str:
-    """Return a text in one line, without control characters."""
-    return " ".join("".join(sign if sign.isprintable() else " " for sign in text).split())
+        return lines

@@ -100,14 +100,16 @@ class CircleShape(NamedTuple):
 
 
 class RectangleShape(NamedTuple):
-    """A solid rectangle."""
+    """A solid rectangle, which may have round corners."""
 
     centre: Point
     """m"""
     size: tuple[float, float]
-    """width and height before rotation, m"""
+    """width and height before rotation, without the radius, m"""
     angle: float
     """rad, counter-clockwise, between −π/2 and π/2"""
+    radius: float = 0.0
+    """radius by which it is widened on all sides, which rounds its corners, m"""
 
 
 class PolygonShape(NamedTuple):
@@ -212,7 +214,9 @@ def rectangle_shape(
     tolerance: float = 0.0,
     radii: tuple[float, float] = (0.0, 0.0),
 ) -> RectangleShape | PolygonShape:
-    """Return the image of a rectangle with sides along x and y: a polygon if it is rounded or sheared.
+    """Return the image of a rectangle with sides along x and y: a polygon if it is sheared or its corners are elliptic.
+
+    Rectangles whose round corners leave no straight side become polygons too, because a box has a width and a height.
 
     Args:
         corner: the corner with the smallest coordinates, in the drawing.
@@ -222,17 +226,33 @@ def rectangle_shape(
         radii: of rounded corners, in the drawing; at most half of the size.
     """
     (x, y), (width, height), (rx, ry) = corner, size, radii
-    if rx <= 0.0 or ry <= 0.0:
-        if transform.keeps_right_angles:
-            angle = math.atan2(transform.b, transform.a)
-            if angle > 0.5 * math.pi:
-                angle -= math.pi
-            elif angle <= -0.5 * math.pi:
-                angle += math.pi
-            image = width * math.hypot(transform.a, transform.b), height * math.hypot(transform.c, transform.d)
-            return RectangleShape(transform.apply(x + 0.5 * width, y + 0.5 * height), image, angle)
+    is_rounded = rx > 0.0 and ry > 0.0
+    is_circular = (
+        transform.is_similarity and abs(rx - ry) <= SIMILARITY * rx and 2.0 * rx < min(size) * (1 - SIMILARITY)
+    )
+    if transform.keeps_right_angles and (is_circular or not is_rounded):
+        angle = math.atan2(transform.b, transform.a)
+        if angle > 0.5 * math.pi:
+            angle -= math.pi
+        elif angle <= -0.5 * math.pi:
+            angle += math.pi
+        radius = rx if is_rounded else 0.0
+        across, up = math.hypot(transform.a, transform.b), math.hypot(transform.c, transform.d)
+        image = (width - 2.0 * radius) * across, (height - 2.0 * radius) * up
+        return RectangleShape(
+            transform.apply(x + 0.5 * width, y + 0.5 * height), image, angle, radius * transform.mean_scale
+        )
+    if not is_rounded:
         corners = ((x, y), (x + width, y), (x + width, y + height), (x, y + height))
         return PolygonShape(tuple(transform.apply(*each) for each in corners))
+    return PolygonShape(_rounded_corners(corner, size, (rx, ry), transform, tolerance))
+
+
+def _rounded_corners(
+    corner: Point, size: tuple[float, float], radii: tuple[float, float], transform: Affine, tolerance: float
+) -> tuple[Point, ...]:
+    """Return the corners of the image of a rounded rectangle; the arguments are those of `rectangle_shape`."""
+    (x, y), (width, height), (rx, ry) = corner, size, radii
     count = arc_steps(max(rx, ry) * transform.scale_factors[0], 0.5 * math.pi, tolerance)
     centres = (
         (x + width - rx, y + height - ry),
@@ -245,19 +265,23 @@ def rectangle_shape(
         for k in range(count + 1):
             angle = 0.5 * math.pi * (quarter + k / count)
             points.append(transform.apply(cx + rx * math.cos(angle), cy + ry * math.sin(angle)))
-    return PolygonShape(tuple(points))
+    return tuple(points)
 
 
 def outline_of(shape: LevelShape, tolerance: float) -> tuple[Point, ...]:
-    """Return the corners of a shape, of a circle those of a polygon within a tolerance, m."""
+    """Return the corners of a shape; those of circles and round corners are within a tolerance, m."""
     match shape:
         case CircleShape(centre, radius):
             count = _ellipse_corners(radius, tolerance)
             unit = Affine(radius, 0.0, 0.0, radius, *centre)
             angles = (2.0 * math.pi * k / count for k in range(count))
             return tuple(unit.apply(math.cos(each), math.sin(each)) for each in angles)
-        case RectangleShape((x, y), (width, height), angle):
+        case RectangleShape((x, y), (width, height), angle, radius):
             frame = translation(x, y).after(rotation(angle))
+            if radius > 0.0:
+                corner = -0.5 * width - radius, -0.5 * height - radius
+                outer = width + 2.0 * radius, height + 2.0 * radius
+                return _rounded_corners(corner, outer, (radius, radius), frame, tolerance)
             signs = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
             return tuple(frame.apply(i * width, j * height) for i, j in signs)
         case PolygonShape(points) | LineShape(points):

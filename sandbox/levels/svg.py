@@ -16,7 +16,6 @@ from sandbox.levels.builder import (
     ROLES,
     ImportedLevel,
     LevelBuilder,
-    LevelElement,
     LevelOptions,
     LevelPiece,
     ShapeKeys,
@@ -28,6 +27,7 @@ from sandbox.levels.outlines import (
     LevelShape,
     LineShape,
     PolygonShape,
+    RectangleShape,
     contains_point,
     ellipse_shape,
     outline_of,
@@ -35,6 +35,7 @@ from sandbox.levels.outlines import (
     translation,
 )
 from sandbox.levels.safe_xml import MAX_XML_ELEMENTS, XmlNode, parse_xml, read_text, refuse
+from sandbox.levels.scene_text import LevelElement
 from sandbox.levels.svg_paths import PathError, Subpath, subpaths
 from sandbox.levels.svg_values import (
     IGNORED,
@@ -314,14 +315,16 @@ class _Drawing:
             self._builder.add(pieces, context.role, context.label or _label(node), context.keys, element)
 
     def _painted(self, shapes: Iterator[LevelShape], context: _Context) -> Iterator[LevelShape]:
-        """Yield shapes, with the outlines of static ones that are not filled as walls."""
+        """Yield shapes: static ones without a fill as walls along their outlines, rounded zones as polygons."""
         style = context.style
         is_hollow = style["fill"] == "none" and style["stroke"] != "none" and context.role == "static"
         for shape in shapes:
-            if not is_hollow or isinstance(shape, LineShape):
+            if context.role == "zone" and isinstance(shape, RectangleShape) and shape.radius:
+                yield PolygonShape(outline_of(shape, self._tolerance))
+            elif not is_hollow or isinstance(shape, LineShape):
                 yield shape
-                continue
-            yield LineShape(outline_of(shape, self._tolerance), _stroke_width(context), closed=True)
+            else:
+                yield LineShape(outline_of(shape, self._tolerance), _stroke_width(context), closed=True)
 
     @property
     def _tolerance(self) -> float:

@@ -1,9 +1,8 @@
-"""Tables of a scene from shapes of a level: the values of their geometry and keys, and their text."""
+"""Tables of a scene from shapes of a level: the values of their geometry and keys."""
 
-import json
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -47,8 +46,6 @@ _TEXTS = frozenset({"material", "collides", "layer", "to_layer", "colour"})
 """Keys whose values are text, even one that looks like a number."""
 _LISTS = frozenset({"layers"})
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
-_WIDTH = 120
-"""Columns of the text."""
 
 
 @cache
@@ -87,11 +84,12 @@ def table_of(shape: LevelShape, role: LevelRole, rounding: LengthRounding) -> tu
         case CircleShape(centre, radius):
             table = {"static": "post", "dynamic": "ball", "zone": "zone"}[role]
             return table, {"position": rounding.point(centre, radius), "radius": rounding.length(radius)}
-        case RectangleShape(centre, size, angle) if role != "zone":
+        case RectangleShape(centre, size, angle, radius) if role != "zone":
             position, (width, height) = rounding.point(centre, max(size)), size
             values = {"position": position, "size": (rounding.length(width), rounding.length(height))}
+            round_corners = {"radius": rounding.length(radius)} if radius else {}
             turned = round(angle, 12)
-            return "box", values | ({"angle": turned} if turned else {}) | fixed
+            return "box", values | round_corners | ({"angle": turned} if turned else {}) | fixed
         case RectangleShape():
             extent = max(shape.size)
             return "zone", {"points": tuple(rounding.point(each, extent) for each in outline_of(shape, extent))}
@@ -117,6 +115,9 @@ def bounds_of(shape: LevelShape) -> Sequence[Point]:
     match shape:
         case CircleShape((x, y), radius):
             return ((x - radius, y - radius), (x + radius, y + radius))
+        case RectangleShape(radius=radius) if radius:
+            corners = outline_of(shape._replace(radius=0.0), 0.0)
+            return [(x + side * radius, y + side * radius) for x, y in corners for side in (-1.0, 1.0)]
         case _:
             return outline_of(shape, 0.0)
 
@@ -142,36 +143,3 @@ def parse_value(key: str, text: str) -> Any:
             return {"speed": numbers[0]}
         return numbers[0] if len(numbers) == 1 else numbers
     return text
-
-
-def table_lines(values: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the lines of a table below its heading; the parts of a body are inline tables."""
-    for key, value in values.items():
-        text = f"{key} = {toml_text(value)}"
-        if len(text) <= _WIDTH or not isinstance(value, list | tuple):
-            yield text
-            continue
-        yield f"{key} = ["
-        line = " "
-        for each in value:
-            item = f" {toml_text(each)},"
-            if len(line) + len(item) > _WIDTH and line.strip():
-                yield line
-                line = " "
-            line += item
-        yield from (line, "]")
-
-
-def toml_text(value: Any) -> str:
-    """Return a value as TOML, in one line."""
-    match value:
-        case bool():
-            return "true" if value else "false"
-        case float() | int():
-            return repr(value)
-        case str():
-            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-        case dict():
-            return "{ " + ", ".join(f"{key} = {toml_text(each)}" for key, each in value.items()) + " }"
-        case _:
-            return "[" + ", ".join(map(toml_text, value)) + "]"

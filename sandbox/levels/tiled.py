@@ -20,7 +20,6 @@ from sandbox.echo import short_repr
 from sandbox.levels.builder import (
     ImportedLevel,
     LevelBuilder,
-    LevelElement,
     LevelOptions,
     LevelPiece,
     ShapeKeys,
@@ -41,6 +40,7 @@ from sandbox.levels.outlines import (
     translation,
 )
 from sandbox.levels.safe_xml import XmlNode, parse_xml, read_text, refuse
+from sandbox.levels.scene_text import LevelElement
 from sandbox.levels.tables import LevelRole
 from sandbox.levels.tiled_values import (
     NUMBER,

@@ -30,8 +30,10 @@ radius = 0.1
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Change to a folder with a scene, a session, a run and a folder, and put `sandbox` on the PATH."""
-    for name, text in (("mine.toml", SCENE), ("session.json", "{}"), ("run.npz", ""), (".hidden.toml", SCENE)):
-        (tmp_path / name).write_text(text)
+    for name in ("mine.toml", ".hidden.toml"):
+        (tmp_path / name).write_text(SCENE)
+    for name in ("session.json", "run.npz", "yard.svg", "cave.tmx"):
+        (tmp_path / name).write_text("")
     (tmp_path / "folder").mkdir()
     programs = tmp_path / "folder" / "bin"
     programs.mkdir()
@@ -92,10 +94,11 @@ def test_bash_offers_commands_options_engines_and_scenes() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("workspace")
 def test_bash_offers_files_and_keys_of_the_scene_on_the_line() -> None:
-    files, hidden, runs, tables, names, keys, solver, values = in_bash(
+    files, hidden, runs, levels, tables, names, keys, solver, values = in_bash(
         "sandbox check mi",
         "sandbox check .h",
         "sandbox replay ",
+        "sandbox import ",
         "sandbox run mine.toml --set b",
         "sandbox run mine.toml --set ball.",
         "sandbox run mine.toml --set ball.cue.ve",
@@ -105,6 +108,7 @@ def test_bash_offers_files_and_keys_of_the_scene_on_the_line() -> None:
     assert files == ["mine.toml"]
     assert hidden == [".hidden.toml"]
     assert runs == ["folder/", "run.npz", "session.json"]
+    assert levels == ["cave.tmx", "folder/", "session.json", "yard.svg"]
     assert tables == ["ball."]
     assert names == ["ball.cue.", "ball.ball-2."]
     assert keys == ["ball.cue.velocity="]

@@ -97,6 +97,20 @@ def test_rounded_rectangle_has_the_area_of_its_sides_and_quarters() -> None:
     )  # tolerance × length
 
 
+def test_rectangle_with_circular_corners_keeps_its_radius_and_outline() -> None:
+    shape = rectangle_shape((0.0, 0.0), (10.0, 6.0), rotation(0.3).after(Affine(2.0, 0.0, 0.0, 2.0)), 1e-4, (1.0, 1.0))
+    assert isinstance(shape, RectangleShape)
+    assert (*shape.size, shape.radius) == pytest.approx((16.0, 8.0, 2.0), rel=1e-12)
+    assert signed_area(outline_of(shape, 1e-6)) == pytest.approx(
+        240.0 - (4.0 - math.pi) * 4.0, abs=1e-6 * 64.0
+    )  # tolerance × length
+
+
+@pytest.mark.parametrize("radii", [(3.0, 3.0), (1.0, 0.5), (1.0, 1.0 + 1e-4)])
+def test_rectangle_whose_corners_a_box_cannot_have_is_a_polygon(radii: tuple[float, float]) -> None:
+    assert isinstance(rectangle_shape((0.0, 0.0), (10.0, 6.0), Affine(), 1e-4, radii), PolygonShape)
+
+
 @given(st.lists(st.tuples(offsets, offsets), min_size=3, max_size=4), st.sampled_from([1.0, 0.1, 0.01]))
 def test_bezier_curve_stays_within_the_tolerance_of_its_polyline(
     controls: list[tuple[float, float]], tolerance: float

@@ -28,6 +28,37 @@ def test_rectangle_becomes_a_box_and_turns_with_its_transform() -> None:
     assert abs(turned.angle) == pytest.approx(math.pi / 2, abs=1e-12)
 
 
+def test_rounded_rectangle_becomes_a_box_with_a_radius() -> None:
+    rounded = '<rect x="10" y="20" width="30" height="20" rx="4" transform="scale(2)"/>'
+    (box,) = imported(dynamic(rounded)).scene.boxes
+    assert box.position == pytest.approx((0.5, 0.4), abs=EXACT)
+    assert (*box.size, box.radius) == pytest.approx((0.44, 0.24, 0.08), abs=EXACT)
+    (fixed,) = imported(rounded).scene.boxes
+    assert (fixed.size, fixed.radius, fixed.fixed) == (box.size, box.radius, True)
+
+
+@pytest.mark.parametrize("corners", ['rx="4" ry="3"', 'rx="10"', 'rx="4" transform="scale(1,2)"'])
+def test_rectangle_with_other_round_corners_becomes_a_polygon(corners: str) -> None:
+    level = imported(f'<rect x="10" y="20" width="30" height="20" {corners}/>')
+    assert dict(level.counts) == {"polygon": 1}
+
+
+def test_rounded_rectangle_keeps_its_corners_as_a_zone_as_a_hollow_wall_and_in_a_body() -> None:
+    area = (30.0 * 20.0 - (4.0 - math.pi) * 16.0) * 1e-4
+    tolerance = 0.001 * 100e-4  # px of the outline, 100 px long, in m²
+    rounded = '<rect x="10" y="20" width="30" height="20" rx="4" {}/>'
+    (zone,) = imported(rounded.format('data-body="zone"'), tolerance=0.001).scene.zones
+    (wall,) = imported(rounded.format('fill="none" stroke="black"'), tolerance=0.001).scene.walls
+    for points in (zone.points, wall.points):
+        assert points is not None
+        assert abs(signed_area(points)) == pytest.approx(area, abs=tolerance)
+    group = f'<g data-body="compound">{rounded.format("")}<circle cx="50" cy="30" r="10"/></g>'
+    (body,) = imported(group).scene.compounds
+    (box,) = body.boxes
+    assert (*box.size, box.radius) == pytest.approx((0.22, 0.12, 0.04), abs=EXACT)
+    assert body.position == pytest.approx((0.35, 0.7), abs=EXACT)  # of the bounding box, which has the round corners
+
+
 def test_transforms_of_nested_groups_are_applied_from_the_inside() -> None:
     body = '<g transform="translate(10,20)"><g transform="scale(2) rotate(90)"><circle cx="3" cy="0" r="1"/></g></g>'
     (post,) = imported(body).scene.posts  # rotate: (0, 3); scale: (0, 6); translate: (10, 26)

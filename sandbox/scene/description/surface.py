@@ -114,6 +114,19 @@ def miscues(stroke: Stroke) -> bool:
     return math.hypot(stroke.side, stroke.height) > MISCUE
 
 
+def squirt_angle(side: float, end_mass: float = END_MASS) -> float:
+    """Return the angle between cue and path of a ball that is struck off its centre, rad, clockwise.
+
+    Source: Alciatore TP A.31.
+
+    Args:
+        side: side offset of the tip as a fraction of the radius, positive to the right.
+        end_mass: effective mass of the cue's end as a fraction of the ball's.
+    """
+    level = 1.0 - side * side
+    return -math.atan(2.5 * side * math.sqrt(level) / (1.0 + 1.0 / end_mass + 2.5 * level))
+
+
 def struck(stroke: Stroke, mass: float, radius: float) -> tuple[tuple[float, float], Spin]:
     """Return the velocity, m/s, and the spin, rad/s, of a sphere directly after a stroke.
 
@@ -124,9 +137,7 @@ def struck(stroke: Stroke, mass: float, radius: float) -> tuple[tuple[float, flo
     """
     a, b = stroke.side, stroke.height
     speed = 2.0 * stroke.speed / (1.0 + mass / stroke.cue_mass + 2.5 * (a * a + b * b))
-    level = 1.0 - a * a
-    squirt = -math.atan(2.5 * a * math.sqrt(level) / (1.0 + 1.0 / END_MASS + 2.5 * level))
-    heading = stroke.aim - squirt  # sidespin to the right deflects the ball to the left
+    heading = stroke.aim - squirt_angle(a)  # sidespin to the right deflects the ball to the left
     cos, sin = math.cos(heading), math.sin(heading)
     rate = speed / (0.4 * radius)
     # b gives spin about the axis to the left of its path, a about z: struck on the right it spins counter-clockwise.
