@@ -126,7 +126,11 @@ def record_command(
 def _faults(game: str, path: Path, force: bool) -> list[Fault]:
     """Return why the game cannot be run, or the recording cannot be written."""
     found = []
-    if not Path(game).exists():
+    try:
+        exists = Path(game).exists()
+    except OSError as error:  # the name is too long for the file system
+        return [Fault(shorten(game, MAX_NAMED), None, "", f"cannot be read: {error.strerror or error}")]
+    if not exists:
         found.append(Fault(game, None, "", "does not exist; name the Python file of the game"))
     elif Path(game).suffix != ".py" and not (Path(game) / "__main__.py").exists():
         found.append(Fault(game, None, "", "is no Python program; name a .py file, or a folder with a __main__.py"))

@@ -45,7 +45,7 @@ def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bo
     """Return lines for a `pymunk.Space` named `space`; only attributes that differ from pymunk's defaults are set."""
     values = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
     lines = [
-        f"space.{name} = {value!r}"
+        f"space.{name} = {float(f'{value:.12g}') if isinstance(value, float) else value!r}"
         for name, value in values.items()
         if not math.isclose(value, SPACE_DEFAULTS[name], rel_tol=SAME_VALUE)
     ]

@@ -146,9 +146,10 @@ def test_flipper_and_plunger_drive_bodies(hand: Hand, tmp_path: Path) -> None:
 
 
 def test_nested_tables_lists_and_points_or_names_are_edited(open_on: Callable[[str], Hand]) -> None:
-    text = BALL + "[[post]]\nposition = [4.0, 1.0]\nradius = 0.3\n[[attraction]]\ntoward = [0.0, 5.0]\nstrength = 1.0\n"
-    hand = open_on(text)
-    hand.click((4.0, 1.0))
+    text = BALL + "[[post]]\nposition = [-9.0, 1.0]\nradius = 0.3\n"
+    text += "[[attraction]]\ntoward = [-20.0, 5.0]\nstrength = 1.0\n"
+    hand = open_on(text)  # both lie to the left of the list of warnings, which may appear at any time
+    hand.click((-9.0, 1.0))
     hand.set_field("selection:post", "kick.threshold", "0.1")
     assert hand.scene.posts[0].kick is None  # without a speed
     hand.set_field("selection:post", "kick.speed", "2")
@@ -160,7 +161,7 @@ def test_nested_tables_lists_and_points_or_names_are_edited(open_on: Callable[[s
     hand.set_field("selection:post", "kick.threshold", "")
     hand.set_field("selection:post", "kick.speed", "")
     assert hand.scene.posts[0].kick is None and "kick" not in hand.view.draft.text
-    hand.click((0.0, 5.0))
+    hand.click((-20.0, 5.0))
     hand.set_field("selection:attraction", "toward", "b")
     assert hand.scene.attractions[0].toward == "b"
     hand.set_field("selection:attraction", "toward", "nothing")
