@@ -55,7 +55,7 @@ def test_joint_of_one_body_is_anchored_in_the_world() -> None:
 def test_missing_values_are_those_of_the_initial_state() -> None:
     assert two_polygons(kind="rotary_spring", stiffness=1).links.figures[0].tolist() == [-0.2 - 0.7, 1, 0]
     assert two_polygons(kind="gear", ratio=3).links.figures[0].tolist() == [-0.2 * 3 - 0.7, 3, 0]
-    assert two_polygons(kind="motor", rate=2).links.most_force[0] == math.inf
+    assert two_polygons(kind="motor", rate=2).links.max_force[0] == math.inf
 
 
 def test_links_list_bodies_held_turned_and_excluded_from_collision() -> None:

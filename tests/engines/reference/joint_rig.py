@@ -30,7 +30,7 @@ def compile_joints(*links: dict[str, Any]) -> JointArrays:
         anchor_b=column("anchor_b", (0.0, 0.0)).reshape(-1, 2),
         figures=column("figures", (0.0, 0.0, 0.0)).reshape(-1, 3),
         wheels=column("wheels", (0.0,) * 4).reshape(-1, 4),
-        most_force=column("most_force", np.inf),
+        max_force=column("max_force", np.inf),
         collide=column("collide", False, np.bool_),
         strength=column("strength", np.inf),
         number=np.arange(len(links)),
