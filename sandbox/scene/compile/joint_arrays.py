@@ -1,6 +1,5 @@
 """Joints of a scene as arrays, J of them, by the indices of their bodies."""
 
-import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
@@ -58,9 +57,9 @@ CLICK_TOLERANCE = 0.05
 """Fraction of the angle between two clicks by which a load may have turned back a ratchet that holds"""
 
 
-def last_click(angle: float, phase: float, ratchet: float) -> float:
-    """Return the last click of a ratchet that turned to an angle, rad, as Munk2D (`cpRatchetJoint.c`)."""
-    return math.floor((angle - phase) / ratchet) * ratchet + phase
+def last_click(angle: npt.ArrayLike, phase: npt.ArrayLike, ratchet: npt.ArrayLike) -> FloatArray:
+    """Return the last clicks of ratchets that turned to some angles, rad, as Munk2D (`cpRatchetJoint.c`)."""
+    return np.asarray(np.floor(np.subtract(angle, phase) / ratchet) * ratchet + phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,11 +193,11 @@ class JointArrays:
         """Return the joints with ratchets at the last clicks of bodies that turned to angles, (N,) rad."""
         if not (self.kind == LinkKind.RATCHET).any():
             return self
-        figures = self.figures.copy()
-        for k in np.flatnonzero(self.kind == LinkKind.RATCHET).tolist():
-            _, phase, ratchet = figures[k].tolist()
-            turned = float(angle[self.b[k]]) - (float(angle[self.a[k]]) if self.a[k] >= 0 else 0.0)
-            figures[k, 0] = last_click(turned + CLICK_TOLERANCE * ratchet, phase, ratchet)
+        rows, figures = self.kind == LinkKind.RATCHET, self.figures.copy()
+        _, phase, ratchet = figures[rows].T
+        a, b = self.a[rows], self.b[rows]
+        turned = angle[b] - np.where(a >= 0, angle[a], 0.0)
+        figures[rows, 0] = last_click(turned + CLICK_TOLERANCE * ratchet, phase, ratchet)
         return replace(self, figures=figures)
 
     @property

@@ -219,8 +219,8 @@ def _figures(
             phase = angle_b * joint.ratio - angle_a if joint.phase is None else joint.phase
             return phase, joint.ratio, 0.0
         case Ratchet():
-            click = last_click(angle_b - angle_a, joint.phase, joint.ratchet) if joint.angle is None else joint.angle
-            return click, joint.phase, joint.ratchet
+            start = last_click(angle_b - angle_a, joint.phase, joint.ratchet)
+            return float(start) if joint.angle is None else joint.angle, joint.phase, joint.ratchet
         case Spring():
             return length if joint.rest_length is None else joint.rest_length, joint.stiffness, joint.damping
         case RotarySpring():

@@ -371,7 +371,7 @@ def _draw_ratchets(view: DrawContext, ratchets: JointSegments) -> None:
     for (x, y), size, base, relative_angle, (_, phase, ratchet) in _dials(view, ratchets):
         count = min(max(int(math.tau / abs(ratchet)), 1), MAX_TEETH)
         tooth = math.copysign(min(abs(ratchet), math.tau), ratchet)
-        first = base + last_click(relative_angle, phase, ratchet) - (count // 2) * tooth
+        first = base + float(last_click(relative_angle, phase, ratchet)) - (count // 2) * tooth
         points = [spot((x, y), 0.85 * size, first)]
         for k in range(count):
             stop = first + (k + 1) * tooth
