@@ -31,6 +31,8 @@ def compile_joints(*links: dict[str, Any]) -> JointArrays:
         figures=column("figures", (0.0, 0.0, 0.0)).reshape(-1, 3),
         wheels=column("wheels", (0.0,) * 4).reshape(-1, 4),
         max_force=column("max_force", np.inf),
+        max_bias=column("max_bias", np.inf),
+        bias=column("bias", np.nan),
         collide=column("collide", False, np.bool_),
         strength=column("strength", np.inf),
         number=np.arange(len(links)),
