@@ -57,9 +57,9 @@ CLICK_TOLERANCE = 0.05
 """Fraction of the angle between two clicks by which a load may have turned back a ratchet that holds"""
 
 
-def last_click(angle: npt.ArrayLike, phase: npt.ArrayLike, ratchet: npt.ArrayLike) -> FloatArray:
+def last_click(angle: FloatArray | float, phase: FloatArray | float, ratchet: FloatArray | float) -> FloatArray:
     """Return the last clicks of ratchets that turned to some angles, rad, as Munk2D (`cpRatchetJoint.c`)."""
-    return np.asarray(np.floor(np.subtract(angle, phase) / ratchet) * ratchet + phase)
+    return np.asarray(np.floor((angle - phase) / ratchet) * ratchet + phase)
 
 
 @dataclass(frozen=True, eq=False)
