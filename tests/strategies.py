@@ -247,13 +247,19 @@ def _joints(draw: st.DrawFn, names: list[str]) -> Document:
         "gear": {"ratio": coefficient},
         "spring": {"stiffness": coefficient, "damping": coefficient, "rest_length": coefficient},
         "rotary_spring": {"stiffness": coefficient, "rest_angle": numbers(-3, 3)},
+        "ratchet": {"ratchet": coefficient, "phase": numbers(-3, 3)},
     }
     if len(names) > 1:
         kinds["pulley"] = {"wheels": st.just([[-97.5, 98.5], [96.5, 99.5]]), "ratio": coefficient}
     kind = draw(st.sampled_from(list(kinds)))
     least = 2 if kind == "pulley" else 1
     between = st.lists(st.sampled_from(names), min_size=least, max_size=2, unique=True)
-    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional={"collide": st.booleans()})
+    optional: Document = {"collide": st.booleans()}
+    if kind not in ("motor", "pulley"):
+        optional["max_force"] = numbers(0, 100)
+    if kind not in ("motor", "pulley", "spring", "rotary_spring"):
+        optional |= {"max_bias": numbers(0, 10), "bias": numbers(0, 1)}
+    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional=optional)
     return {"kind": kind, **draw(joint)}
 
 

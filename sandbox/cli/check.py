@@ -26,7 +26,7 @@ from sandbox.measure.preflight import (
     run_preflight,
     unknown_speeds,
 )
-from sandbox.scene.compile.demands import JOINTS, Item, bill
+from sandbox.scene.compile.demands import JOINT_LIMITS, JOINTS, Item, bill
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import dumps, load
@@ -255,7 +255,7 @@ def _demand_lines(items: Sequence[Item]) -> Iterator[tuple[bool, str, str]]:
     has_joints = any(item.on for item in items if item.demand in JOINTS)
     is_listed = False
     for demand, on, why in items:
-        if on or demand not in JOINTS:
+        if on or demand not in JOINTS | JOINT_LIMITS:
             yield on, str(demand), why
         elif not (has_joints or is_listed):
             is_listed = True

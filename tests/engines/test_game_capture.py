@@ -158,6 +158,10 @@ def _first(space: pymunk.Space) -> pymunk.Body:
 CHANGES: dict[str, tuple[Callable[[pymunk.Space], object], str]] = {
     "angle": (lambda s: setattr(_first(s), "angle", 1.0), "angles that the game sets"),
     "joint added": (lambda s: s.add(pymunk.PinJoint(s.static_body, _first(s))), "joints that the game adds"),
+    "limit of a motor": (
+        lambda s: setattr(next(iter(s.constraints)), "max_force", 9.0),
+        "joints that the game changes",
+    ),
     "motor": (lambda s: setattr(next(iter(s.constraints)), "rate", 9.0), "joints that the game changes"),
     "iterations": (lambda s: setattr(s, "iterations", 20), "settings and callbacks"),
     "callback": (lambda s: s.on_collision(1, 2, begin=lambda *_: None), "settings and callbacks"),

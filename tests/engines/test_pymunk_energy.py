@@ -83,8 +83,20 @@ def test_ledger_of_a_shipped_scene_closes(name: str, steps: int) -> None:
             }
         ],
         [{"kind": "rotary_spring", "stiffness": 30.0, "damping": 0.7, "rest_angle": 0.5}],
+        [{"kind": "ratchet", "ratchet": 0.2}],
+        [{"kind": "pivot", "at": [0.5, 0], "max_force": 4.0, "max_bias": 0.1}],
+        [{"kind": "gear", "ratio": 2.0, "max_force": 0.1, "max_bias": 0.0}],
+        [{"kind": "groove", "groove": [[0, -1], [2, 1]], "anchor": [0.1, 0], "max_force": 3.0, "bias": 0.5}],
+        [{"kind": "spring", "stiffness": 300.0, "damping": 5.0, "rest_length": 0.2, "max_force": 20.0}],
+        [{"kind": "rotary_spring", "stiffness": 30.0, "damping": 0.7, "rest_angle": 0.5, "max_force": 2.0}],
+        # a motor next to joints that give way: its impulse is found among theirs
+        [
+            {"kind": "pivot", "at": [0.5, 0], "max_force": 4.0},
+            {"kind": "ratchet", "ratchet": 0.2, "max_force": 0.1},
+            {"kind": "motor", "rate": 5.0, "max_torque": 3.0},
+        ],
     ],
-    ids=lambda joints: str(joints[-1]["kind"]),
+    ids=lambda joints: "limited " * ("max_force" in joints[0]) + str(joints[-1]["kind"]),
 )
 def test_ledger_of_a_joint_in_wind_closes_with_the_expected_signs(joints: list[dict[str, Any]]) -> None:
     box = {"size": [0.6, 0.3], "mass": 2.0, "collides": "none"}

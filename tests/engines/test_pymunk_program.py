@@ -22,7 +22,7 @@ from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import shipped
-from tests.engines.test_capture import balls, joints, mixed, pyramid
+from tests.engines.test_capture import balls, joints, limited_joints, mixed, pyramid
 from tests.strategies import OUTLINES, numbers, pairs
 
 SUBSTEPS = 300
@@ -341,14 +341,20 @@ def _joints(draw: st.DrawFn, names: list[str]) -> dict[str, Any]:
         "gear": {"ratio": figure},
         "spring": {"stiffness": figure, "damping": figure, "rest_length": figure},
         "rotary_spring": {"stiffness": figure, "rest_angle": numbers(-3, 3)},
+        "ratchet": {"ratchet": figure, "phase": numbers(-3, 3)},
     }
     kind = draw(st.sampled_from(list(kinds)))
     between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
-    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional={"collide": st.booleans()})
+    optional: dict[str, Any] = {"collide": st.booleans()}
+    if kind != "motor":
+        optional["max_force"] = numbers(0, 100)
+    if kind not in ("motor", "spring", "rotary_spring"):
+        optional |= {"max_bias": numbers(0, 3), "bias": numbers(0, 1)}
+    joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional=optional)
     return {"kind": kind, **draw(joint)}
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
 def test_space_scene_program_space_round_trip(make: Callable[[], pymunk.Space]) -> None:
     """A captured space, its scene as a program, and the space that the program makes: the same bits, and scene."""
     space = make()

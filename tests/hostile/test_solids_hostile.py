@@ -145,6 +145,7 @@ every = [
     ("groove", {"groove": [[0, 0], [1, 0]]}), ("rotary_limit", {"least": -1, "most": 1}),
     ("motor", {"rate": 1}), ("gear", {"ratio": 2}),
     ("spring", {"stiffness": 9, "damping": 1}), ("rotary_spring", {"stiffness": 9}),
+    ("ratchet", {"ratchet": 1}), ("pivot", {"at": [1, 1], "max_force": 1, "max_bias": 0, "bias": 0}),
 ]
 
 def ends(document):

@@ -44,6 +44,7 @@ JOINTS: dict[str, Document] = {
     "spring": {"stiffness": 10.0, "damping": 1.0},
     "rotary_spring": {"stiffness": 10.0},
     "pulley": {"wheels": [[0.0, 6.0], [2.0, 6.0]]},
+    "ratchet": {"ratchet": 0.5},
 }
 
 
@@ -128,6 +129,12 @@ FEATURES: dict[str, Document] = {
     },
     **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS if kind != "pulley"},
     **{f"{kind} between two": {"joint": [_joint(kind, "a", "b")]} for kind in JOINTS},
+    "friction of the ground": {
+        "joint": [
+            {"kind": "pivot", "between": ["a"], "anchors": [[0, 0], [0, 0]], "max_bias": 0, "max_force": 5.0},
+            {"kind": "gear", "between": ["a"], "ratio": 1.0, "max_bias": 0, "max_force": 0.5},
+        ]
+    },
     **{f"weak {kind}": {"joint": [{**_joint(kind, "a", "b"), "strength": 1e-9}]} for kind in JOINTS},
 }
 

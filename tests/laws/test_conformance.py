@@ -232,6 +232,37 @@ PROOFS: dict[Demand, Proof] = {
         ),
         position(0.0, -3.5),
     ),
+    # it turns back to its click, and not beyond
+    Demand.RATCHETS: Proof(
+        scene(
+            box=[box(angle=0.3, angular_velocity=-2.0)],
+            joint=[AXLE, {"kind": "ratchet", "between": ["box"], "ratchet": 0.4}],
+        ),
+        angle(0.0),
+    ),
+    # a weight of 10 N hangs from a rod of at most 4 N
+    Demand.MAX_FORCE: Proof(
+        scene(
+            world=GRAVITY, ball=[ball(0.0, -1.0, name="a")], joint=[{**_pendulum(), "max_force": 4.0, "length": 1.0}]
+        ),
+        velocity(0.0, -6.0),
+    ),
+    # an error of 1 m is corrected at 0.5 m/s
+    Demand.MAX_BIAS: Proof(
+        scene(
+            ball=[ball(1.0, name="a")],
+            joint=[{"kind": "pivot", "between": ["a"], "anchors": [[0.0, 0.0], [0.0, 0.0]], "max_bias": 0.5}],
+        ),
+        position(0.5, 0.0),
+    ),
+    # the fraction of an error that remains after one second
+    Demand.JOINT_BIAS: Proof(
+        scene(
+            ball=[ball(1.0, name="a")],
+            joint=[{"kind": "pivot", "between": ["a"], "anchors": [[0.0, 0.0], [0.0, 0.0]], "bias": 0.25}],
+        ),
+        position(0.25, 0.0),
+    ),
     # a circle with v² = k/r
     Demand.ATTRACTION: Proof(
         scene(ball=[ball(1.0, vy=1.0)], attraction=[{"toward": [0.0, 0.0], "strength": 1.0}]),

@@ -25,6 +25,7 @@ PLUNGER = {"kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1, "sp
 STROKE = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0, 1], "rate": 1}
 OTHER: dict[str, Any] = {**BALL, "name": "b", "position": [3, 0]}
 PULLEY = {"kind": "pulley", "between": ["a", "b"], "wheels": [[0, 2], [3, 2]]}
+MOTOR = {"kind": "motor", "between": ["a"], "rate": 1}
 OFF: dict[str, Any] = {"kind": "rod", "between": ["a"], "anchors": [[0, 1], [5, 5]]}
 JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.RODS: {"kind": "rod", "anchors": [[0, 0], [5, 5]]},
@@ -36,6 +37,10 @@ JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.GEARS: {"kind": "gear", "ratio": 2},
     Demand.SPRINGS: {"kind": "spring", "stiffness": 1},
     Demand.ROTARY_SPRINGS: {"kind": "rotary_spring", "stiffness": 1},
+    Demand.RATCHETS: {"kind": "ratchet", "ratchet": 1},
+    Demand.MAX_FORCE: {"kind": "pivot", "at": [0, 0], "max_force": 1},
+    Demand.MAX_BIAS: {"kind": "pivot", "at": [0, 0], "max_bias": 0},
+    Demand.JOINT_BIAS: {"kind": "pivot", "at": [0, 0], "bias": 0},
 }
 
 CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
@@ -144,6 +149,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     ),
     (Demand.PULLEYS, True, {"ball": [NAMED, OTHER], "joint": [PULLEY] * 2}, "2"),
     (Demand.PULLEYS, False, {"ball": [NAMED]}, "none"),
+    # the largest torque of a motor belongs to motors
+    (Demand.MAX_FORCE, False, {"ball": [NAMED], "joint": [{**MOTOR, "max_torque": 1}]}, "none"),
     (Demand.ATTRACTION, True, {"ball": [BALL], "attraction": [{"toward": [0, 0], "strength": 1}]}, "1"),
     (Demand.ATTRACTION, False, {"ball": [BALL]}, "none"),
     (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),

@@ -1,6 +1,7 @@
 """JointArrays: indices of bodies, and anchors relative to centres of mass."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given, settings
 
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document
 from tests import strategies
 
@@ -55,7 +57,28 @@ def test_joint_of_one_body_is_anchored_in_the_world() -> None:
 def test_missing_values_are_those_of_the_initial_state() -> None:
     assert two_polygons(kind="rotary_spring", stiffness=1).links.figures[0].tolist() == [-0.2 - 0.7, 1, 0]
     assert two_polygons(kind="gear", ratio=3).links.figures[0].tolist() == [-0.2 * 3 - 0.7, 3, 0]
-    assert two_polygons(kind="motor", rate=2).links.most_force[0] == math.inf
+    assert two_polygons(kind="motor", rate=2).links.max_force[0] == math.inf
+    assert two_polygons(kind="ratchet", ratchet=0.5, phase=0.25).links.figures[0].tolist() == [-1.25, 0.25, 0.5]
+
+
+def test_limits_of_joints_are_unlimited_by_default() -> None:
+    links = two_polygons(kind="rod", max_force=3, max_bias=0, bias=0.5).links
+    assert (links.max_force[0], links.max_bias[0], links.bias[0]) == (3.0, 0.0, 0.5)
+    free = two_polygons(kind="rod").links
+    assert (free.max_force[0], free.max_bias[0], math.isnan(free.bias[0])) == (math.inf, math.inf, True)
+    assert [each.is_limited.tolist() for each in (links, free)] == [[True], [False]]
+
+
+@pytest.mark.parametrize(("ratchet", "turned", "click"), [(0.5, 1.3, 1.0), (0.5, 0.99, 1.0), (-0.5, -1.3, -1.0)])
+def test_ratchet_of_a_later_state_is_at_the_last_click(ratchet: float, turned: float, click: float) -> None:
+    """A load turns a ratchet that holds back a little, here by 2 % of a click."""
+    scene = from_document({
+        "ball": [{"name": "a", "position": [0, 0], "radius": 1}],
+        "joint": [{"kind": "ratchet", "between": ["a"], "ratchet": ratchet}],
+    })  # fmt: skip
+    setup = Setup.of(scene)
+    later = setup.placed(replace(setup.bodies, angle=np.asarray([turned])), 1.0)
+    assert (setup.links.figures[0, 0], later.links.figures[0, 0]) == (0.0, click)
 
 
 def test_links_list_bodies_held_turned_and_excluded_from_collision() -> None:

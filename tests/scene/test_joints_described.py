@@ -7,7 +7,7 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 
 TWO = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[ball]]\nname="b"\nposition=[5,0]\nradius=1\n'
-KINDS = "rod, pin, pivot, slide, groove, rotary_limit, motor, gear, spring, rotary_spring"
+KINDS = "rod, pin, pivot, slide, groove, rotary_limit, motor, gear, spring, rotary_spring, pulley, ratchet"
 FIXED = TWO.replace("radius=1", "radius=1\nfixed=true")
 
 
@@ -25,10 +25,11 @@ def test_joint_of_every_kind_is_read() -> None:
                 '"rod"', '"pin"\nlength=3', '"pivot"\nat=[1,1]', '"pivot"\nanchors=[[1,0],[-1,0]]', '"slide"\nmost=9',
                 '"groove"\ngroove=[[0,0],[0,1]]', '"rotary_limit"\nleast=-1\nmost=1', '"motor"\nrate=2\nmax_torque=3',
                 '"gear"\nratio=-2', '"spring"\nstiffness=5', '"rotary_spring"\nstiffness=5\ndamping=1',
+                '"pivot"\nat=[1,1]\nmax_force=0\nmax_bias=0\nbias=1', '"ratchet"\nratchet=-0.1\nphase=2\nmax_force=5',
             )
         )
     )  # fmt: skip
-    assert len(scene.joints) == len(scene.links) == 11
+    assert len(scene.joints) == len(scene.links) == 13
     assert isinstance(scene.joints[1], Rod)
 
 
@@ -74,8 +75,26 @@ def test_joint_of_every_kind_is_read() -> None:
             ["s.toml:12: joint[0].at: must have either `at`"],
         ),
         (
-            'kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=0',
-            ["s.toml:13: joint[0].max_torque: must be greater than 0, is 0"],
+            'kind="motor"\nbetween=["a"]\nrate=1\nmax_torque=-1',
+            ["s.toml:13: joint[0].max_torque: must be at least 0, is -1"],
+        ),
+        ('kind="ratchet"\nbetween=["a"]', ["s.toml:9: joint[0].ratchet: is missing"]),
+        ('kind="ratchet"\nbetween=["a"]\nratchet=0', ["s.toml:12: joint[0].ratchet: must be at least 1e-06 rad"]),
+        (
+            'kind="rod"\nbetween=["a","b"]\nmax_force=-1\nmax_bias=-1\nbias=1.5',
+            [
+                "s.toml:12: joint[0].max_force: must be at least 0, is -1",
+                "s.toml:13: joint[0].max_bias: must be at least 0, is -1",
+                "s.toml:14: joint[0].bias: must be between 0 and 1, is 1.5",
+            ],
+        ),
+        (
+            'kind="motor"\nbetween=["a"]\nrate=1\nmax_force=5',  # that of a motor is a torque
+            ["s.toml:13: joint[0].max_force: unknown key; did you mean 'max_torque'?"],
+        ),
+        (
+            'kind="spring"\nbetween=["a","b"]\nstiffness=1\nbias=0.5',  # a spring has no error to correct
+            ["s.toml:13: joint[0].bias: unknown key"],
         ),
         ('kind="gear"\nbetween=["a"]\nratio=0', ["s.toml:12: joint[0].ratio: must be at least"]),
         ('kind="gear"\nbetween=["a"]\nratio=-1e-9', ["s.toml:12: joint[0].ratio: must be at least"]),

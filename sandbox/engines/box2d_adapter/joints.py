@@ -74,7 +74,7 @@ class WorldJoints:
             low, high, _ = links.figures[other].tolist()
             if links.kind[other] == LinkKind.MOTOR:
                 joint.enable_motor, joint.motor_speed = True, low
-                joint.max_motor_torque = min(float(links.most_force[other]) * scale**2, UNLIMITED_TORQUE)
+                joint.max_motor_torque = min(float(links.max_force[other]) * scale**2, UNLIMITED_TORQUE)
             elif links.kind[other] == LinkKind.ROTARY_LIMIT:
                 joint.reference_angle = math.remainder(0.5 * (low + high), math.tau)
                 joint.enable_limit, joint.lower_angle, joint.upper_angle = True, 0.5 * (low - high), 0.5 * (high - low)

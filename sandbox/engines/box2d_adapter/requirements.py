@@ -56,8 +56,6 @@ def joint_faults(links: JointArrays) -> Iterator[str]:
                 yield f"{name}: a {MERGED[kind]} that breaks, or whose pivot breaks, is not supported"
         if kind == LinkKind.ROTARY_LIMIT and not links.figures[k, 1] - links.figures[k, 0] < 2.0 * math.pi:
             yield f"{name}: a range of a whole turn or more is not supported, as Box2D knows angles modulo 2π"
-        if math.isfinite(links.most_force[k]) and kind != LinkKind.MOTOR:
-            yield f"{name}: a largest force is not supported, except of motors"
 
 
 def size_faults(setup: Setup, settings: Settings) -> Iterator[str]:

@@ -402,9 +402,9 @@ class SpaceElements:
         """Yield the joint of a constraint; nothing if a scene has no such joint."""
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
-        values = joint_values(constraint)
+        values = joint_values(constraint, self.space.collision_bias)
         ends = [None if self._is_world(body) else self.names[body] for body in (a, b)]
-        is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint | pymunk.GearJoint)
+        is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint)
         if values is None or ends == [None, None] or is_carried:
             self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))
             return
@@ -426,12 +426,6 @@ class SpaceElements:
         return body is self.space.static_body or (body.body_type == pymunk.Body.STATIC and is_at_origin)
 
     def _note_constraint(self, constraint: pymunk.Constraint, kind: str) -> None:
-        if math.isfinite(constraint.max_force) and not isinstance(constraint, pymunk.SimpleMotor):
-            self.omitted.append(f"max_force of a {kind}")
-        if math.isfinite(constraint.max_bias):
-            self.omitted.append(f"max_bias of a {kind}")
-        if constraint.error_bias != self.space.collision_bias:
-            self.inexact.append(f"error_bias of a {kind} is not that of the space's contacts")
         if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
             self.omitted.append(f"callbacks of a {kind}")
 
@@ -530,8 +524,34 @@ def _body_of(shape: pymunk.Shape) -> pymunk.Body:
     return shape.body
 
 
-def joint_values(constraint: pymunk.Constraint) -> KeyValues | None:
-    """Return the kind and the values of a joint; None if a scene has no such joint."""
+def joint_values(constraint: pymunk.Constraint, default_bias: float) -> KeyValues | None:
+    """Return the kind and the values of a joint; None if a scene has no such joint.
+
+    Args:
+        constraint: the joint.
+        default_bias: of the solver, which joints without their own `bias` have.
+    """
+    values = _kind_values(constraint)
+    return None if values is None else values | _limits(constraint, default_bias)
+
+
+def _limits(constraint: pymunk.Constraint, default_bias: float) -> KeyValues:
+    """Return the limits of a joint that differ from the defaults of a scene, as far as pymunk uses them."""
+    values: KeyValues = {}
+    if math.isfinite(constraint.max_force):
+        key = "max_torque" if isinstance(constraint, pymunk.SimpleMotor) else "max_force"
+        values[key] = float(constraint.max_force)
+    if isinstance(constraint, pymunk.SimpleMotor | pymunk.DampedSpring | pymunk.DampedRotarySpring):
+        return values  # they have no error to correct
+    if math.isfinite(constraint.max_bias):
+        values["max_bias"] = float(constraint.max_bias)
+    if constraint.error_bias != default_bias:
+        values["bias"] = float(constraint.error_bias)
+    return values
+
+
+def _kind_values(constraint: pymunk.Constraint) -> KeyValues | None:
+    """Return the kind of a joint and the values of its geometry; None if a scene has no such joint."""
     match constraint:
         case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
             return {"kind": "pivot"} | _anchors(constraint)
@@ -555,9 +575,11 @@ def joint_values(constraint: pymunk.Constraint) -> KeyValues | None:
             return {"kind": "rotary_limit", "least": float(constraint.min), "most": float(constraint.max)}
         case pymunk.GearJoint():
             return {"kind": "gear", "ratio": float(constraint.ratio), "phase": float(constraint.phase)}
+        case pymunk.RatchetJoint():
+            clicks = {"ratchet": float(constraint.ratchet), "phase": float(constraint.phase)}
+            return {"kind": "ratchet", "angle": float(constraint.angle)} | clicks
         case pymunk.SimpleMotor():
-            torque = {"max_torque": float(constraint.max_force)} if math.isfinite(constraint.max_force) else {}
-            return {"kind": "motor", "rate": -float(constraint.rate) + 0.0} | torque
+            return {"kind": "motor", "rate": -float(constraint.rate) + 0.0}
     return None
 
 
@@ -569,9 +591,18 @@ def _anchors(constraint: Any) -> KeyValues:
     return {"anchors": [_point(constraint.anchor_a), _point(constraint.anchor_b)]}
 
 
+OPPOSITE_ANGLES = {"motor": ("rate",), "rotary_spring": ("rest_angle",), "ratchet": ("angle", "phase", "ratchet")}
+"""Keys of joints that change their sign if the bodies are exchanged, by kind"""
+
+
 def _turned(values: KeyValues) -> KeyValues:
     """Return the values of a joint from its body to the world: angles are those of the body relative to the world."""
-    changed = {key: -value + 0.0 if key in ("rate", "rest_angle") else value for key, value in values.items()}
+    opposite = OPPOSITE_ANGLES.get(values["kind"], ())
+    changed = {key: -value + 0.0 if key in opposite else value for key, value in values.items()}
     if values["kind"] == "rotary_limit":
         changed |= {"least": -values["most"] + 0.0, "most": -values["least"] + 0.0}
+    if values["kind"] == "gear":  # the world has no angle, so that only the phase and the torque on the body remain
+        changed |= {"ratio": 1.0, "phase": -values["phase"] + 0.0}
+        if "max_force" in values:
+            changed["max_force"] = values["max_force"] / abs(values["ratio"])
     return changed

@@ -8,7 +8,7 @@ from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.resource_limits import SPACE_SIZE
-from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, unmodelled
+from sandbox.scene.compile.demands import BALLS, FLOOR, JOINT_LIMITS, JOINTS, SURFACES, Demand, unmodelled
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -22,6 +22,8 @@ FIXED_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "respo
 
 OWN = frozenset(
     {
+        *JOINTS - {Demand.PULLEYS},
+        *JOINT_LIMITS,
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
@@ -68,7 +70,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS - {Demand.PULLEYS} | FLOOR | SURFACES | OWN | {Demand.CURL}
+    capabilities: frozenset[Demand] = BALLS | FLOOR | SURFACES | OWN | {Demand.CURL}
     knows_impulses: bool = True
     epsilon: float = 2.0**-52
 

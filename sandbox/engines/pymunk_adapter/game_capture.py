@@ -76,7 +76,7 @@ class SpaceForm:
                 each: (each.body, each.elasticity, each.friction, each.filter, each.surface_velocity, each.sensor)
                 for each in space.shapes
             },
-            {joint: (joint_values(joint), joint.max_force, joint.collide_bodies) for joint in space.constraints},
+            {joint: (joint_values(joint, space.collision_bias), joint.collide_bodies) for joint in space.constraints},
         )
 
     def changes_since(self, before: "SpaceForm", explained: Set[pymunk.Body]) -> Iterator[str]:

@@ -154,7 +154,7 @@ def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray)
     arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
     for k, kind in enumerate(links.kind.tolist()):
         a, b, first_column = int(links.a[k]), int(links.b[k]), int(column[k])
-        if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR):
+        if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR, LinkKind.RATCHET):
             table[b, 2, first_column] += 1.0
             table[a, 2, first_column] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
             continue

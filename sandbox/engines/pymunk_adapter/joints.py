@@ -20,13 +20,13 @@ def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bi
         k: index of the joint.
         a: first body; the space's static body if that is the world.
         b: second body.
-        bias: fraction of a joint's error that remains after one second.
+        bias: fraction of the error that remains after one second, of joints without their own.
     """
     constraint = _new_constraint(links, k, a, b)
     constraint.collide_bodies = bool(links.collide[k])
-    constraint.error_bias = bias
-    constraint.max_bias = math.inf
-    constraint.max_force = float(links.most_force[k])
+    constraint.error_bias = bias if math.isnan(links.bias[k]) else float(links.bias[k])
+    constraint.max_bias = float(links.max_bias[k])
+    constraint.max_force = float(links.max_force[k])
     return constraint
 
 
@@ -54,6 +54,10 @@ def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) 
             return pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, z)
         case LinkKind.ROTARY_SPRING:
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
+        case LinkKind.RATCHET:
+            ratchet = pymunk.RatchetJoint(a, b, y, z)
+            ratchet.angle = x
+            return ratchet
         case kind:
             raise ValueError(f"pymunk has no {kind.name.lower()} joints")
 
@@ -79,7 +83,7 @@ def spring_force_magnitude(
     length = np.hypot(displacement[:, 0], displacement[:, 1])
     rate = np.einsum("kd,kd->k", displacement, relative_velocity) / np.where(length > 0.0, length, 1.0)
     rest, stiffness, damping = links.figures.T
-    return np.asarray(np.abs(spring_law(rest, stiffness, damping, length, rate)))
+    return np.asarray(np.minimum(np.abs(spring_law(rest, stiffness, damping, length, rate)), links.max_force))
 
 
 def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
@@ -105,13 +109,18 @@ def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -
 def spring_torque_magnitude(links: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
     """Return the magnitude of the torque of rotary springs, (K,) N·m."""
     rest, stiffness, damping = links.figures.T
-    return np.asarray(np.abs(spring_law(rest, stiffness, damping, relative(links, angle), relative(links, spin))))
+    torque = spring_law(rest, stiffness, damping, relative(links, angle), relative(links, spin))
+    return np.asarray(np.minimum(np.abs(torque), links.max_force))
 
 
 def elastic_force(links: JointArrays, extent: FloatArray) -> FloatArray:
-    """Return `spring_law` without dampers, at lengths (K,), m, or angles of rotary springs (K,), rad."""
+    """Return the force of springs without dampers, at lengths (K,), m, or angles of rotary springs (K,), rad.
+
+    pymunk limits it to `max_force`, and then its sum with the force of the damper.
+    """
     rest, stiffness, damping = links.figures.T
-    return np.asarray(spring_law(rest, stiffness, damping, extent, np.zeros_like(extent)))
+    force = spring_law(rest, stiffness, damping, extent, np.zeros_like(extent))
+    return np.asarray(np.clip(force, -links.max_force, links.max_force))
 
 
 def relative(links: JointArrays, values: FloatArray) -> FloatArray:
@@ -159,7 +168,7 @@ class SpaceJoints:
         Args:
             links: of the scene; all their bodies are in the space.
             body: returns a body by its index.
-            bias: fraction of a joint's error that remains after one second.
+            bias: fraction of the error that remains after one second, of joints without their own.
         """
         if self._links is not None:
             return

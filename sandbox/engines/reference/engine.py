@@ -3,12 +3,15 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -40,6 +43,17 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
         if drive.body in numbers and joined[numbers[drive.body]]:
             return drive.body, name
     return None
+
+
+def _max_force_faults(setup: Setup) -> list[str]:
+    """Return the first joint whose largest force is not supported: springs are forces, and grooves have two rows."""
+    for kind in (LinkKind.SPRING, LinkKind.ROTARY_SPRING, LinkKind.GROOVE):
+        links = setup.links.of(kind)
+        limited = np.flatnonzero(np.isfinite(links.max_force))
+        if len(limited):
+            word = kind.name.lower().replace("_", " ")
+            return [f"max_force of a {word} is not supported ({links.names[int(limited[0])]!r})"]
+    return []
 
 
 DEFAULT_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
@@ -80,7 +94,8 @@ class ReferenceEngine:
         Demand.ONE_WAY,
         Demand.PASSABLE,
         Demand.POLYGONS,
-        *JOINTS,
+        *JOINTS - {Demand.RATCHETS},
+        Demand.MAX_FORCE,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
@@ -100,6 +115,7 @@ class ReferenceEngine:
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
         missing = unmodelled(setup, self.capabilities) + box2d_settings_in(settings)
         missing += self._detection_faults(wanted, settings)
+        missing += _max_force_faults(setup)
         if Demand.DRIVES in wanted:
             missing += _drive_faults(setup, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:

@@ -79,7 +79,7 @@ def select_joints(links: JointArrays, *kinds: LinkKind, among: IntArray | None =
     if among is not None:
         which &= np.isin(np.arange(len(links)), among)
     anchor = np.column_stack((links.anchor_a, links.anchor_b))
-    columns = links.kind, links.a, links.b, anchor, links.figures, links.wheels, links.most_force
+    columns = links.kind, links.a, links.b, anchor, links.figures, links.wheels, links.max_force
     found = JointData(np.arange(len(links)), *columns).take(np.flatnonzero(which))
     if not (found.kind == GROOVE).any():
         return found

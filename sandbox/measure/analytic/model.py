@@ -84,13 +84,13 @@ class SceneFacts:
     def anchor(self, number: int) -> Anchor | None:
         """Return the only joint of a body, or None.
 
-        It counts if it never breaks and connects the body to the world or a static body.
+        It counts if it neither breaks nor gives way, and connects the body to the world or a static body.
         """
         found = np.flatnonzero((self.links.a == number) | (self.links.b == number))
         if len(found) != 1:
             return None
         k = int(found[0])
-        if math.isfinite(self.links.strength[k]) or math.isfinite(self.links.most_force[k]):
+        if math.isfinite(self.links.strength[k]) or self.links.is_limited[k]:
             return None
         joint = self.links.some(np.asarray([k]))
         (start,), (end,) = joint.ends(self.bodies.position, self.bodies.angle)

@@ -126,16 +126,22 @@ CONSTRAINT_KINDS = (
     LinkKind.GEAR,
     LinkKind.PULLEY,
 )
-"""Kinds of joints that are constraints; springs and motors are not."""
+"""Kinds of joints that are constraints with an error; springs, motors and ratchets are not."""
+
+
+def has_constraints(links: JointArrays) -> bool:
+    """Return whether a joint has an error: one of `CONSTRAINT_KINDS` that does not give way."""
+    return bool((np.isin(links.kind, CONSTRAINT_KINDS) & ~links.is_limited).any())
 
 
 def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
     """Return the error of each joint in each frame, (T, J).
 
-    It is nan for springs, motors and joints that broke or lost a body. In m: of a rod |l − length|, of a pivot the
-    distance of its two points, of a slide the excess of the distance over its bounds, of a groove the distance of the
-    point from the groove, of a pulley the stretch of its rope. In rad: of a rotary limit the excess of the angle over
-    its bounds, of a gear |angle_b·ratio − angle_a − phase|. The error of a diverged state is infinite.
+    It is nan for springs, motors, ratchets, joints that may give way (`JointArrays.is_limited`), and joints that broke
+    or lost a body. In m: of a rod |l − length|, of a pivot the distance of its two points, of a slide the excess of the
+    distance over its bounds, of a groove the distance of the point from the groove, of a pulley the stretch of its
+    rope. In rad: of a rotary limit the excess of the angle over its bounds, of a gear |angle_b·ratio − angle_a −
+    phase|. The error of a diverged state is infinite.
 
     Args:
         trajectory: the run; its first bodies are those of `start`.
@@ -168,7 +174,7 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     """
     setup = Setup.of(start)
     links = setup.links
-    if not len(links) or not np.isin(links.kind, CONSTRAINT_KINDS).any() or not len(trajectory.time):
+    if not has_constraints(links) or not len(trajectory.time):
         return None
     errors = joint_errors(trajectory, setup) / joint_scales(links, setup.bodies)
     known = errors[~np.isnan(errors)]
@@ -205,7 +211,7 @@ def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present
     found = np.full(present.shape, np.nan)
     for kind, error in by_kind.items():
         found = np.where(links.kind == kind, np.maximum(np.where(np.isnan(error), math.inf, error), 0.0), found)
-    return np.where(present, found, np.nan)
+    return np.where(present & ~links.is_limited, found, np.nan)
 
 
 def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:

@@ -44,22 +44,23 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each group of joints that need more iterations.
 
     Its kind is `mass_ratio` if equal masses would suffice, otherwise `chain`. Only joints solved by impulses count;
-    springs and motors are no constraints.
+    springs and motors are no constraints, and joints that may give way come apart as intended.
     """
     if settings.joints not in (None, "impulses"):
         return
-    links = scene.links.of(*IMPULSE_KINDS)
+    links = scene.links.some(~scene.links.is_limited).of(*IMPULSE_KINDS)
     if len(links) < 2:
         return
     bodies, available = scene.bodies, settings.iterations / settings.h
-    bias = BIAS if settings.bias is None else settings.bias
-    rate = (1.0 - bias**settings.h) / settings.h
+    solver_bias = BIAS if settings.bias is None else settings.bias
     free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
     group_of = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
     for group in np.unique(group_of).tolist():
         members = np.flatnonzero(group_of == group)
         some = links.some(members)
+        bias = float(np.where(np.isnan(some.bias), solver_bias, some.bias).min())  # of the fastest correction
+        rate = (1.0 - bias**settings.h) / settings.h
         inverse = np.where(bodies.fixed, 0.0, 1.0 / bodies.mass)
         needed = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, inverse)
         if needed <= available * (1.0 + ROUNDING):

@@ -24,11 +24,13 @@ Paths = list[list[tuple[int, float]]]
 def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
     """Return how far along `down` each body can move at most, (N,) m; inf if it is not tethered to a static point.
 
+    Joints that give way do not tether.
+
     From each anchor in the world or on a static body, the reach is the sum of the rods, the slides at their longest,
     and the paths through the bodies between their joints.
     """
     bodies, links = scene.bodies, scene.links
-    links = links.of(LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE)
+    links = links.some(~links.is_limited).of(LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE)
     length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
     length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
     arm_a, arm_b = (np.hypot(*each.T) for each in (links.anchor_a, links.anchor_b))

@@ -4,13 +4,12 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-
 from sandbox.echo import short_repr
-from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
+from sandbox.measure.metrics.invariants import has_constraints
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 
 T = TypeVar("T")
@@ -105,7 +104,7 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
         doubt = f"no truth is known{f' ({context.doubt})' if context.doubt else ''}"
     else:
         doubt = f"positions are predictable for {context.until:.3g} s of {duration:.4g} s only"
-    if np.isin(scene.links.kind, CONSTRAINT_KINDS).any():
+    if has_constraints(scene.links):
         return METRICS["joint_error"], f"{doubt}, and the scene has joints"
     if conserves_energy(scene):
         return METRICS["energy"], f"{doubt}, and energy is conserved"
@@ -119,10 +118,14 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Return whether a scene conserves energy: no drag, friction, damper, thrust or drive, and elastic contacts."""
+    """Return whether a scene conserves energy.
+
+    It has no drag, friction, damper, thrust, drive or motor, no joint that gives way, and elastic contacts.
+    """
     if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.drives:
         return False
-    if scene.links.figures[:, 2].any():
+    springs, motors = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING), scene.links.of(LinkKind.MOTOR)
+    if springs.figures[:, 2].any() or len(motors) or scene.links.is_limited.any():
         return False
     matrix = contact_matrix(scene)
     elastic = (matrix.surfaces.restitution == 1.0) & matrix.surfaces.fixed_coefficients

@@ -46,6 +46,10 @@ class Demand(StrEnum):
     SPRINGS = "springs"
     ROTARY_SPRINGS = "rotary springs"
     PULLEYS = "pulleys"
+    RATCHETS = "ratchets"
+    MAX_FORCE = "max_force of joints"
+    MAX_BIAS = "max_bias of joints"
+    JOINT_BIAS = "bias of joints"
     ATTRACTION = "attraction"
     THRUST = "thrust"
     DRIVES = "drives"
@@ -98,10 +102,14 @@ DEMAND_OF_JOINT = {
     LinkKind.SPRING: Demand.SPRINGS,
     LinkKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
     LinkKind.PULLEY: Demand.PULLEYS,
+    LinkKind.RATCHET: Demand.RATCHETS,
 }
 """Demands of each kind of joint."""
 
 JOINTS = frozenset(DEMAND_OF_JOINT.values())
+
+JOINT_LIMITS = frozenset({Demand.MAX_FORCE, Demand.MAX_BIAS, Demand.JOINT_BIAS})
+"""Demands of the keys of joints that limit or change how they hold"""
 
 
 class Item(NamedTuple):
@@ -207,9 +215,15 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
 
 
 def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
-    scene = setup.scene
-    for kind, demand in DEMAND_OF_JOINT.items():
-        count = int(np.count_nonzero(setup.links.kind == kind))
+    scene, links = setup.scene, setup.links
+    has_limit = np.isfinite(links.max_force) & (links.kind != LinkKind.MOTOR)  # that of a motor is part of motors
+    for demand, applies in (
+        *((demand, links.kind == kind) for kind, demand in DEMAND_OF_JOINT.items()),
+        (Demand.MAX_FORCE, has_limit),
+        (Demand.MAX_BIAS, np.isfinite(links.max_bias)),
+        (Demand.JOINT_BIAS, np.isfinite(links.bias)),
+    ):
+        count = int(np.count_nonzero(applies))
         yield demand, count > 0, f"{count:,}" if count else "none"
     for demand, elements in (
         (Demand.ATTRACTION, scene.attractions),

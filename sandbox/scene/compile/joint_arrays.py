@@ -29,7 +29,7 @@ class LinkKind(IntEnum):
     ROTARY_LIMIT = 4
     """smallest and largest angle_b − angle_a, rad"""
     MOTOR = 5
-    """target rate of angle_b − angle_a, rad/s; `most_force` is a torque"""
+    """target rate of angle_b − angle_a, rad/s"""
     GEAR = 6
     """phase, rad, and ratio: angle_b·ratio − angle_a = phase"""
     SPRING = 7
@@ -38,10 +38,28 @@ class LinkKind(IntEnum):
     """rest angle of angle_b − angle_a, rad, stiffness, N·m/rad, damping, N·m·s/rad"""
     PULLEY = 9
     """length of the rope, m, and ratio: length_a + ratio·length_b is at most the length"""
+    RATCHET = 10
+    """last click, phase and angle between two clicks, of angle_b − angle_a, rad"""
 
 
-TURNING = (LinkKind.GROOVE, LinkKind.ROTARY_LIMIT, LinkKind.MOTOR, LinkKind.GEAR, LinkKind.ROTARY_SPRING)
+TURNING = (
+    LinkKind.GROOVE,
+    LinkKind.ROTARY_LIMIT,
+    LinkKind.MOTOR,
+    LinkKind.GEAR,
+    LinkKind.ROTARY_SPRING,
+    LinkKind.RATCHET,
+)
 """Kinds that can rotate bodies at any anchor; the others only at anchors off the centre of mass."""
+
+
+CLICK_TOLERANCE = 0.05
+"""Fraction of the angle between two clicks by which a load may have turned back a ratchet that holds"""
+
+
+def last_click(angle: FloatArray | float, phase: FloatArray | float, ratchet: FloatArray | float) -> FloatArray:
+    """Return the last clicks of ratchets that turned to some angles, rad, as Munk2D (`cpRatchetJoint.c`)."""
+    return np.asarray(np.floor((angle - phase) / ratchet) * ratchet + phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +80,12 @@ class JointArrays:
     """(J, 3) parameters by kind, unused ones 0"""
     wheels: FloatArray
     """(J, 4) m, positions of both wheels of a pulley in the world: ax, ay, bx, by; else 0"""
-    most_force: FloatArray
+    max_force: FloatArray
     """(J,) largest force or torque, N or N·m; inf without a limit"""
+    max_bias: FloatArray
+    """(J,) largest speed of error correction, m/s or rad/s; inf without a limit"""
+    bias: FloatArray
+    """(J,) fraction of the error that remains after one second; nan: that of the solver"""
     collide: BoolArray
     """(J,) whether the two bodies also collide"""
     strength: FloatArray
@@ -91,7 +113,9 @@ class JointArrays:
             anchor_b=np.empty((0, 2)),
             figures=np.empty((0, 3)),
             wheels=np.empty((0, 4)),
-            most_force=np.empty(0),
+            max_force=np.empty(0),
+            max_bias=np.empty(0),
+            bias=np.empty(0),
             collide=np.empty(0, np.bool_),
             strength=np.empty(0),
             number=np.empty(0, np.int64),
@@ -122,7 +146,9 @@ class JointArrays:
             anchor_b=np.broadcast_to(np.asarray(anchor_b, dtype=np.float64), (count, 2)).copy(),
             figures=np.broadcast_to(np.asarray(figures, dtype=np.float64), (count, 3)).copy(),
             wheels=np.zeros((count, 4)),
-            most_force=np.full(count, np.inf),
+            max_force=np.full(count, np.inf),
+            max_bias=np.full(count, np.inf),
+            bias=np.full(count, np.nan),
             collide=np.zeros(count, np.bool_),
             strength=np.full(count, np.inf),
             number=np.arange(count),
@@ -157,6 +183,22 @@ class JointArrays:
     def of(self, *kinds: LinkKind) -> Self:
         """Return the joints of some kinds."""
         return self if not len(self) else self.some(np.isin(self.kind, kinds))
+
+    @property
+    def is_limited(self) -> BoolArray:
+        """(J,) whether each may give way: its force, or the speed of its error correction, has a limit."""
+        return np.asarray(np.isfinite(self.max_force) | np.isfinite(self.max_bias))
+
+    def clicked(self, angle: FloatArray) -> Self:
+        """Return the joints with ratchets at the last clicks of bodies that turned to angles, (N,) rad."""
+        if not (self.kind == LinkKind.RATCHET).any():
+            return self
+        rows, figures = self.kind == LinkKind.RATCHET, self.figures.copy()
+        _, phase, ratchet = figures[rows].T
+        a, b = self.a[rows], self.b[rows]
+        turned = angle[b] - np.where(a >= 0, angle[a], 0.0)
+        figures[rows, 0] = last_click(turned + CLICK_TOLERANCE * ratchet, phase, ratchet)
+        return replace(self, figures=figures)
 
     @property
     def turns(self) -> BoolArray:

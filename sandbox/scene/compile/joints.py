@@ -1,6 +1,7 @@
 """Joints of a scene as arrays, including those of ropes, cloths and ragdolls."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,17 +11,20 @@ from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_joints, 
 from sandbox.scene.compile.bodies import Bodies, rotated
 from sandbox.scene.compile.drives import is_immovable
 from sandbox.scene.compile.generators import count_of
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind, last_click
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, SoftBody
 from sandbox.scene.description.joints import (
     Anchored,
+    ErrorCorrecting,
+    ForceLimited,
     Gear,
     Groove,
     Joint,
     Motor,
     Pivot,
     Pulley,
+    Ratchet,
     Rod,
     RotaryLimit,
     RotarySpring,
@@ -107,6 +111,7 @@ KINDS: dict[type, LinkKind] = {
     Spring: LinkKind.SPRING,
     RotarySpring: LinkKind.ROTARY_SPRING,
     Pulley: LinkKind.PULLEY,
+    Ratchet: LinkKind.RATCHET,
 }
 
 
@@ -122,8 +127,7 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     number = {name: k for k, name in enumerate(bodies.names)}
     rows = [_row(joint, bodies, number) for joint in scene.joints]
     a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
-    motors = [joint.max_torque if isinstance(joint, Motor) else None for joint in scene.joints]
-    strengths = [joint.strength for joint in scene.joints]
+    max_force, max_bias, bias = zip(*map(_limits, scene.joints), strict=True)
     wheels = [
         (*joint.wheels[0], *joint.wheels[1]) if isinstance(joint, Pulley) else (0.0,) * 4 for joint in scene.joints
     ]
@@ -135,12 +139,31 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
         anchor_b=np.asarray(anchor_b, dtype=np.float64).reshape(-1, 2),
         figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
         wheels=np.asarray(wheels, dtype=np.float64).reshape(-1, 4),
-        most_force=np.asarray([math.inf if limit is None else limit for limit in motors]),
+        max_force=_column(max_force, math.inf),
+        max_bias=_column(max_bias, math.inf),
+        bias=_column(bias, math.nan),
         collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
-        strength=np.asarray([math.inf if limit is None else limit for limit in strengths]),
+        strength=_column([joint.strength for joint in scene.joints], math.inf),
         number=np.arange(len(scene.joints)),
         names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
     )
+
+
+def _limits(joint: Joint) -> tuple[float | None, float | None, float | None]:
+    """Return the largest force, N or N·m, the largest speed of correction, m/s or rad/s, and the bias of a joint."""
+    match joint:
+        case ErrorCorrecting():
+            return joint.max_force, joint.max_bias, joint.bias
+        case ForceLimited():
+            return joint.max_force, None, None
+        case Motor():
+            return joint.max_torque, None, None
+        case _:
+            return None, None, None
+
+
+def _column(values: Sequence[float | None], default: float) -> FloatArray:
+    return np.asarray([default if value is None else value for value in values], dtype=np.float64)
 
 
 def ends_of(joint: Rod | Pulley, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
@@ -195,6 +218,9 @@ def _figures(
         case Gear():
             phase = angle_b * joint.ratio - angle_a if joint.phase is None else joint.phase
             return phase, joint.ratio, 0.0
+        case Ratchet():
+            start = last_click(angle_b - angle_a, joint.phase, joint.ratchet)
+            return float(start) if joint.angle is None else joint.angle, joint.phase, joint.ratchet
         case Spring():
             return length if joint.rest_length is None else joint.rest_length, joint.stiffness, joint.damping
         case RotarySpring():

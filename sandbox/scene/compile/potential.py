@@ -16,7 +16,8 @@ ROUNDING = 1e-12
 class Potential:
     """Potential energy of springs and attraction, frame by frame.
 
-    A spring stores ½ k (l − l₀)², a rotary spring ½ k (φ − φ₀)². An attraction a = s/(r² + ε²) has −m s/r where ε = 0,
+    A spring stores ½ k (l − l₀)², a rotary spring ½ k (φ − φ₀)²; beyond the stretch F/k of its largest force F it
+    stores F per unit of stretch. An attraction a = s/(r² + ε²) has −m s/r where ε = 0,
     else −(m s/ε)·atan(ε/r), which is 0 at infinity; a pair of bodies counts once. Energy between two moving bodies is
     divided equally; energy between a body and the world or a fixed body belongs to the body.
     """
@@ -77,7 +78,10 @@ class Potential:
         stored = np.zeros(len(position))
         for links, breaks, strain in self._springs:
             if len(links):
-                energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
+                stiffness, stretch = links.figures[:, 1], np.abs(strain(links, position, angle) - links.figures[:, 0])
+                energy = 0.5 * stiffness * np.square(stretch)
+                excess = np.maximum(stretch - links.max_force / stiffness, 0.0)
+                energy -= 0.5 * stiffness * np.square(excess)
                 holds = both_present(links, present) & ~is_broken_at(breaks, time)
                 stored += np.where(holds, energy, 0.0) @ self._fraction(links.a, links.b)
         return stored

@@ -68,7 +68,7 @@ class Setup:
             passing: pairs of a body and a one-way wall that it is passing.
             plane_reach: extent of half-planes.
         """
-        links = self.links.without(broken).among(bodies.names, self.bodies.names)
+        links = self.links.without(broken).among(bodies.names, self.bodies.names).clicked(bodies.angle)
         drives = initial_drive_states(self.scene) if drives is None else drives
         return replace(
             self, bodies=bodies, links=links, drives=drives, time=time, passing=passing, plane_reach=plane_reach

@@ -11,6 +11,8 @@ from pydantic import Field
 from sandbox.scene.description.base import Name, Part, Point
 
 JointStrength = Annotated[float, Field(gt=0, le=1e42)]
+JointLimit = Annotated[float, Field(ge=0, le=1e42)]
+JointBias = Annotated[float, Field(ge=0, le=1)]
 JointDistance = Annotated[float, Field(ge=0, le=1e9)]
 JointAngle = Annotated[float, Field(ge=-1e12, le=1e12)]
 Stiffness = Annotated[float, Field(gt=0, le=1e30)]
@@ -30,6 +32,23 @@ class Joined(Part):
     """strength, N (N·m for joints that hold an angle): a larger load breaks the joint; default: unbreakable"""
 
 
+class ForceLimited(Joined):
+    """A joint whose force can have a limit."""
+
+    max_force: JointLimit | None = None
+    """largest force, N (N·m for joints that hold an angle): the joint gives way to a larger load; default: unlimited"""
+
+
+class ErrorCorrecting(ForceLimited):
+    """A joint that corrects its error, a length or an angle, over several steps."""
+
+    max_bias: JointLimit | None = None
+    """largest speed at which the error is corrected, m/s (rad/s for joints that hold an angle); 0: never, so that the
+    joint only resists motion; default: unlimited"""
+    bias: JointBias | None = None
+    """fraction of the error that remains after one second of correction; default: that of the solver"""
+
+
 class Anchored(Joined):
     """A joint that acts on one point of each body."""
 
@@ -38,7 +57,7 @@ class Anchored(Joined):
     point in the world"""
 
 
-class Rod(Anchored):
+class Rod(Anchored, ErrorCorrecting):
     """Keeps two points at a constant distance, as a massless rod. `pin` is a synonym (pymunk's term)."""
 
     kind: Literal["rod", "pin"]
@@ -46,7 +65,7 @@ class Rod(Anchored):
     """length, m; default: the distance at the start"""
 
 
-class Pivot(Joined):
+class Pivot(ErrorCorrecting):
     """Joins two bodies at one point, about which they turn."""
 
     kind: Literal["pivot"]
@@ -57,7 +76,7 @@ class Pivot(Joined):
     the world"""
 
 
-class Slide(Anchored):
+class Slide(Anchored, ErrorCorrecting):
     """Keeps the distance of two points between two limits; a string if the lower limit is 0."""
 
     kind: Literal["slide"]
@@ -67,7 +86,7 @@ class Slide(Anchored):
     """largest distance, m"""
 
 
-class Groove(Joined):
+class Groove(ErrorCorrecting):
     """Lets a point of the second body slide along a groove in the first; with one body, the groove is in the world."""
 
     kind: Literal["groove"]
@@ -77,7 +96,7 @@ class Groove(Joined):
     """point of the other body in its own frame, m"""
 
 
-class RotaryLimit(Joined):
+class RotaryLimit(ErrorCorrecting):
     """Keeps the angle between two bodies within limits."""
 
     kind: Literal["rotary_limit"]
@@ -93,11 +112,26 @@ class Motor(Joined):
     kind: Literal["motor"]
     rate: JointAngle
     """rate of rotation, rad/s"""
-    max_torque: JointStrength | None = None
+    max_torque: JointLimit | None = None
     """largest torque, N·m; default: unlimited"""
 
 
-class Gear(Joined):
+class Ratchet(ErrorCorrecting):
+    """Lets the second body turn in one direction, click by click, and holds it at the last click in the other.
+
+    Clicks are at the angles phase + k·ratchet, for all integers k.
+    """
+
+    kind: Literal["ratchet"]
+    ratchet: JointAngle
+    """angle between two clicks, rad; if negative, the body turns freely clockwise, else counter-clockwise"""
+    phase: JointAngle = 0.0
+    """angle of a click, rad"""
+    angle: JointAngle | None = None
+    """angle at which it holds until the next click is passed, rad; default: the last click at the start"""
+
+
+class Gear(ErrorCorrecting):
     """Keeps angle₂·ratio − angle₁ = phase: the first body turns `ratio` times as fast as the second."""
 
     kind: Literal["gear"]
@@ -107,7 +141,7 @@ class Gear(Joined):
     """phase, rad; default: its value at the start"""
 
 
-class Spring(Anchored):
+class Spring(Anchored, ForceLimited):
     """A damped spring between two points: F = −k (l − l₀) − c l̇ along their line."""
 
     kind: Literal["spring"]
@@ -119,7 +153,7 @@ class Spring(Anchored):
     """damping c, N·s/m"""
 
 
-class RotarySpring(Joined):
+class RotarySpring(ForceLimited):
     """A damped spring of the angle between two bodies: τ = −k (φ − φ₀) − c φ̇."""
 
     kind: Literal["rotary_spring"]
@@ -149,6 +183,6 @@ class Pulley(Anchored):
 
 
 Joint = Annotated[
-    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring | Pulley,
+    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring | Pulley | Ratchet,
     Field(discriminator="kind"),
 ]

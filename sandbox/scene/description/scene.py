@@ -65,7 +65,7 @@ class SceneDescription(_Header):
     ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
     joints: tuple[Joint, ...] = Field((), alias="joint")
     """Joint of one body to the world, or of two bodies: rod, pivot, slide, groove, rotary_limit, motor, gear, spring,
-    rotary_spring."""
+    rotary_spring, pulley, ratchet."""
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
     drives: tuple[AnyDrive, ...] = Field((), alias="drive")

@@ -13,18 +13,7 @@ from pydantic import BaseModel
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.forces import Driven, PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.description.game_tables import lazy_table
-from sandbox.scene.description.joints import (
-    Gear,
-    Groove,
-    Joined,
-    Motor,
-    Pivot,
-    Rod,
-    RotaryLimit,
-    RotarySpring,
-    Slide,
-    Spring,
-)
+from sandbox.scene.description.joints import Joined, Joint
 from sandbox.scene.errors import Location
 
 
@@ -149,9 +138,7 @@ def model_at(location: Location) -> type[BaseModel]:
 
 
 JOINTS: dict[str, type[BaseModel]] = {
-    tag: model
-    for model in (Rod, Pivot, Slide, Groove, RotaryLimit, Motor, Gear, Spring, RotarySpring)
-    for tag in get_args(model.model_fields["kind"].annotation)
+    tag: model for model in get_args(get_args(Joint)[0]) for tag in get_args(model.model_fields["kind"].annotation)
 }
 """Models of joints by their `kind`."""
 

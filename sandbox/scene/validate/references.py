@@ -11,7 +11,7 @@ from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive
-from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Pulley, Rod, RotaryLimit, Slide
+from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Pulley, Ratchet, Rod, RotaryLimit, Slide
 from sandbox.scene.description.play import marking_fault
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
@@ -25,6 +25,9 @@ SHORTEST = 1e-9
 
 MIN_RATIO = 1e-6
 """Smallest magnitude of a gear ratio; engines divide by it."""
+
+SMALLEST_CLICK = 1e-6
+"""rad, smallest magnitude of the angle between two clicks of a ratchet; the engine divides by it."""
 
 
 def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
@@ -107,6 +110,9 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
         case Gear():
             if abs(joint.ratio) < MIN_RATIO:
                 yield "ratio", f"must be at least {MIN_RATIO:g} in magnitude"
+        case Ratchet():
+            if abs(joint.ratchet) < SMALLEST_CLICK:
+                yield "ratchet", f"must be at least {SMALLEST_CLICK:g} rad in magnitude"
         case Slide() | RotaryLimit():
             if joint.least > joint.most:
                 yield "most", "must not be smaller than `least`"

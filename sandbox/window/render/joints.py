@@ -15,7 +15,7 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind, last_click
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.window.render.body_geometry import clipped_box
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
@@ -207,6 +207,7 @@ _TINTS: dict[LinkKind, RgbColour] = {
     LinkKind.SPRING: INK,
     LinkKind.ROTARY_SPRING: SKY,
     LinkKind.PULLEY: SKY,
+    LinkKind.RATCHET: GREEN,
 }
 
 
@@ -234,6 +235,7 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
         LinkKind.ROTARY_LIMIT: _draw_limits,
         LinkKind.ROTARY_SPRING: _draw_rotary_springs,
         LinkKind.MOTOR: _draw_motors,
+        LinkKind.RATCHET: _draw_ratchets,
     }
     for kind in (*renderers, LinkKind.SPRING, LinkKind.PULLEY, LinkKind.PIVOT):
         some = joints.of(kind)
@@ -358,6 +360,26 @@ def _draw_motors(view: DrawContext, motors: JointSegments) -> None:
         last = first + span
         neck, tip = spot((x, y), 1.15 * size, last - sign * 0.15), spot((x, y), 1.15 * size, last + sign * 0.35)
         draw_arrow(view.surface, neck, tip, INK, 2.2 * view.ui_scale, view.antialias, BACKGROUND)
+
+
+MAX_TEETH = 36
+"""Largest number of teeth of a ratchet that are drawn; with more, only those next to the needle are"""
+
+
+def _draw_ratchets(view: DrawContext, ratchets: JointSegments) -> None:
+    """Draw the teeth of a ratchet, up which the needle of the second body slides and down which it does not."""
+    for (x, y), size, base, relative_angle, (_, phase, ratchet) in _dials(view, ratchets):
+        count = min(max(int(math.tau / abs(ratchet)), 1), MAX_TEETH)
+        tooth = math.copysign(min(abs(ratchet), math.tau), ratchet)
+        first = base + float(last_click(relative_angle, phase, ratchet)) - (count // 2) * tooth
+        points = [spot((x, y), 0.85 * size, first)]
+        for k in range(count):
+            stop = first + (k + 1) * tooth
+            points += [spot((x, y), (0.85 + 0.3 * f) * size, stop + (f - 1.0) * tooth) for f in (0.25, 0.5, 0.75, 1.0)]
+            points.append(spot((x, y), 0.85 * size, stop))
+        path(view, points, INK, 1.4)
+        angle = base + relative_angle
+        path(view, [spot((x, y), 0.35 * size, angle), spot((x, y), 1.1 * size, angle)], YELLOW, 2.0)
 
 
 def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:

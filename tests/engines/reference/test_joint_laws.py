@@ -105,7 +105,7 @@ def test_joint_force_does_not_exceed_its_maximum(method, integrator, kind):
     """The body falls straight down with g − F/m."""
     figures = (1.0,) if kind == LinkKind.ROD else ()
     anchor = (0.0, 0.0) if kind == LinkKind.ROD else (0.0, 1.0)
-    joints = compile_joints(link(kind, -1, 0, *figures, anchor_b=anchor, most_force=4.0))
+    joints = compile_joints(link(kind, -1, 0, *figures, anchor_b=anchor, max_force=4.0))
     rig = Rig(joints, [0, -1], mass=2.0, method=method, integrator=integrator).run(1.0, 1 / 100)
     assert rig.rates[0, 1] == pytest.approx(-(G - 2.0), rel=1e-12)  # rounding of 100 steps
     assert rig.solver.load(rig.x)[0] == pytest.approx([0.0, 4.0], abs=1e-12)  # as above

@@ -175,9 +175,9 @@ JOINTS = {
 }
 
 
-@pytest.mark.parametrize("most_force", [math.inf, 6.0])
+@pytest.mark.parametrize("max_force", [math.inf, 6.0])
 @pytest.mark.parametrize("name", JOINTS)
-def test_impulses_match_pymunk_step_by_step(name, most_force):
+def test_impulses_match_pymunk_step_by_step(name, max_force):
     """Same order of drift and kick, step, iterations and bias: the same algebra, so only rounding differs."""
     theirs, ours = JOINTS[name]
     space = pymunk.Space()
@@ -185,10 +185,10 @@ def test_impulses_match_pymunk_step_by_step(name, most_force):
     body = pymunk.Body(1.0, 0.4)
     body.position, body.angular_velocity = (1.0, 0.0), 2.0
     joint = theirs(space, body)
-    joint.error_bias, joint.max_force = BIAS, most_force
+    joint.error_bias, joint.max_force = BIAS, max_force
     space.add(body, joint)
     rig = Rig(
-        compile_joints({**ours, "most_force": most_force}), [1, 0], [0, 0, 2], moment=0.4, integrator="explicit_euler"
+        compile_joints({**ours, "max_force": max_force}), [1, 0], [0, 0, 2], moment=0.4, integrator="explicit_euler"
     )
     for _ in range(1000):
         space.step(1 / 240)

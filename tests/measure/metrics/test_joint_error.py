@@ -60,8 +60,17 @@ def test_joint_error_is_the_distance_from_its_constraint(
     assert error_at(joint, position, angle) == pytest.approx(error, abs=1e-15)  # rounding of sines of right angles
 
 
-@pytest.mark.parametrize("joint", ['kind = "spring"\nstiffness = 1.0', 'kind = "motor"\nrate = 1.0'])
-def test_springs_and_motors_have_no_joint_error(joint: str) -> None:
+@pytest.mark.parametrize(
+    "joint",
+    [
+        'kind = "spring"\nstiffness = 1.0',
+        'kind = "motor"\nrate = 1.0',
+        'kind = "ratchet"\nratchet = 1.0',
+        'kind = "pivot"\nat = [1.5, 0.0]\nmax_force = 5.0',
+        'kind = "pivot"\nat = [1.5, 0.0]\nmax_bias = 0.0',
+    ],
+)
+def test_springs_motors_and_joints_that_give_way_have_no_joint_error(joint: str) -> None:
     assert math.isnan(error_at(joint, (9.0, 9.0)))
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
     assert joint_error(resting_run(scene), scene) is None

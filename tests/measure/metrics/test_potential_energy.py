@@ -53,6 +53,12 @@ def test_springs_store_half_k_times_their_strain_squared() -> None:
     )  # sums of 3
 
 
+def test_spring_with_a_largest_force_stores_its_work() -> None:
+    scene = loads(SPRINGS.replace("stiffness = 10.0", "stiffness = 10.0\nmax_force = 20.0"))
+    # ½·10·2² up to a stretch of 2 m, and 20·1 beyond it; the others as without a limit
+    assert energies(resting_run(scene), scene).potential == pytest.approx([40.0 + 4.0 + 9.0] * 4, rel=1e-15)  # as above
+
+
 def test_spring_energy_is_halved_between_bodies_but_not_with_the_world() -> None:
     scene = loads(SPRINGS)
     parts = [energies(resting_run(scene), scene, body=n).potential[0] for n in range(3)]

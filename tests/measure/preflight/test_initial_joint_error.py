@@ -65,6 +65,7 @@ def test_initially_violated_joint_is_warned_of_with_its_error(joint: str, error:
         f'kind = "pivot"\n{ONE}at = [0, 0]',
         f'kind = "spring"\n{BOTH}stiffness = 5\nrest_length = 1',  # stretched, as springs may be
         f'kind = "motor"\n{ONE}rate = 3',
+        f'kind = "pivot"\n{ONE}anchors = [[0, 0], [0, 0]]\nmax_bias = 0\nmax_force = 1',  # friction of the ground
     ],
 )
 def test_initially_satisfied_joint_is_not_warned_of(joint: str) -> None:

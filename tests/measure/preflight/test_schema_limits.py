@@ -42,10 +42,13 @@ def joints(draw: st.DrawFn) -> dict[str, Any]:
         "rotary_spring": {"stiffness": STIFF, "damping": DAMPING, "rest_angle": angles},
         "motor": {"rate": angles},
         "gear": {"ratio": ends(-1e6, 1e6, 1.0)},
+        "ratchet": {"ratchet": ends(-1e12, 1e12, 1.0), "phase": angles},
     }
     kind = draw(st.sampled_from(sorted(kinds)))
     between = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=2, unique=True))
-    return {"kind": kind, "between": between, **draw(st.fixed_dictionaries(kinds[kind]))}
+    is_limited = kind in ("rod", "slide", "pivot", "gear", "ratchet")
+    limits = {key: ends(0.0, 1e42, 1.0) for key in ("max_force", "max_bias") if is_limited}
+    return {"kind": kind, "between": between, **draw(st.fixed_dictionaries(kinds[kind], optional=limits))}
 
 
 @st.composite

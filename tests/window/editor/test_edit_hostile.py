@@ -12,6 +12,7 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import FIELD_OF
 from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import JOINTS
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
@@ -237,6 +238,14 @@ stiffness = 10.0
 kind = "rotary_spring"
 between = ["a", "tri"]
 stiffness = 10.0
+max_force = 3.0
+[[joint]]
+kind = "ratchet"
+between = ["a", "tri"]
+ratchet = 0.5
+max_force = 3.0
+max_bias = 1.0
+bias = 0.1
 [[thrust]]
 name = "engine"
 body = "ship"
@@ -592,7 +601,7 @@ def test_scene_with_everything_has_every_kind_of_element() -> None:
     found = [loads(text) for text in (EVERYTHING, TABLE, ATTRACTED)]
     for table, name in FIELD_OF.items():
         assert any(getattr(scene, name) for scene in found), table
-    kinds = {"rod", "pivot", "slide", "groove", "rotary_limit", "motor", "gear", "spring", "rotary_spring", "pulley"}
+    kinds = set(JOINTS) - {"pin"}  # which is another name of a rod
     assert {joint.kind for scene in found for joint in scene.joints} == kinds
 
 

@@ -28,6 +28,7 @@ KINDS = {
     "spring": PAIR | {"kind": "spring", "stiffness": 1.0},
     "rotary_spring": PAIR | {"kind": "rotary_spring", "stiffness": 1.0},
     "pulley": PAIR | {"kind": "pulley", "wheels": [[-3, 2], [3, 2]]},
+    "ratchet": PAIR | {"kind": "ratchet", "ratchet": 0.5},
 }
 WITHOUT_OVERLAY = {"rod", "slide", "spring", "pulley"}
 

@@ -249,10 +249,10 @@ class Contents:
             first = "space.static_body" if int(links.a[k]) == WORLD else "bodies[{a}]"
             lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
             columns = {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
-            limit = ""
-            if math.isfinite(links.most_force[k]):
-                limit, columns["max_force"] = ", max_force={max_force}", literal(float(links.most_force[k]))
-            lines.append(f"add_joint(space, joint, collide_bodies={bool(links.collide[k])}{limit})")
+            limits = {"max_force": links.max_force[k], "max_bias": links.max_bias[k], "error_bias": links.bias[k]}
+            columns |= {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
+            stated = "".join(f", {key}={{{key}}}" for key in limits if key in columns)
+            lines.append(f"add_joint(space, joint, collide_bodies={bool(links.collide[k])}{stated})")
             title = literal(links.names[k]) if links.names[k] else f"joint {k + 1}"
             yield Block(f"{kind.name.lower().replace('_', ' ')} joints", title, tuple(lines), columns)
 
@@ -314,6 +314,10 @@ JOINT_LINES: dict[LinkKind, tuple[str, ...]] = {
     LinkKind.GROOVE: ("joint = pymunk.GrooveJoint(<a>, <b>, {anchor_a}, {far_end}, {anchor_b})",),
     LinkKind.ROTARY_LIMIT: ("joint = pymunk.RotaryLimitJoint(<a>, <b>, {least}, {most})",),
     LinkKind.MOTOR: ("joint = pymunk.SimpleMotor(<a>, <b>, {rate})",),
+    LinkKind.RATCHET: (
+        "joint = pymunk.RatchetJoint(<a>, <b>, {offset}, {ratchet})",
+        "joint.angle = {click}",
+    ),
     LinkKind.GEAR: ("joint = pymunk.GearJoint(<a>, <b>, {phase}, {ratio})",),
     LinkKind.SPRING: (
         "joint = pymunk.DampedSpring(<a>, <b>, {anchor_a}, {anchor_b}, {rest_length}, {stiffness}, {damping})",
@@ -342,6 +346,9 @@ def _joint_values(links: JointArrays, k: int, names: Sequence[str]) -> dict[str,
         "most": y,
         "far_end": f"({x}, {y})",
         "rate": opposite,
+        "click": x,
+        "offset": y,
+        "ratchet": z,
         "phase": x,
         "ratio": y,
         "rest_length": x,

@@ -220,11 +220,13 @@ def _helpers(contents: Contents) -> Iterator[str]:
     if len(contents.setup.links):
         yield from (
             "",
-            "def add_joint(space, joint, collide_bodies, max_force=INFINITY):",
-            '    """Add a joint; its error is corrected as fast as overlaps are."""',
+            "def add_joint(",
+            "    space, joint, collide_bodies, max_force=INFINITY, max_bias=INFINITY, error_bias=COLLISION_BIAS",
+            "):",
+            '    """Add a joint; by default its error is corrected as fast as overlaps are."""',
             "    joint.collide_bodies = collide_bodies",
-            "    joint.error_bias = COLLISION_BIAS",
-            "    joint.max_bias = INFINITY",
+            "    joint.error_bias = error_bias",
+            "    joint.max_bias = max_bias",
             "    joint.max_force = max_force",
             "    space.add(joint)",
             "",
