@@ -41,6 +41,7 @@ ABSENT = {
 
 OWN = frozenset(
     {
+        Demand.DAMPING,
         Demand.POLYGONS,
         Demand.PASSABLE,
         Demand.SURFACE_SPEED,

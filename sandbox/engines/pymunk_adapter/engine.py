@@ -21,6 +21,7 @@ FIXED_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "respo
 
 OWN = frozenset(
     {
+        Demand.DAMPING,
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
@@ -72,8 +73,11 @@ class PymunkEngine:
             missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
         if settings.stretch is not None:
             missing.append("stretch applies to joints = 'relaxation', which it does not have")
-        if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
+        missing += damping_faults(scene)
+        if settings.half_kick and scene.world.has_drag:
             missing.append("half_kick does not support drag")
+        if settings.half_kick and scene.world.has_damping:
+            missing.append("half_kick does not support damping")
         if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
             missing.append("half_kick supports gravity only, and the scene has other forces")
         if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
@@ -112,6 +116,18 @@ class PymunkEngine:
         if missing:
             raise Refusal(self.name, missing, ())
         return PymunkSimulation(setup, self.resolve(setup, settings))
+
+
+def damping_faults(scene: Scene) -> list[str]:
+    """Return what a scene with damping has that pymunk does not support together with damping."""
+    if not scene.world.has_damping:
+        return []
+    found = []
+    if scene.world.has_drag:
+        found.append("it does not model drag and damping together")
+    if scene.drives:
+        found.append("it does not model drives and damping together")
+    return found
 
 
 def _too_large(setup: Setup) -> list[str]:

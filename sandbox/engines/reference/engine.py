@@ -45,7 +45,7 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
 DEFAULT_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """Default methods: those of pymunk and of the tutorial"""
 
-TABLETOP = BALLS | FLOOR | SURFACES | {Demand.CURL}
+TABLETOP = BALLS | FLOOR | SURFACES | {Demand.DAMPING, Demand.CURL}
 """Demands that the engine models in scenes with a surface, as far as `unsupported_by_steppers` allows"""
 
 TABLETOP_METHODS = {**DEFAULT_METHODS, "impact": "newton", "persistence": 1}
@@ -81,6 +81,7 @@ class ReferenceEngine:
         Demand.PASSABLE,
         Demand.POLYGONS,
         *JOINTS,
+        Demand.DAMPING,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,

@@ -119,8 +119,8 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Return whether a scene conserves energy: no drag, friction, damper, thrust or drive, and elastic contacts."""
-    if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.drives:
+    """Return whether a scene conserves energy: no drag, damping, friction, thrust or drive, and elastic contacts."""
+    if scene.world.has_drag or scene.world.has_damping or scene.thrusts or scene.drives:
         return False
     if scene.links.figures[:, 2].any():
         return False
