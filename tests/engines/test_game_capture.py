@@ -48,6 +48,8 @@ class Platformer:
             self.others[0].angular_velocity = 4.0
         if k == 80:
             self.space.gravity = 100, -700
+        if k in (30, 150):
+            self.space.damping = 0.3 if k == 30 else 1.0
         if k % 40 == 25:
             self.others.append(disc(self.space, self.rng.uniform(-200, 200), 400, 8))
         if k == 120:

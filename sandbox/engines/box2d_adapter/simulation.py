@@ -80,7 +80,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         return {"substeps": self.substeps}
 
     def _set_air(self, scene: Scene) -> None:
-        """Apply gravity, drag and damping of a scene; what Box2D lacks are forces that are constant during a substep."""
+        """Apply gravity, drag and damping of a scene; what Box2D lacks are forces, constant during a substep."""
         air = scene.world
         self._world.set_gravity(air.gravity)
         self._world.set_damping(air.linear_drag + air.damping_rate, air.damping_rate)
