@@ -15,8 +15,8 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import derive_contacts, has_same_bodies
 from sandbox.engines.common.lifetimes import NO_BODIES
 from sandbox.engines.common.zones import ZoneTracker
-from sandbox.engines.pymunk_adapter.engine import damping_faults
 from sandbox.engines.pymunk_adapter.particles import Particles
+from sandbox.engines.pymunk_adapter.requirements import air_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.bodies import Bodies
@@ -291,11 +291,7 @@ class PymunkBodies:
             ActionError: the settings or the engine do not support the change.
         """
         scene = setup.scene
-        if self._half_kick and scene.world.has_drag:
-            raise ActionError("drag cannot be switched on in a run with half_kick, which does not support it")
-        if self._half_kick and scene.world.has_damping:
-            raise ActionError("damping cannot be switched on in a run with half_kick, which does not support it")
-        if faults := damping_faults(scene):
+        if faults := air_faults(scene, self._half_kick > 0.0):
             raise ActionError(faults[0])
         bodies, matrix = self.bodies, self._contact_matrix
         same_bodies = spawned is None and has_same_bodies(scene, self.scene)
