@@ -141,7 +141,7 @@ class SetParameter(Timed):
     """Change a parameter of the running scene.
 
     Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
-    `surface.sliding_friction`, `surface.curl`, and every `restitution` and `friction`.
+    `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution` and `friction`.
     """
 
     kind: Literal["set"] = "set"
@@ -283,6 +283,7 @@ _SETTABLE = (
     "world.wind",
     "world.linear_drag",
     "world.quadratic_drag",
+    "world.damping",
     "surface.sliding_friction",
     "surface.curl",
 )

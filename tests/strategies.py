@@ -156,6 +156,7 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
                 "seed": st.integers(0, 2**63 - 1),
                 "linear_drag": numbers(0, 1e9),
                 "quadratic_drag": numbers(0, 1e9),
+                "damping": numbers(1e-9, 1),
                 "wind": pairs(-speed, speed),
                 "bounds": st.just([[-1e16, -1e16], [1e16, 1e16]]),
             },

@@ -375,6 +375,8 @@ def _print_landing_errors(name: str, scene: Scene, found: "LandingErrorTable", s
 
     world = scene.world
     air = f"drag {world.linear_drag:g} 1/s and {world.quadratic_drag:g} 1/m, wind {world.wind[0]:g} m/s"
+    if world.has_damping:
+        air += f", damping {world.damping:g}"
     truth = f"{shot}, {air}: exact range {found.range:.4f} m, time of flight {found.time:.5f} s"
     click.echo(f"{name}: {truth}")
     dts = list(dict.fromkeys(row.dt for row in found.rows))

@@ -24,7 +24,7 @@ class Cause(StrEnum):
     FRICTION = "friction"
     """tangential impulses of contacts, as far as they remove energy"""
     DRAG = "drag"
-    """air drag; wind may add energy"""
+    """air drag, where wind may add energy, and `world.damping`"""
     DAMPING = "damping"
     """dampers of springs"""
     JOINTS = "joints"

@@ -89,6 +89,16 @@ SCENES = {
     + "[[wall]]\npoints = [[-0.9, 0.5], [0, 0.3], [0.8, 0.6]]\n[[post]]\nposition = [0.1, 0.8]\nradius = 0.05\n"
     "[[grid]]\nradius = 0.06\norigin = [-0.7, 1.0]\ncolumns = 6\nrows = 5\nspacing = [0.2, 0.2]\njitter = 0.02\n"
     "velocity_jitter = 1.0\nrestitution = 0.6\nfriction = 0.3\n",
+    "damping, walls and posts": "[world]\ndamping = 0.5\n"
+    + BOX
+    + "[[wall]]\npoints = [[-0.9, 0.5], [0, 0.3], [0.8, 0.6]]\n[[post]]\nposition = [0.1, 0.8]\nradius = 0.05\n"
+    "[[grid]]\nradius = 0.06\norigin = [-0.7, 1.0]\ncolumns = 6\nrows = 5\nspacing = [0.2, 0.2]\njitter = 0.02\n"
+    "velocity_jitter = 1.0\nrestitution = 0.6\nfriction = 0.3\n",
+    "damping, drag and thrust": "[world]\ndamping = 0.4\nlinear_drag = 0.2\nwind = [1, 0]\n"
+    + BOX
+    + "[[box]]\nname = 'ship'\nposition = [0, 1]\nsize = [0.3, 0.2]\nangular_velocity = 3.0\n"
+    "[[box]]\nposition = [0.1, 0.3]\nsize = [0.3, 0.2]\nangle = 0.3\nfriction = 0.4\n"
+    "[[thrust]]\nbody = 'ship'\nforce = [0.1, 0.9]\npoint = [0.05, -0.1]\n",
     "spring": "[[ball]]\nname = 'mass'\nposition = [1.1, 0]\nradius = 0.1\n"
     "[[joint]]\nkind = 'spring'\nbetween = ['mass']\nrest_length = 1.0\nstiffness = 40\n",
 }
@@ -220,7 +230,17 @@ def test_advance_equals_steps(
 @pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "grid", "sweep"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize(
-    "name", ["drag, walls and posts", "boxes and walls", "thrusts", "thrust on a ball", "chain", "jointed boxes"]
+    "name",
+    [
+        "drag, walls and posts",
+        "damping, walls and posts",
+        "damping, drag and thrust",
+        "boxes and walls",
+        "thrusts",
+        "thrust on a ball",
+        "chain",
+        "jointed boxes",
+    ],
 )
 def test_compiled_steps_of_the_reference(name: str, integrator: str, broad_phase: str) -> None:
     scene = small_scene(name)

@@ -194,6 +194,16 @@ def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymun
 
 
 @pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
+def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
+    space = make()
+    space.damping = 0.9
+    captured, differences = compare(space)
+    assert captured.scene.world.damping == 0.9
+    assert not captured.omitted
+    assert max(differences) == 0.0
+
+
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
 def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     scene = from_pymunk(space, dt=DT, title="captured")
@@ -346,7 +356,8 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda s, b, c: setattr(s, "damping", 0.9), "space.damping = 0.9"),
+        (lambda s, b, c: setattr(s, "damping", 1.5), "space.damping = 1.5"),
+        (lambda s, b, c: setattr(s, "damping", 0.0), "space.damping = 0"),
         (lambda s, b, c: setattr(s, "sleep_time_threshold", 0.5), "sleeping"),
         (lambda s, b, c: s.on_collision(1, 2, begin=lambda *_: None), "1 collision callbacks"),
         (lambda s, b, c: setattr(b, "velocity_func", _velocity_function), "velocity or position function of body-1"),
@@ -431,10 +442,10 @@ def test_bodies_without_friction_are_kept_up_to_rounding() -> None:
 
 def test_omissions_are_warnings_or_errors() -> None:
     space = balls()
-    space.damping = 0.5
-    with pytest.warns(CaptureWarning, match=r"damping = 0\.5"):
+    space.damping = 1.5
+    with pytest.warns(CaptureWarning, match=r"damping = 1\.5"):
         assert isinstance(sandbox.from_pymunk(space), Scene)
-    with pytest.raises(CaptureError, match=r"damping = 0\.5"):
+    with pytest.raises(CaptureError, match=r"damping = 1\.5"):
         sandbox.from_pymunk(space, strict=True)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

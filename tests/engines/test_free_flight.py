@@ -180,6 +180,7 @@ DRAGS = {
     "still": {},
     "linear": {"linear_drag": 0.3, "wind": [2.0, -1.0]},
     "quadratic": {"linear_drag": 0.1, "quadratic_drag": 0.02, "wind": [2.0, 0.5]},
+    "damping": {"damping": 0.6},
 }
 
 

@@ -87,6 +87,31 @@ def test_replay_of_a_game_ends_in_its_state_bit_for_bit() -> None:
     assert captured.recording.duration == pytest.approx(STEPS * DT)
 
 
+def test_changes_of_damping_are_actions() -> None:
+    space = balls()
+    with capture() as captured:
+        for k in range(120):
+            if k in (20, 60, 90):
+                space.damping = {20: 0.3, 60: 0.8, 90: 1.0}[k]
+            space.step(DT)
+    assert not captured.omitted and not captured.inexact
+    assert [action.path for action in captured.recording.actions] == ["world.damping"] * 3
+    ends = end_of(captured.recording)
+    for body, name in captured.spaces[0].names.items():
+        if body.body_type == pymunk.Body.DYNAMIC:
+            assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
+
+
+def test_damping_that_a_scene_cannot_have_is_named() -> None:
+    space = balls()
+    with capture() as captured:
+        for _ in range(3):
+            space.step(DT)
+            space.damping = 0.0
+    assert captured.omitted == ("space.damping = 0, which the game sets; `world.damping` is above 0 and at most 1",)
+    assert not captured.recording.actions
+
+
 def test_recording_is_saved_and_replayed_on_other_engines(tmp_path: Path) -> None:
     captured = play(Platformer(), 60)
     path = captured.recording.save(tmp_path / "game.json")

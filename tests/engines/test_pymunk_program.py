@@ -82,6 +82,14 @@ def differing(scene: Scene, substeps: int = SUBSTEPS) -> list[str]:
     return found
 
 
+@pytest.mark.parametrize("name", ["benchmark/pile", "benchmark/pyramid", "joints/ragdoll_stairs"])
+def test_program_of_a_damped_scene_has_the_states_of_the_engine(name: str) -> None:
+    (path,) = (each.path for each in shipped() if each.name == name)
+    scene = load(path, ["world.damping=0.9"])
+    assert executed(scene)["make_space"]()[0].damping == 0.9
+    assert differing(scene) == []
+
+
 @pytest.mark.parametrize("name", [each.name for each in shipped()])
 def test_shipped_scene_has_the_states_of_the_engine_or_is_refused(name: str) -> None:
     (path,) = (each.path for each in shipped() if each.name == name)

@@ -53,6 +53,8 @@ def parameters_of(scene: Scene) -> list[tuple[str, Any]]:
     found: list[tuple[str, Any]] = [("world.wind", [1.0, 0.5])]
     if scene.surface is None:
         found += [("world.gravity", [0.3, -5.0]), ("world.linear_drag", 0.25), ("world.quadratic_drag", 0.02)]
+        if not (scene.drives or scene.world.has_drag):  # pymunk models damping without them only
+            found.append(("world.damping", 0.8))
     else:
         found.append(("surface.sliding_friction", 0.03))
         if scene.surface.bodies == "pucks":
@@ -125,6 +127,8 @@ INVALID_VALUES: list[tuple[str, str, Any]] = [
     ("tutorial/bounce", "world.gravity", 3),
     ("tutorial/bounce", "world.linear_drag", -1.0),
     ("tutorial/bounce", "world.linear_drag", True),
+    ("tutorial/bounce", "world.damping", 0.0),
+    ("tutorial/bounce", "world.damping", 1.5),
     ("tutorial/bounce", "world.wind", [1.0, 2.0, 3.0]),
     ("tutorial/bounce", "ball.nobody.restitution", 0.5),
     ("tutorial/bounce", "ball.17.restitution", 0.5),
@@ -147,6 +151,9 @@ INVALID_VALUES: list[tuple[str, str, Any]] = [
     ("billiards/9-ball", "surface.sliding_friction", 0.0),
     ("billiards/9-ball", "world.gravity", [0.0, -1.0]),
     ("games/curling", "world.linear_drag", 0.5),
+    ("games/curling", "world.damping", 0.5),
+    ("joints/cloth", "world.damping", 0.5),
+    ("pinball/classic", "world.damping", 0.5),
 ]
 
 

@@ -80,6 +80,7 @@ FEATURES: dict[str, Document] = {
     },
     "bounds": {"world": {"bounds": [[-9.0, 2.9], [9.0, 9.0]]}},
     "air": {"world": {"linear_drag": 0.5, "quadratic_drag": 0.5, "wind": [1.0, 0.0]}},
+    "damping": {"world": {"damping": 0.5}},
     "materials": {
         "material": [{"name": "m", "restitution": 0.5}, {"name": "n"}],
         "pair": [{"between": ["m", "n"], "friction": 0.5}],

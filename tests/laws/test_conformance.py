@@ -91,6 +91,15 @@ def angle(value: float, error: float = ERROR, body: int = 0) -> Callable[[Trajec
     return check
 
 
+def spin(value: float, error: float = ERROR, body: int = 0) -> Callable[[Trajectory], None]:
+    """Return a check of the last angular velocity of a body, rad/s."""
+
+    def check(run: Trajectory) -> None:
+        assert run.angular_velocity[-1, body] == pytest.approx(value, abs=error)
+
+    return check
+
+
 def retired_at(time: float, body: int = 0) -> Callable[[Trajectory], None]:
     """Return a check of the time at which a body leaves, s."""
 
@@ -137,6 +146,10 @@ PROOFS: dict[Demand, Proof] = {
     Demand.ROTATION: Proof(scene(ball=[ball(angular_velocity=2.0)]), angle(2.0)),
     Demand.GRAVITY: Proof(scene(world=GRAVITY, ball=[ball(vx=1.0)]), position(1.0, -5.0)),
     Demand.DRAG: Proof(scene(world={"linear_drag": 2.0}, ball=[ball(vx=1.0)]), velocity(math.exp(-2.0), 0.0)),
+    # velocity and spin keep a quarter of their values
+    Demand.DAMPING: Proof(
+        scene(world={"damping": 0.25}, ball=[ball(vx=1.0, angular_velocity=1.0)]), both(velocity(0.25, 0.0), spin(0.25))
+    ),
     # the first ball stops the second half of their momentum: e = 0
     Demand.BALL_BALL: Proof(scene(ball=[ball(vx=1.0), ball(1.0)]), velocity(0.5, 0.0)),
     Demand.BALL_PLANE: Proof(scene(world=GRAVITY, ball=[ball(0.0, 0.3)], plane=[FLOOR]), position(0.0, 0.25)),

@@ -45,6 +45,36 @@ def test_flight_through_air_converges_at_the_order_of_its_scheme(config):
     assert fitted_order(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
 
 
+@pytest.mark.parametrize(
+    ("config", "drag"),
+    [
+        *((EngineConfig("reference", {"integrator": word}), 0.3) for word in INTEGRATORS),
+        (EngineConfig("pymunk", {}), 0.0),
+    ],
+)
+def test_damped_flight_converges_at_the_order_of_its_scheme(config, drag):
+    """Velocities and spins against DOP853 at its smallest tolerances, with drag and wind where an engine has both."""
+    world = {"gravity": [0.0, -9.81], "damping": 0.3, "linear_drag": drag, "wind": [2.0, 0.5], "duration": 2.0}
+    flight = {"position": [0, 0], "velocity": [15, 20], "angular_velocity": 6.0, "radius": 0.1}
+    scene, rate = from_document({"world": world, "ball": [flight]}), -np.log(0.3)
+
+    def derivative(_, s):
+        velocity = s[3:5]
+        return [*s[3:], *([0.0, -9.81] - drag * (velocity - [2.0, 0.5]) - rate * velocity), -rate * s[5]]
+
+    start = [0, 0, 0, 15, 20, 6.0]
+    expected = solve_ivp(derivative, (0, 2), start, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    errors = []
+    for dt in STEPS:
+        run = config.run(scene, dt=float(dt))
+        end = [*run.position[-1, 0], run.angle[-1, 0], *run.velocity[-1, 0], run.angular_velocity[-1, 0]]
+        errors.append(np.abs(end - expected))
+    order = 1 if config.engine == "pymunk" else TABLE[config.settings["integrator"]].order
+    assert fitted_order(np.max(errors, axis=1)) == pytest.approx(order, abs=0.2)  # a fit over three halvings
+    spins = np.asarray(errors)[:, [2, 5]].max(axis=1)
+    assert fitted_order(spins) == pytest.approx(order, abs=0.2)  # likewise
+
+
 @pytest.mark.full
 @pytest.mark.parametrize(
     ("settings", "order"),

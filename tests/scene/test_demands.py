@@ -59,6 +59,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.DRAG, True, {"world": {"linear_drag": 0.5}, "ball": [BALL]}, "linear 0.5"),
     (Demand.DRAG, True, {"world": {"quadratic_drag": 0.25}, "ball": [BALL]}, "quadratic 0.25"),
     (Demand.DRAG, False, {"world": {"wind": [5, 0]}, "ball": [BALL]}, "no drag"),
+    (Demand.DAMPING, True, {"world": {"damping": 0.9}, "ball": [BALL]}, "0.9"),
+    (Demand.DAMPING, False, {"world": {"damping": 1.0}, "ball": [BALL]}, "no damping"),
     (Demand.BALL_BALL, True, {"ball": [BALL, BALL]}, "can collide"),
     (Demand.BALL_BALL, True, {"ball": [{**BALL, "collides": "fixed"}, ROCK]}, "can collide"),
     (Demand.BALL_BALL, False, {"ball": [BALL, GHOST]}, "2 of 2 cannot collide"),

@@ -45,6 +45,7 @@ FILTER_BITS = 64
 
 OWN = frozenset(
     {
+        Demand.DAMPING,
         Demand.POLYGONS,
         Demand.PASSABLE,
         Demand.SURFACE_SPEED,

@@ -80,10 +80,10 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         return {"substeps": self.substeps}
 
     def _set_air(self, scene: Scene) -> None:
-        """Apply gravity and drag of a scene; what Box2D does not model are forces, constant during a substep."""
+        """Apply gravity, drag and damping of a scene; what Box2D lacks are forces, constant during a substep."""
         air = scene.world
         self._world.set_gravity(air.gravity)
-        self._world.set_damping(air.linear_drag)
+        self._world.set_damping(air.linear_drag + air.damping_rate, air.damping_rate)
         self._has_wind = bool(air.quadratic_drag or (air.linear_drag and any(air.wind)))
 
     @property

@@ -390,19 +390,20 @@ class Box2DWorld:
 
         The binding can neither remove shapes nor change the speed of their surface.
         """
-        damping = self._bodies[index].linear_damping
+        replaced = self._bodies[index]
+        linear, angular = replaced.linear_damping, replaced.angular_damping
         self._remove_body(index)
         self._create(index)
-        self._bodies[index].linear_damping = damping
+        self._bodies[index].linear_damping, self._bodies[index].angular_damping = linear, angular
 
     def set_gravity(self, gravity: tuple[float, float]) -> None:
         """Set the gravity, m/s²."""
         self._world.gravity = self._vector(gravity)
 
-    def set_damping(self, rate: float) -> None:
-        """Set the linear drag, 1/s, of all moving bodies."""
+    def set_damping(self, linear: float, angular: float) -> None:
+        """Set the damping rates of the velocities and spins of all moving bodies, 1/s."""
         for index in self.indices.tolist():
-            self._bodies[index].linear_damping = rate
+            self._bodies[index].linear_damping, self._bodies[index].angular_damping = linear, angular
 
     def remove(self, indices: list[int]) -> None:
         """Remove bodies; their contacts end."""

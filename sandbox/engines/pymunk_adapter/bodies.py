@@ -16,6 +16,7 @@ from sandbox.engines.common.actions import derive_contacts, has_same_bodies
 from sandbox.engines.common.lifetimes import NO_BODIES
 from sandbox.engines.common.zones import ZoneTracker
 from sandbox.engines.pymunk_adapter.particles import Particles
+from sandbox.engines.pymunk_adapter.requirements import air_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.bodies import Bodies
@@ -290,8 +291,8 @@ class PymunkBodies:
             ActionError: the settings or the engine do not support the change.
         """
         scene = setup.scene
-        if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
-            raise ActionError("drag cannot be switched on in a run with half_kick, which does not support it")
+        if faults := air_faults(scene, self._half_kick > 0.0):
+            raise ActionError(faults[0])
         bodies, matrix = self.bodies, self._contact_matrix
         same_bodies = spawned is None and has_same_bodies(scene, self.scene)
         is_checked = same_bodies and scene.world is self.scene.world

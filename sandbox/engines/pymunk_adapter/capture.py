@@ -84,7 +84,7 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
     space = capture.space
     document: KeyValues = {
         "title": title,
-        "world": {"gravity": _point(space.gravity), "duration": duration},
+        "world": {"gravity": _point(space.gravity), "duration": duration} | damping_of(space),
         "solver": {
             "dt": dt,
             "iterations": int(space.iterations),
@@ -107,6 +107,11 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
     if (moves & ~contact_matrix(setup).turnable & ~contact_matrix(setup).free).any():
         capture.inexact.append("bodies that nothing can turn: the engine keeps their rotation free of rounding")
     return CapturedSpace(scene, tuple(dict.fromkeys(capture.omitted)), tuple(dict.fromkeys(capture.inexact)))
+
+
+def damping_of(space: pymunk.Space) -> KeyValues:
+    """Return the damping of a space as a key of `[world]`; empty if it has none, or one that a scene cannot have."""
+    return {"damping": float(space.damping)} if 0.0 < space.damping < 1.0 else {}
 
 
 class CaptureWarning(UserWarning):
@@ -192,10 +197,8 @@ class SpaceElements:
     def note_space(self) -> None:
         """Note the settings and callbacks of the space that a scene cannot state."""
         space = self.space
-        if space.damping != 1.0:
-            self.omitted.append(
-                f"space.damping = {space.damping:g}; `world.linear_drag` slows bodies, and not their spin"
-            )
+        if not damping_of(space) and space.damping != 1.0:
+            self.omitted.append(f"space.damping = {space.damping:g}; `world.damping` is above 0 and at most 1")
         if math.isfinite(space.sleep_time_threshold):
             self.omitted.append("sleeping of bodies (space.sleep_time_threshold)")
         if space.current_time_step:

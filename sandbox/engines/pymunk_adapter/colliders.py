@@ -24,7 +24,6 @@ from sandbox.engines.common.collision_bits import bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.common.restitution import segment_fractions
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayWalls
-from sandbox.engines.pymunk_adapter.forces import has_drag
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
@@ -43,7 +42,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
     space = pymunk.Space(threaded=False)  # with two threads, runs are not repeatable
     space.gravity = gravity_of(scene)
-    space.damping = 1.0  # drag is in `forces.py`: pymunk's damping would slow spins too, and has no wind
+    space.damping = scene.world.damping
     space.iterations = settings.iterations
     space.collision_slop = settings.slop
     space.collision_bias = settings.bias
@@ -55,7 +54,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
 
 def gravity_of(scene: Scene) -> tuple[float, float]:
     """Return the gravity of the space: 0 in a scene with drag, whose forces then include gravity."""
-    return (0.0, 0.0) if has_drag(scene.world) else scene.world.gravity
+    return (0.0, 0.0) if scene.world.has_drag else scene.world.gravity
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Energy accounting of a pymunk run: the work of gravity, drag, joints, drives and contacts in a step.
+"""Energy accounting of a pymunk run: the work of gravity, drag, damping, joints, drives and contacts.
 
 A body on a hinge has one degree of freedom: all work on it is an angular impulse about the hinge times a mean spin. The
 work of the drive on a kinematic body follows from its change of momentum, minus the impulses of contacts.
@@ -13,12 +13,31 @@ from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactPoints
 from sandbox.engines.pymunk_adapter.drives import SpaceDrivenBody, SpaceHingeMotor, SpacePlunger
-from sandbox.engines.pymunk_adapter.forces import acceleration, has_drag
+from sandbox.engines.pymunk_adapter.forces import acceleration, damping_factor
 from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpulses, motors, springs
 from sandbox.engines.pymunk_adapter.joints import spring_forces
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.potential import Potential
 from sandbox.scene.compile.scene import Scene
+
+
+class EnergyState(NamedTuple):
+    """Positions and velocities of N bodies."""
+
+    position: FloatArray
+    """(N, 2) m"""
+    angle: FloatArray
+    """(N,) rad"""
+    velocity: FloatArray
+    """(N, 2) m/s"""
+    spin: FloatArray
+    """(N,) rad/s"""
+
+    def interpolated(self, other: "EnergyState", fraction: float) -> "EnergyState":
+        """Return the state interpolated to another by a fraction; for 1 the other itself, bit for bit."""
+        if fraction == 1.0:
+            return other
+        return EnergyState(*(old + (new - old) * fraction for old, new in zip(self, other, strict=True)))
 
 
 class AppliedImpulses(NamedTuple):
@@ -31,17 +50,19 @@ class AppliedImpulses(NamedTuple):
     angular: FloatArray
     """(N,) by constant torques and thrusts, N·m·s"""
     drag: FloatArray
-    """(N, 2) by drag, including its reduction of other forces"""
+    """(N, 2) by drag, including its reduction of other forces, and by damping"""
+    angular_drag: FloatArray
+    """(N,) by damping, N·m·s"""
 
 
 def applied_impulses(
-    population: PymunkBodies, before: FloatArray, included: BoolArray, springs: FloatArray | None, h: float
+    population: PymunkBodies, before: EnergyState, included: BoolArray, springs: FloatArray | None, h: float
 ) -> AppliedImpulses:
     """Return the impulses applied in the last substep.
 
     Args:
         population: as it is after the substep.
-        before: velocities at its start, (N, 2) m/s.
+        before: state at its start.
         included: (N,) bodies to include; others get 0.
         springs: (N, 2) N, forces of springs, which drag reduces; None: none.
         h: duration of the accounted part of the substep, s.
@@ -50,14 +71,21 @@ def applied_impulses(
     mass = np.where(included, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(population)
     attraction, (thrust, thrust_torque) = _attraction(population), _thrusts(population)
-    drag = np.zeros_like(before)
-    if has_drag(world):
+    drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
+    if world.has_drag:
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
-        drag_acceleration = acceleration(world, before, applied, population.h) - np.asarray(world.gravity) - applied
+        drag_acceleration = (
+            acceleration(world, before.velocity, applied, population.h) - np.asarray(world.gravity) - applied
+        )
         drag = mass * drag_acceleration * h
+    if world.has_damping:
+        lost = (damping_factor(world.damping, population.h) - 1.0) * (h / population.h)
+        drag = lost * mass * before.velocity
+        angular_drag = lost * np.where(included, bodies.moment, 0.0) * before.spin
     driven = np.where(included[:, None], constant + thrust, 0.0)
     angular = np.where(included, torque + thrust_torque, 0.0)
-    return AppliedImpulses(mass * (np.asarray(world.gravity) + attraction) * h, driven * h, angular * h, drag)
+    weight = mass * (np.asarray(world.gravity) + attraction) * h
+    return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag)
 
 
 def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
@@ -87,25 +115,6 @@ def _thrusts(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     for index, (x, y, turning) in population.space_bodies.thrusts.loads.items():
         force[index], torque[index] = (x, y), turning
     return force, torque
-
-
-class EnergyState(NamedTuple):
-    """Positions and velocities of N bodies."""
-
-    position: FloatArray
-    """(N, 2) m"""
-    angle: FloatArray
-    """(N,) rad"""
-    velocity: FloatArray
-    """(N, 2) m/s"""
-    spin: FloatArray
-    """(N,) rad/s"""
-
-    def interpolated(self, other: "EnergyState", fraction: float) -> "EnergyState":
-        """Return the state interpolated to another by a fraction; for 1 the other itself, bit for bit."""
-        if fraction == 1.0:
-            return other
-        return EnergyState(*(old + (new - old) * fraction for old, new in zip(self, other, strict=True)))
 
 
 class DriveWorkSums(NamedTuple):
@@ -244,7 +253,7 @@ class PymunkEnergyLedger:
         set_mean_driven_velocity(driven_bodies, before, now, velocity, spin)
         joints = p.space_bodies.joints.by_kind
         spring_force = spring_forces(joints.springs, end.position, end.angle) if len(joints.springs) else None
-        applied = applied_impulses(p, before.velocity, included, spring_force, p.h * fraction)
+        applied = applied_impulses(p, before, included, spring_force, p.h * fraction)
         applied.angular[~self._can_turn()] = 0.0
         joint_impulses = springs(p.space_bodies.joints, end.position, end.angle, p.h) if joints else ((), ())
         by_stiffness, by_damping = (tuple(each.scaled(fraction) for each in impulses) for impulses in joint_impulses)
@@ -253,7 +262,7 @@ class PymunkEnergyLedger:
         self._move(before, now, included, fraction, applied, (velocity, spin))
         for each in by_stiffness:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
-        account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1])))
+        account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1]) + applied.angular_drag @ spin[:-1]))
         account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
         account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
         normal_work, tangential_work, kick_work, surface_work = points.work(velocity, spin)
@@ -347,7 +356,7 @@ class PymunkEnergyLedger:
         p = self._population
         mass, moment = np.where(included, p.bodies.mass, 0.0), np.where(included, p.bodies.moment, 0.0)
         linear = mass[:, None] * (now.velocity - before.velocity) - applied.weight - applied.driven - applied.drag
-        angular = moment * (now.spin - before.spin) - applied.angular
+        angular = moment * (now.spin - before.spin) - applied.angular - applied.angular_drag
         rigid = p.space_bodies.joints.by_kind.rigid
         return ImpulseSums(np.vstack((linear, np.zeros((1, 2)))), np.append(angular, 0.0), np.union1d(rigid.a, rigid.b))
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
+from sandbox.engines.pymunk_adapter.requirements import air_faults, size_faults
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
-from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINT_LIMITS, JOINTS, SURFACES, Demand, unmodelled
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -24,6 +24,7 @@ OWN = frozenset(
     {
         *JOINTS - {Demand.PULLEYS},
         *JOINT_LIMITS,
+        Demand.DAMPING,
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
@@ -95,8 +96,7 @@ class PymunkEngine:
             missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
         if settings.stretch is not None:
             missing.append("stretch applies to joints = 'relaxation', which it does not have")
-        if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
-            missing.append("half_kick does not support drag")
+        missing += air_faults(scene, settings.half_kick)
         if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
             missing.append("half_kick supports gravity only, and the scene has other forces")
         if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
@@ -105,7 +105,7 @@ class PymunkEngine:
             missing.append("it does not model attraction and drives together")
         if on_floor(setup):
             missing += unsupported_by_steppers(setup)
-        return (*missing, *overload(setup, settings), *_too_large(setup))
+        return (*missing, *overload(setup, settings), *size_faults(setup))
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
         """Return the settings with defaults for slop, bias, persistence and the values that describe pymunk."""
@@ -135,15 +135,3 @@ class PymunkEngine:
         if missing:
             raise Refusal(self.name, missing, ())
         return PymunkSimulation(setup, self.resolve(setup, settings))
-
-
-def _too_large(setup: Setup) -> list[str]:
-    """Return why it would take too long to create a scene's space."""
-    size = len(setup.bodies) + len(setup.links)
-    if size <= SPACE_SIZE.value:  # most scenes: no need to count the bodies in free flight
-        return []
-    from sandbox.scene.compile.contacts import contact_matrix
-
-    size -= int((contact_matrix(setup).free & ~setup.bodies.fixed).sum())
-    refusal = SPACE_SIZE.refusal("the number of bodies and joints in its pymunk space is", size)
-    return [] if refusal is None else [refusal]

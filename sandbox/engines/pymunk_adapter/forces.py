@@ -1,4 +1,4 @@
-"""Drag, attraction and thrust on bodies in the space.
+"""Drag, damping, attraction and thrust on bodies.
 
 `AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
 position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
@@ -11,10 +11,13 @@ Drag is the acceleration of one explicit step. With a drag rate κ, a force F ad
 φ = (1 − e^(−κh))/(κh), and not (F/m)·h. So forces that balance each other, springs, thrusts and attraction among them,
 balance exactly at any h, also with drag. Spin has no drag, and torques act unchanged. Where a joint turns a force into
 a torque, as on a lever held by a rotary spring, the two differ by the factor φ.
+
+Damping is pymunk's own: in a step it multiplies velocities and spins by a factor before it adds forces.
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 import pymunk
@@ -249,9 +252,16 @@ def acceleration(world: World, velocity: FloatArray, applied: FloatArray | None,
     return np.asarray(total * fraction[:, None])
 
 
-def has_drag(world: World) -> bool:
-    """Return whether there is drag."""
-    return world.linear_drag > 0 or world.quadratic_drag > 0
+@cache
+def damping_factor(damping: float, h: float) -> float:
+    """Return the factor by which a step of h, s, multiplies velocities: `damping ** h`, with Munk2D's own rounding."""
+    space = pymunk.Space()
+    space.damping = damping
+    body = pymunk.Body(1.0, 1.0)
+    body.velocity = 1.0, 0.0
+    space.add(body)
+    space.step(h)
+    return body.velocity.x
 
 
 def rates(world: World, velocity: FloatArray) -> FloatArray:

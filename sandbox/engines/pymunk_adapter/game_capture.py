@@ -1,8 +1,8 @@
 """Recordings of games that use pymunk: `Space.step` is watched while the game runs.
 
 The scene of a space is that before its first step. What the code of the game changes between two steps becomes
-actions before the next step: velocities and positions, forces, gravity, bodies added and removed. So the recording
-can be replayed, on this engine to the same bits, and on other engines and settings to compare.
+actions before the next step: velocities and positions, forces, gravity, damping, bodies added and removed. So the
+recording can be replayed, on this engine to the same bits, and on other engines and settings to compare.
 
 What actions cannot state is a remark and never left out silently, as in `capture`.
 """
@@ -63,7 +63,6 @@ class SpaceForm:
                 space.collision_slop,
                 space.collision_bias,
                 space.collision_persistence,
-                space.damping,
                 space.sleep_time_threshold,
                 len(getattr(space, "_handlers", ())),
             ),
@@ -119,7 +118,7 @@ class SpaceCapture:
         self._actions: list[Action] = []
         self._states = {body: MotionState.of(body) for body in self._names}
         self._forces: dict[pymunk.Body, tuple[float, float, float]] = {}
-        self._gravity = tuple(space.gravity)
+        self._gravity, self._damping = tuple(space.gravity), space.damping
         self._scene_bodies = set(captured.scene.bodies.names)
         self._form = SpaceForm.of(space, self._names)
 
@@ -134,6 +133,14 @@ class SpaceCapture:
         if tuple(space.gravity) != self._gravity:
             self._gravity = tuple(space.gravity)
             self._actions.append(SetParameter(time=self.time, path="world.gravity", value=list(self._gravity)))
+        if space.damping != self._damping:
+            self._damping = space.damping
+            if 0.0 < space.damping <= 1.0:
+                self._actions.append(SetParameter(time=self.time, path="world.damping", value=space.damping))
+            else:
+                self._omitted[
+                    f"space.damping = {space.damping:g}, which the game sets; `world.damping` is above 0 and at most 1"
+                ] = None
         if self.steps:
             form, known = SpaceForm.of(space, self._names), set(self._names)
             self._note_population()

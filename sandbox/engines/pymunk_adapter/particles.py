@@ -11,7 +11,13 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.pymunk_adapter.forces import AttractionField, acceleration, has_drag, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.forces import (
+    AttractionField,
+    acceleration,
+    damping_factor,
+    mean_fraction,
+    rates,
+)
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
 
@@ -89,7 +95,8 @@ class Particles:
     @property
     def has_only_gravity(self) -> bool:
         """Whether only gravity acts."""
-        return self._field is None and not (self._has_force or self._has_torque or self._has_drag)
+        is_slowed = self._has_drag or self.world.has_damping
+        return self._field is None and not (self._has_force or self._has_torque or is_slowed)
 
     @property
     def forces(self) -> Mapping[int, tuple[FloatArray, float]]:
@@ -101,7 +108,8 @@ class Particles:
         world = self.world
         self._has_force = any(force.any() for force, _ in self._forces.values())
         self._has_torque = any(torque for _, torque in self._forces.values())
-        self._has_drag = has_drag(world)
+        self._has_drag = world.has_drag
+        self._damping_factor = damping_factor(world.damping, self._h) if world.has_damping else 1.0
         self.can_turn = bool(self._spin[self.indices].any()) or self._has_torque
         self._kick: FloatArray = (np.asarray(world.gravity) + 0.0) * self._h
         if not self._compiled:
@@ -167,7 +175,7 @@ class Particles:
         """Advance by some substeps: in each, positions by the old velocity, then velocities."""
         if not len(self.indices):
             return
-        compiled = self._compiled
+        compiled = self._compiled and not self.world.has_damping
         has_forces = self._has_force or self._field is not None or self.world.quadratic_drag > 0
         if compiled and not has_forces:
             self._step_compiled(substeps)
@@ -183,7 +191,7 @@ class Particles:
         elif self.can_turn:
             for piece in self._pieces():
                 for _ in range(substeps):
-                    self._angle[piece] += self._spin[piece] * self._h
+                    self._turn(piece)
 
     def _step_compiled(self, substeps: int) -> None:
         from sandbox.engines.pymunk_adapter.particle_kernels import drift, fall
@@ -205,7 +213,10 @@ class Particles:
             for _ in range(substeps):
                 np.multiply(velocity, self._h, out=displacement)
                 position += displacement
-                velocity += self._forced_kick(position, velocity, mass, force) if has_forces else uniform_kick
+                kick = self._forced_kick(position, velocity, mass, force) if has_forces else uniform_kick
+                if self.world.has_damping:
+                    velocity *= self._damping_factor
+                velocity += kick
             if not isinstance(piece, slice):
                 self._position[piece], self._velocity[piece] = position, velocity
 
@@ -229,9 +240,15 @@ class Particles:
     def _turn_with_torques(self) -> None:
         """Advance angles, then the spins of bodies with a constant torque."""
         for piece in self._pieces():
-            self._angle[piece] += self._spin[piece] * self._h
+            self._turn(piece)
         for index, (_, torque) in self._forces.items():
             self._spin[index] += torque * (1.0 / self._moment[index]) * self._h
+
+    def _turn(self, piece: slice | IntArray) -> None:
+        """Advance the angles of some rows by a substep, then damp their spins."""
+        self._angle[piece] += self._spin[piece] * self._h
+        if self.world.has_damping:
+            self._spin[piece] *= self._damping_factor
 
     def _forced_kick(
         self, position: FloatArray, velocity: FloatArray, mass: FloatArray, force: FloatArray | None

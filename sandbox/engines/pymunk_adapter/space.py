@@ -24,7 +24,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 )
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
-from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, has_drag, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
 from sandbox.engines.pymunk_adapter.zones import ZoneSensors
@@ -50,7 +50,7 @@ class SpaceBodies(SpaceBodyTable):
         """
         scene = setup.scene
         self._setup, self._scene, self._settings, self._skin = setup, scene, settings, skin
-        self._h, self._dragged = settings.h, has_drag(scene.world)
+        self._h, self._dragged = settings.h, scene.world.has_drag
         super().__init__(new_space(scene, settings))
         self._reader, self._batch_reader = SpaceReader(self._space), BatchReader(self._space)
         self._surface_setter = SurfaceSetter(self._space, settings.h)
@@ -253,11 +253,11 @@ class SpaceBodies(SpaceBodyTable):
         self._static_shapes.rebuild(scene, self._surface_of_fixed)
 
     def rebuild_world(self, scene: Scene) -> None:
-        """Update after a change of the scene's gravity, drag or wind."""
+        """Update after a change of the scene's gravity, drag, damping or wind."""
         self._scene, self._needs_check = scene, None
-        self._dragged = has_drag(scene.world)
+        self._dragged = scene.world.has_drag
         self.field.fractions.clear()
-        self._space.gravity = gravity_of(scene)
+        self._space.gravity, self._space.damping = gravity_of(scene), scene.world.damping
         if self.drives.driven_bodies:
             self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
 

@@ -100,6 +100,7 @@ class CompiledStepper:
             correction=solver.correction_rate(h),
             linear_drag=forces.linear_drag,
             quadratic_drag=forces.quadratic_drag,
+            damping_rate=forces.damping_rate,
             wind_x=forces.wind[0],
             wind_y=forces.wind[1],
             broad_phase=BROAD_PHASE_CODES[settings.broad_phase] if has_pairs else NO_PAIRS,

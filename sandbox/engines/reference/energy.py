@@ -9,7 +9,7 @@ which is ½μ(1 − e²)u² for an impact, μ m g s for sliding, and 0 for a res
 kinetic energy, J·(kick)/2, reverses a change by the integrator; it is attributed to the integrator, as are positions
 that follow velocities. Joints solved by positions are treated in the same way, by their change of velocity; position
 changes beyond that count as position correction. An impact within a step is entered with the velocities just before and
-after it. Attraction, drag and drives are entered with their work along the actual path of each body.
+after it. Attraction, drag, damping and drives are entered with their work along the actual path of each body.
 """
 
 import math
@@ -69,7 +69,7 @@ class StepEnergyLedger:
         self._no_spin: FloatArray = np.zeros(len(moving))
         u = self._forces
         has_constant_forces = store.force.any() or store.torque.any() or self._zone_weight.any()
-        has_varying_forces = u.has_drag or u.damped_forces or self._field.thrusting or self._penalty is not None
+        has_varying_forces = u.damped or self._field.thrusting or self._penalty is not None
         self._has_work = bool(has_constant_forces or has_varying_forces)
         self._compliant = self._joints is not None and self._joints.method == "xpbd"
 
@@ -195,6 +195,8 @@ class StepEnergyLedger:
             wind = rate[:, :2] - u.wind
             fraction = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
             yield Cause.DRAG, -float((self._inertia[:, :1] * fraction * wind * rate[:, :2]).sum())
+        if u.damping_rate > 0.0:
+            yield Cause.DRAG, -u.damping_rate * self._product(rate, rate)
         if u.damped_forces and self._joints is not None:
             yield Cause.DAMPING, self._joints.damper_power(x)
         if store.force.any() or store.torque.any():

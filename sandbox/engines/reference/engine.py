@@ -59,7 +59,7 @@ def _max_force_faults(setup: Setup) -> list[str]:
 DEFAULT_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
 """Default methods: those of pymunk and of the tutorial"""
 
-TABLETOP = BALLS | FLOOR | SURFACES | {Demand.CURL}
+TABLETOP = BALLS | FLOOR | SURFACES | {Demand.DAMPING, Demand.CURL}
 """Demands that the engine models in scenes with a surface, as far as `unsupported_by_steppers` allows"""
 
 TABLETOP_METHODS = {**DEFAULT_METHODS, "impact": "newton", "persistence": 1}
@@ -96,6 +96,7 @@ class ReferenceEngine:
         Demand.POLYGONS,
         *JOINTS - {Demand.RATCHETS},
         Demand.MAX_FORCE,
+        Demand.DAMPING,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,

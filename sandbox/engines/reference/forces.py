@@ -1,4 +1,4 @@
-"""External forces: gravity, drag, attraction, thrust and springs, as inputs of the integrators."""
+"""External forces: gravity, drag, damping, attraction, thrust and springs, as inputs of the integrators."""
 
 from collections.abc import Callable
 
@@ -42,4 +42,5 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         moving.astype(np.float64),
         forces=tuple(forces),
         damped_forces=bool(springs.figures[:, 2].any()),
+        damping_rate=world.damping_rate,
     )

@@ -12,7 +12,7 @@ frequency ω:
 | rk4 | exact | loses (ωh)⁶/72 of its energy a step, ωh < 2√2 |
 
 x is an array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) if nothing turns, else 3 (x, y, angle). u
-contains the external forces: gravity, drag, constant forces, and penalty contacts with `response = "penalty"`.
+contains the external forces: gravity, drag, damping, constant forces, and penalty contacts with `response = "penalty"`.
 """
 
 from collections.abc import Callable
@@ -41,13 +41,15 @@ class Inputs(NamedTuple):
     wind: tuple[float, float] = (0.0, 0.0)
     """m/s"""
     mobile: FloatArray = _ALL
-    """(N, 1) or (1, 1): 1 for bodies with drag, 0 for fixed or removed ones"""
+    """(N, 1) or (1, 1): 1 for bodies with drag and damping, 0 for fixed or removed ones"""
     contacts: Callable[[State], FloatArray] | None = None
     """penalty contacts: acceleration (N, D) in a state"""
     forces: tuple[Callable[[float, State], FloatArray], ...] = ()
     """springs, attraction and thrusts: acceleration (N, D) of each as a function of time and state"""
     damped_forces: bool = False
     """whether one of these forces depends on velocity"""
+    damping_rate: float = 0.0
+    """λ, 1/s: damping of rates"""
 
     @property
     def has_drag(self) -> bool:
@@ -57,7 +59,7 @@ class Inputs(NamedTuple):
     @property
     def damped(self) -> bool:
         """Whether acceleration depends on velocity, so that a scheme has to evaluate it at the right velocity."""
-        return self.has_drag or self.damped_forces or self.contacts is not None
+        return self.has_drag or self.damping_rate > 0.0 or self.damped_forces or self.contacts is not None
 
 
 Transition: TypeAlias = Callable[[float, State, Inputs], State]
@@ -65,7 +67,7 @@ Transition: TypeAlias = Callable[[float, State, Inputs], State]
 
 
 def transition(t: float, x: State, u: Inputs) -> State:
-    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w + Σ f(t, x), where w = v − wind.
+    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w − λ v + Σ f(t, x), w = v − wind.
 
     Args:
         t: s.
@@ -82,6 +84,8 @@ def transition(t: float, x: State, u: Inputs) -> State:
         wind = x[1, :, :2] - u.wind
         rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)
         derivative[1, :, :2] -= u.mobile * rate * wind
+    if u.damping_rate > 0.0:
+        derivative[1] -= u.mobile * u.damping_rate * x[1]
     for force in u.forces:
         derivative[1] += force(t, x)
     if u.contacts is not None:

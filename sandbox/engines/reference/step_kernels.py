@@ -1,9 +1,9 @@
 """Compiled steps: what worlds of balls and worlds of convex pieces have in common.
 
 `ball_kernels` and `piece_kernels` make the steps that `step.step` defines, by the same kernels in the same order, for
-worlds that need nothing between two substeps: gravity, drag and thrusts, discrete detection, contacts and joints by
-impulses. They stop before a substep that needs more memory or another path; the readable step then makes it. Tests
-compare the two, bit for bit. `compiled_stepper` prepares the arrays.
+worlds that need nothing between two substeps: gravity, drag, damping and thrusts, discrete detection, contacts and
+joints by impulses. They stop before a substep that needs more memory or another path; the readable step then makes it.
+Tests compare the two, bit for bit. `compiled_stepper` prepares the arrays.
 """
 
 import math
@@ -68,6 +68,8 @@ class StepConstants(NamedTuple):
     """1/s"""
     quadratic_drag: float
     """1/m"""
+    damping_rate: float
+    """1/s"""
     wind_x: float
     """m/s"""
     wind_y: float
@@ -96,7 +98,7 @@ class BodyColumns(NamedTuple):
     constant: FloatArray
     """(N, 3) acceleration, m/s² and rad/s²"""
     mobile: FloatArray
-    """(N,) 1 for bodies with drag, 0 for others"""
+    """(N,) 1 for bodies with drag and damping, 0 for others"""
     can_leave: BoolArray
     """(N,) bodies that are removed when they are out of bounds"""
     inverse_mass: FloatArray
@@ -293,8 +295,9 @@ def acceleration(
     angle: float,
     vx: float,
     vy: float,
+    spin: float,
 ) -> tuple[float, float, float]:
-    """Return the acceleration of a body by constant forces, drag and thrusts, as `integrators.transition`.
+    """Return the acceleration of a body by constant forces, drag, damping and thrusts, as `integrators.transition`.
 
     Args:
         number: numbers.
@@ -305,12 +308,16 @@ def acceleration(
         angle: rad.
         vx: m/s.
         vy: m/s.
+        spin: rad/s.
     """
     ax, ay, alpha = bodies.constant[i, 0], bodies.constant[i, 1], bodies.constant[i, 2]
     if bodies.mobile[i] != 0.0 and (number.linear_drag > 0.0 or number.quadratic_drag > 0.0):
         wx, wy = vx - number.wind_x, vy - number.wind_y
         rate = number.linear_drag + number.quadratic_drag * math.sqrt(wx * wx + wy * wy)
         ax, ay = ax - rate * wx, ay - rate * wy
+    if bodies.mobile[i] != 0.0 and number.damping_rate > 0.0:
+        rate = number.damping_rate
+        ax, ay, alpha = ax - rate * vx, ay - rate * vy, alpha - rate * spin
     if len(bodies.thrust_body) > 0:
         fx, fy, torque, now = 0.0, 0.0, 0.0, number.began + time
         for k in range(len(bodies.thrust_body)):
@@ -334,20 +341,20 @@ def move_bodies(
     The integrators are those of `integrators`, with the same operations in the same order.
     """
     h, method, x, placed, level = number.h, number.integrator, state.x, scratch.placed, state.thrust_level
-    damped = number.linear_drag > 0.0 or number.quadratic_drag > 0.0
+    damped = number.linear_drag > 0.0 or number.quadratic_drag > 0.0 or number.damping_rate > 0.0
     for i in range(len(bodies.mobile)):
         px, py, angle, vx, vy, spin = x[0, i, 0], x[0, i, 1], x[0, i, 2], x[1, i, 0], x[1, i, 1], x[1, i, 2]
         if method == LEAPFROG:
             px, py, angle = px + (0.5 * h) * vx, py + (0.5 * h) * vy, angle + (0.5 * h) * spin
-            ax, ay, alpha = acceleration(number, bodies, level, i, time + 0.5 * h, angle, vx, vy)
+            middle = time + 0.5 * h
+            ax, ay, alpha = acceleration(number, bodies, level, i, middle, angle, vx, vy, spin)
             if damped:
-                ax, ay, alpha = acceleration(
-                    number, bodies, level, i, time + 0.5 * h, angle, vx + (0.5 * h) * ax, vy + (0.5 * h) * ay
-                )
+                v2x, v2y, spin2 = vx + (0.5 * h) * ax, vy + (0.5 * h) * ay, spin + (0.5 * h) * alpha
+                ax, ay, alpha = acceleration(number, bodies, level, i, middle, angle, v2x, v2y, spin2)
             vx, vy, spin = vx + h * ax, vy + h * ay, spin + h * alpha
             px, py, angle = px + (0.5 * h) * vx, py + (0.5 * h) * vy, angle + (0.5 * h) * spin
         else:
-            ax, ay, alpha = acceleration(number, bodies, level, i, time, angle, vx, vy)
+            ax, ay, alpha = acceleration(number, bodies, level, i, time, angle, vx, vy, spin)
             if method == EXPLICIT_EULER:
                 px, py, angle = px + h * vx, py + h * vy, angle + h * spin
                 vx, vy, spin = vx + h * ax, vy + h * ay, spin + h * alpha
@@ -357,17 +364,18 @@ def move_bodies(
             elif method == VELOCITY_VERLET:
                 px, py = px + h * (vx + (0.5 * h) * ax), py + h * (vy + (0.5 * h) * ay)
                 angle += h * (spin + (0.5 * h) * alpha)
-                bx, by, beta = acceleration(number, bodies, level, i, time + h, angle, vx + h * ax, vy + h * ay)
+                v2x, v2y, spin2 = vx + h * ax, vy + h * ay, spin + h * alpha
+                bx, by, beta = acceleration(number, bodies, level, i, time + h, angle, v2x, v2y, spin2)
                 vx, vy = vx + (0.5 * h) * (ax + bx), vy + (0.5 * h) * (ay + by)
                 spin += (0.5 * h) * (alpha + beta)
             else:
                 half = time + 0.5 * h
                 v2x, v2y, spin2 = vx + h * (0.5 * ax), vy + h * (0.5 * ay), spin + h * (0.5 * alpha)
-                bx, by, beta = acceleration(number, bodies, level, i, half, angle + h * (0.5 * spin), v2x, v2y)
+                bx, by, beta = acceleration(number, bodies, level, i, half, angle + h * (0.5 * spin), v2x, v2y, spin2)
                 v3x, v3y, spin3 = vx + h * (0.5 * bx), vy + h * (0.5 * by), spin + h * (0.5 * beta)
-                cx, cy, gamma = acceleration(number, bodies, level, i, half, angle + h * (0.5 * spin2), v3x, v3y)
+                cx, cy, gamma = acceleration(number, bodies, level, i, half, angle + h * (0.5 * spin2), v3x, v3y, spin3)
                 v4x, v4y, spin4 = vx + h * cx, vy + h * cy, spin + h * gamma
-                dx, dy, delta = acceleration(number, bodies, level, i, time + h, angle + h * spin3, v4x, v4y)
+                dx, dy, delta = acceleration(number, bodies, level, i, time + h, angle + h * spin3, v4x, v4y, spin4)
                 sixth, third = 1 / 6, 1 / 3
                 px += h * (sixth * vx + third * v2x + third * v3x + sixth * v4x)
                 py += h * (sixth * vy + third * v2y + third * v3y + sixth * v4y)

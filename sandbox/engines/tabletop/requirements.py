@@ -52,8 +52,10 @@ def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) 
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     world = scene.world
     yield from unsupported_on_surface(setup, bodies)
-    if world.linear_drag or world.quadratic_drag:
+    if world.has_drag:
         yield "it does not model drag on a floor"
+    if world.has_damping:
+        yield "it does not model damping on a floor"
     if len(setup.links) or scene.attractions or scene.thrusts or scene.drives:
         yield "it does not model joints, attraction, thrusts or drives on a floor"
     if not bodies.round.all():

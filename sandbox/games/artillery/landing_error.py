@@ -83,7 +83,8 @@ def landing_error_table(
         ValueError: the shot does not land within the limits of time and range.
     """
     velocity = speed * np.array([math.cos(angle), math.sin(angle)])
-    world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
+    keys = ("gravity", "linear_drag", "quadratic_drag", "damping", "wind")
+    world = World(**{key: getattr(world, key) for key in keys})
     exact = exact_landing(world, velocity)
     rows: list[LandingError] = []
     refused: dict[tuple[str, str | None], str] = {}

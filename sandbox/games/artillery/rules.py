@@ -115,7 +115,7 @@ def set_gun(tank: Tank, turn: float, more: float) -> None:
 HEIGHTS = 33
 """number of terrain heights in an observation, evenly spaced from side to side"""
 
-AIR_PARAMETERS = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
+AIR_PARAMETERS = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag", "damping"})
 """parameters of the world that affect the flight of shells"""
 
 TRACER_STEP = 0.03

@@ -200,7 +200,7 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
         yield ("terrain", "heights"), "cannot be combined with `columns`, `base` and `height`; remove those"
     if artillery is None:
         return
-    if artillery.wind and not (scene.world.linear_drag or scene.world.quadratic_drag):
+    if artillery.wind and not scene.world.has_drag:
         yield ("artillery", "wind"), "has no effect without world.linear_drag or world.quadratic_drag; add one"
     if terrain is not None:
         width = terrain.width

@@ -69,8 +69,8 @@ class SceneFacts:
 
     @property
     def has_no_drag(self) -> bool:
-        """Whether there is no drag."""
-        return self.world.linear_drag == 0.0 and self.world.quadratic_drag == 0.0
+        """Whether there is neither drag nor damping."""
+        return not (self.world.has_drag or self.world.has_damping)
 
     def moves_freely(self, number: int) -> bool:
         """Return whether a body can move, cannot collide, and has no thrust."""

@@ -79,7 +79,9 @@ def oscillator(facts: SceneFacts, number: int) -> Oscillator | None:
     if not facts.moves_freely(number) or not facts.matrix.held[number] or scene.attractions:
         return None
     anchor = facts.anchor(number)
-    if anchor is None or anchor.kind != LinkKind.SPRING or anchor.arm.any() or facts.world.quadratic_drag > 0.0:
+    if anchor is None or anchor.kind != LinkKind.SPRING or anchor.arm.any():
+        return None
+    if facts.world.quadratic_drag > 0.0 or facts.world.has_damping:  # damping changes the spin, which is constant here
         return None
     length, stiffness, damper = anchor.figures.tolist()
     mass, drag = float(bodies.mass[number]), facts.world.linear_drag

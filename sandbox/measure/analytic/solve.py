@@ -29,6 +29,7 @@ from sandbox.measure.analytic.pendulum import pendulum
 from sandbox.measure.analytic.pulley import atwood_machine
 from sandbox.measure.analytic.static_stack import static_stack
 from sandbox.measure.metrics.clearance import plane_clearance
+from sandbox.scene.compile.ballistics import free_rotation
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.scene import Scene
@@ -77,7 +78,7 @@ class Solution:
         spins = np.where(bodies.fixed, 0.0, bodies.angular_velocity)
         position = np.repeat(bodies.position[None], len(time), axis=0)
         velocity = np.where(bodies.fixed[:, None], 0.0, np.repeat(bodies.velocity[None], len(time), axis=0))
-        angle, spin = bodies.angle + time[:, None] * spins, np.repeat(spins[None], len(time), axis=0)
+        angle, spin = free_rotation(time, bodies.angle, spins, self.scene.world)
         chunks = max(1, len(self.flying) * len(time) // CHUNK)
         for part in np.array_split(self.flying, chunks) if len(self.flying) else ():
             start = bodies.position[part], bodies.velocity[part]
@@ -200,7 +201,7 @@ def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -
     position, velocity = free_flight(trajectory.time, *start, scene.world)
     valid = trajectory.time < valid_until(trajectory, number)
     if bodies.elements[bodies.element[number]].collides != "none":
-        angle = bodies.angle[number] + trajectory.time * bodies.angular_velocity[number]
+        angle, _ = free_rotation(trajectory.time, bodies.angle[number], bodies.angular_velocity[number], scene.world)
         for plane in scene.planes:
             point, normal = np.asarray(plane.point), normal_of(plane)
             gap = plane_clearance(bodies, number, position, angle, point, normal)

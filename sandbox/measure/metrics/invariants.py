@@ -75,16 +75,16 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the unexplained momentum at the end as a fraction of the largest Σ|m v| of any frame.
 
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
-    between moving bodies conserve momentum. None with drag, thrusts, drives, joints or attraction between moving and
-    static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired with its
-    momentum; or if the run did not reach its end or ended within a step, whose contacts are not recorded.
+    between moving bodies conserve momentum. None with drag, damping, thrusts, drives, joints or attraction between
+    moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired
+    with its momentum; or if the run did not reach its end or ended within a step, whose contacts are not recorded.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
         return None
     if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
         return None
-    if world.linear_drag or world.quadratic_drag or scene.thrusts or scene.drives or _acts_on_static(scene):
+    if world.has_drag or world.has_damping or scene.thrusts or scene.drives or _acts_on_static(scene):
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones):
         return None

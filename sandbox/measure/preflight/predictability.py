@@ -167,15 +167,15 @@ MAX_COVERED = 0.85
 def lyapunov_time(scene: Scene) -> float | None:
     """Return the time in which a perturbation of 1e-12 m grows to a hundredth of a radius, s; None if there is no gas.
 
-    A gas consists of balls that collide with each other in a box of level and upright planes, without gravity, joints
-    or drag.
+    A gas consists of balls that collide with each other in a box of level and upright planes, without gravity, joints,
+    drag or damping.
     """
     bodies, world, matrix = scene.bodies, scene.world, contact_matrix(scene)
     movers = matrix.touches & ~bodies.fixed
     count = int(movers.sum())
     if not matrix.mutual or count < MIN_GAS_BALLS or not bodies.round.all() or len(scene.links) or scene.attractions:
         return None
-    if any(world.gravity) or world.linear_drag or world.quadratic_drag:
+    if any(world.gravity) or world.has_drag or world.has_damping:
         return None
     area = _area(scene)
     if area is None:

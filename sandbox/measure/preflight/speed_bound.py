@@ -282,17 +282,18 @@ class SpeedBounds:
     def _with_thrust_and_wind(self, speed: FloatArray) -> FloatArray:
         """Return speeds with the contributions of thrusts and wind; 0 for static bodies."""
         world, bodies = self.scene.world, self.scene.bodies
-        if world.linear_drag or world.quadratic_drag:
-            if not len(self.scene.links) and not self.scene.attractions:
-                speed = np.minimum(speed, np.maximum(self.start, self._terminal))
+        if (world.has_drag or world.has_damping) and not len(self.scene.links) and not self.scene.attractions:
+            speed = np.minimum(speed, np.maximum(self.start, self._terminal))
+        if world.has_drag:
             speed = speed + math.hypot(*world.wind)
         speed = speed + self.thrust
         return np.where(bodies.fixed, 0.0, speed)
 
     @property
     def _terminal(self) -> float:
-        """Speed through the air at which drag balances gravity, m/s."""
-        linear, quadratic = self.scene.world.linear_drag, self.scene.world.quadratic_drag
+        """Speed through the air at which drag and damping balance gravity, m/s."""
+        world = self.scene.world
+        linear, quadratic = world.linear_drag + world.damping_rate, world.quadratic_drag
         by_linear = self.gravity / linear if linear > 0.0 else math.inf
         return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
 

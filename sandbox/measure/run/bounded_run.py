@@ -118,7 +118,6 @@ def counted_cost(start: Scene | Setup, engine: str, settings: Settings, steps: i
 def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, int]) -> dict[str, float]:
     """Return the amount of each kind of work; unless stated otherwise, bodies × substeps."""
     scene, bodies, substeps = setup.scene, len(setup.bodies), work.get("substeps", 0)
-    drag = scene.world.linear_drag or scene.world.quadratic_drag
     colliding = int(contact_matrix(setup).touches.sum())
     return {
         **work,
@@ -128,7 +127,7 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         "bodies_rk4": substeps * bodies * (settings.integrator == "rk4"),
         "impact_times": substeps * (settings.detection in ("bisect", "swept", "shrink")),
         "meeting": substeps * colliding,
-        "dragged": substeps * colliding * bool(drag),
+        "dragged": substeps * colliding * scene.world.has_drag,
         "attracted": substeps * bodies * len(scene.attractions),
         "driven": substeps * (len(scene.thrusts) + len(scene.drives)),
         "joined": substeps * len(setup.links),

@@ -192,8 +192,10 @@ def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[Model
                 "bodies), because none occur",
                 _set_collides(scene, "fixed"),
             )
-    if world.linear_drag or world.quadratic_drag:
+    if world.has_drag:
         yield ModelChange("no drag", "the scene can also be simulated without drag", _remove_drag)
+    if world.has_damping:
+        yield ModelChange("no damping", "the scene can also be simulated without damping", _remove_damping)
     if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.body_sources, *scene.fixed)):
         yield ModelChange("no friction", "the scene can also be simulated without friction", _remove_friction)
 
@@ -221,6 +223,10 @@ def _set_collides(scene: Scene, value: str) -> SettingChange:
 def _remove_drag(document: dict[str, Any]) -> None:
     for key in ("linear_drag", "quadratic_drag", "wind"):
         document["world"].pop(key, None)
+
+
+def _remove_damping(document: dict[str, Any]) -> None:
+    document["world"].pop("damping", None)
 
 
 def _remove_friction(document: dict[str, Any]) -> None:

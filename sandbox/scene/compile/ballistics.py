@@ -1,4 +1,4 @@
-"""Free flight in closed form, under uniform gravity and linear drag."""
+"""Free flight in closed form, under uniform gravity, linear drag and damping."""
 
 import math
 
@@ -13,17 +13,17 @@ _SERIES = tuple((-1) ** n / math.factorial(n + 2) for n in range(20))
 def free_flight(
     time: FloatArray, position: FloatArray, velocity: FloatArray, world: World
 ) -> tuple[FloatArray, FloatArray]:
-    """Return positions and velocities of a body without contacts, under a = g − k (v − wind).
+    """Return positions and velocities of a body without contacts, under a = g − k (v − wind) − λ v.
 
-    With z = k t: v = v₀ e⁻ᶻ + (g + k·wind) t φ₁ and x = x₀ + v₀ t φ₁ + (g + k·wind) t² φ₂, where
-    φ₁ = (1 − e⁻ᶻ)/z and φ₂ = (z − 1 + e⁻ᶻ)/z² tend to 1 and ½: no cancellation for small z, and at k = 0 the
+    With z = (k + λ) t: v = v₀ e⁻ᶻ + (g + k·wind) t φ₁ and x = x₀ + v₀ t φ₁ + (g + k·wind) t² φ₂, where
+    φ₁ = (1 − e⁻ᶻ)/z and φ₂ = (z − 1 + e⁻ᶻ)/z² tend to 1 and ½: no cancellation for small z, and at z = 0 the
     exact parabola.
 
     Args:
         time: (T,) s since the start.
         position: (2,) or (N, 2) m, at the start.
         velocity: of the same shape, m/s.
-        world: its gravity, linear drag and wind are used.
+        world: its gravity, linear drag, damping and wind are used.
 
     Returns:
         Positions and velocities, (T, 2) or (T, N, 2).
@@ -35,11 +35,32 @@ def free_flight(
         raise ValueError("free flight under quadratic drag has no closed form")
     x, v = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
     t = np.asarray(time, dtype=np.float64).reshape(-1, *(1,) * x.ndim)
-    z = world.linear_drag * t
+    rate = world.linear_drag + world.damping_rate
+    z = rate * t
     phi_1, phi_2 = _phi(z)
     pull, wind = np.asarray(world.gravity), np.asarray(world.wind)
+    if world.has_damping:  # without damping the wind moves a body at its own velocity in the end
+        wind = wind * (world.linear_drag / rate)
     flown = x + v * (t * phi_1) + pull * (t * t * phi_2) + wind * (t * z * phi_2)
     return flown, v * np.exp(-z) + pull * (t * phi_1) + wind * -np.expm1(-z)
+
+
+def free_rotation(time: FloatArray, angle: FloatArray, spin: FloatArray, world: World) -> tuple[FloatArray, FloatArray]:
+    """Return angles, rad, and angular velocities, rad/s, of bodies that nothing but damping turns: ω̇ = −λ ω.
+
+    Args:
+        time: (T,) s since the start.
+        angle: () or (N,) rad, at the start.
+        spin: of the same shape, rad/s.
+        world: its damping is used.
+
+    Returns:
+        Angles and angular velocities, (T,) or (T, N).
+    """
+    w = np.asarray(spin, dtype=np.float64)
+    t = np.asarray(time, dtype=np.float64).reshape(-1, *(1,) * w.ndim)
+    z = world.damping_rate * t
+    return angle + t * _phi(z)[0] * w, np.asarray(w * np.exp(-z))
 
 
 def _phi(z: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -24,6 +24,7 @@ class Demand(StrEnum):
     ROTATION = "rotation"
     GRAVITY = "gravity"
     DRAG = "drag"
+    DAMPING = "damping"
     BALL_BALL = "ball-ball"
     BALL_PLANE = "ball-plane"
     BALL_SEGMENT = "ball-segment"
@@ -148,9 +149,10 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     gravity = world.gravity != (0.0, 0.0)
     yield Demand.GRAVITY, gravity, f"{list(world.gravity)} m/s²" if gravity else "world.gravity is zero"
 
-    drag = world.linear_drag > 0 or world.quadratic_drag > 0
     why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
-    yield Demand.DRAG, drag, why if drag else "no drag"
+    yield Demand.DRAG, world.has_drag, why if world.has_drag else "no drag"
+    why = f"{world.damping:g} of every velocity remains after 1 s" if world.has_damping else "no damping"
+    yield Demand.DAMPING, world.has_damping, why
 
     free = int((matrix.free & ~bodies.fixed).sum())
     free_text = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""

@@ -1,7 +1,7 @@
 """Attraction, thrusts and drives (flippers, diverters, plungers).
 
-A drive prescribes the motion of its body. With a torque drive, gravity and collisions act on the body too, air drag
-does not. With a stroke or plunger drive, no load stops the body: it pushes free bodies, and passes through static
+A drive prescribes the motion of its body. With a torque drive, gravity and collisions act on the body too, air drag and
+damping do not. With a stroke or plunger drive, no load stops the body: it pushes free bodies, and passes through static
 bodies and other bodies with such a drive.
 """
 

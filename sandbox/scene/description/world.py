@@ -1,6 +1,7 @@
 """`[world]`, `[solver]`, materials, pairs of materials, and kicks."""
 
 import difflib
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError
@@ -24,10 +25,27 @@ class World(Part):
     """k, 1/s: a = −k (v − wind)"""
     quadratic_drag: Drag = 0.0
     """c, 1/m: a = −c |v − wind| (v − wind)"""
+    damping: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """d, pymunk's `space.damping`: fraction of velocity and angular velocity that remains after one second"""
     wind: Velocity = (0.0, 0.0)
     """velocity of the air, m/s"""
     bounds: tuple[Point, Point] | None = None
     """Lower left and upper right corner, m. A body whose centre leaves the box is removed."""
+
+    @property
+    def damping_rate(self) -> float:
+        """λ = −ln d, 1/s: damping is the acceleration −λ v and the angular acceleration −λ ω."""
+        return 0.0 - math.log(self.damping)
+
+    @property
+    def has_drag(self) -> bool:
+        """Whether there is drag."""
+        return self.linear_drag > 0.0 or self.quadratic_drag > 0.0
+
+    @property
+    def has_damping(self) -> bool:
+        """Whether there is damping."""
+        return self.damping < 1.0
 
 
 IntegratorName = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]

@@ -48,6 +48,17 @@ def test_landing_errors_converge_with_the_order_of_each_integrator(drags: tuple[
     assert {engine for engine, _ in found.refused} == {"exact"}
 
 
+def test_landing_errors_with_damping_converge_with_the_order_of_each_integrator() -> None:
+    dts = tuple(0.2 * 2.0 ** (-k / 2) for k in range(7))
+    air = world(0.0, 0.01, -8.0).model_copy(update={"damping": 0.8})
+    found = landing_error_table(air, 50.0, math.radians(45.0), dts)
+    for name, integrator in INTEGRATORS.items():
+        errors = [abs(row.off) for row in found.rows if (row.engine, row.integrator) == ("reference", name)]
+        slope = np.polyfit(np.log(dts), np.log(errors), 1)[0]
+        assert slope == pytest.approx(integrator.order, abs=0.35)  # the landing point within the last step varies
+    assert {engine for engine, _ in found.refused} == {"exact", "pymunk"}  # pymunk: drag and damping together
+
+
 def test_shot_that_never_lands_is_refused() -> None:
     rising = world().model_copy(update={"gravity": (0.0, 0.0)})
     with pytest.raises(ValueError, match="does not come down within"):

@@ -1,16 +1,22 @@
 """Closed forms of flight and bouncing against 40-digit arithmetic and each other, and unsupported scenes."""
 
+import math
+
 import mpmath
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
 
+from sandbox.arrays import FloatArray
 from sandbox.measure.analytic import bounces, closed_form, free_flight, unsupported_reason, valid_until
+from sandbox.measure.analytic.solve import solution
 from sandbox.measure.analytic.trajectory import solved_run
+from sandbox.scene.compile.ballistics import free_rotation
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import World
-from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
 
@@ -89,6 +95,39 @@ def test_free_flight_without_drag_is_the_parabola() -> None:
     # Eighths and small integers: every operation is exact.
     assert np.array_equal(position, np.column_stack((time, 10.0 + 2.0 * time - 4.0 * time**2)))
     assert np.array_equal(velocity, np.column_stack((np.ones(9), 2.0 - 8.0 * time)))
+
+
+@pytest.mark.parametrize(("drag", "damping"), [(0.0, 0.3), (0.7, 0.3), (0.7, 0.999999), (1e-9, 0.5)])
+def test_free_flight_with_damping_agrees_with_an_integration(drag: float, damping: float) -> None:
+    world, rate = World(gravity=(0.25, -G), linear_drag=drag, damping=damping, wind=(-4.3, 2.2)), -math.log(damping)
+
+    def derivative(_: float, s: FloatArray) -> list[float]:
+        acceleration = np.asarray(world.gravity) - drag * (s[3:5] - world.wind) - rate * s[3:5]
+        return [*s[3:], *acceleration, -rate * s[5]]
+
+    start = [3.7, -1.9, 0.4, 11.3, 7.1, 5.0]
+    truth = solve_ivp(derivative, (0.0, 3.0), start, method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
+    time = np.array([3.0])
+    position, velocity = free_flight(time, np.array(start[:2]), np.array(start[3:5]), world)
+    angle, spin = free_rotation(time, np.array(start[2]), np.array(start[5]), world)
+    found = [*position[0], angle[0], *velocity[0], spin[0]]
+    assert found == pytest.approx(truth, rel=1e-11, abs=1e-11)  # tolerance of the integration, over its steps
+
+
+def test_solution_of_a_damped_scene_is_free_flight_only() -> None:
+    flying = {"position": [0, 5], "velocity": [1, 2], "angular_velocity": 3.0, "radius": 0.1, "collides": "none"}
+    world = {"gravity": [0.0, -G], "damping": 0.5, "duration": 1.0}
+    scene = from_document({"world": world, "ball": [flying]})
+    found = solution(scene)
+    assert found is not None
+    assert found.at(np.array([1.0])).spin[0, 0] == pytest.approx(1.5, rel=1e-15)  # one rounding
+    spring = {"kind": "spring", "between": ["a"], "anchors": [[0, 0], [0, 0]], "rest_length": 0.0, "stiffness": 9.0}
+    held = from_document({"world": world, "ball": [flying | {"name": "a"}], "joint": [spring]})
+    assert solution(held) is None
+    floor = {"point": [0, 0], "normal": [0, 1]}
+    dropped = {"position": [0, 5], "radius": 0.1}
+    assert solution(from_document({"world": world, "ball": [dropped], "plane": [floor]})) is None
+    assert solution(from_document({"world": world | {"damping": 1.0}, "ball": [dropped], "plane": [floor]})) is not None
 
 
 def test_free_flight_of_several_bodies_equals_that_of_each() -> None:

@@ -73,6 +73,13 @@ def test_ball_collisions_are_kept_if_balls_collide_in_a_second_scene(monkeypatch
     assert not [each for each in proposed(monkeypatch, SEPARATE, colliding, tolerance=10.0) if "fixed" in each.what]
 
 
+def test_only_negligible_damping_can_be_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    document = DROP.replace("duration = 0.4", "duration = 0.2\ndamping = {}")
+    weak, strong = (proposed(monkeypatch, document.format(each), tolerance=2e-3) for each in ("0.9999", "0.01"))
+    assert "no damping" in [each.what for each in weak]
+    assert "no damping" not in [each.what for each in strong]
+
+
 def test_only_negligible_drag_can_be_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
     weak, strong = (proposed(monkeypatch, DRAGGED.format(drag), tolerance=2e-3) for drag in ("1e-4", "5.0"))
     assert "no drag" in [each.what for each in weak]

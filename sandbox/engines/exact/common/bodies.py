@@ -83,12 +83,14 @@ class EventDrivenBodies(BodyStore):
         """Continue with a changed scene. Only gravity, coefficients, points of walls and solid flags may differ.
 
         Raises:
-            ActionError: the scene has drag, curl, gravity along a `[surface]`, or more different surfaces than
+            ActionError: the scene has drag, damping, curl, gravity along a `[surface]`, or more different surfaces than
                 allowed; or a ball overlaps a collider that has moved or become solid.
         """
         scene = setup.scene
-        if scene.world.linear_drag or scene.world.quadratic_drag:
+        if scene.world.has_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
+        if scene.world.has_damping:
+            raise ActionError("exact does not model damping; pymunk and reference do")
         is_checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
         if not is_checked and on_floor(setup) and (reason := next(unsupported_on_surface(setup, self.bodies), None)):
             raise ActionError(reason)

@@ -241,7 +241,7 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
         '    """Return the space, and a dict of its bodies by name."""',
         "    space = pymunk.Space()",
         "    space.gravity = GRAVITY",
-        "    space.damping = 1.0  # none: it would slow spins too",
+        f"    space.damping = {literal(scene.world.damping)}",
         "    space.iterations = ITERATIONS",
         "    space.collision_slop = COLLISION_SLOP",
         "    space.collision_bias = COLLISION_BIAS",
