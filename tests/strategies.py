@@ -162,6 +162,8 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
             },
         )
     )
+    if document["world"].keys() & {"linear_drag", "quadratic_drag"}:
+        document["world"].pop("damping", None)  # pymunk does not model both
     document["solver"] = draw(
         st.fixed_dictionaries(
             {},

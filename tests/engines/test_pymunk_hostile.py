@@ -30,7 +30,7 @@ def supported_scenes(draw: st.DrawFn) -> Scene:
         if key in solver:
             solver[key] = min(solver[key], limit)
     scene = from_document(document)
-    assume(able(scene))  # half_kick with drag is refused
+    assume(able(scene))  # half_kick with drag or damping is refused
     return scene
 
 
@@ -82,7 +82,8 @@ def actions_on_bodies(draw: st.DrawFn, known: tuple[str, ...]) -> Action:
         name=st.none() | st.sampled_from([*known, "new"]),
     )
     path = st.sampled_from(
-        ["world.gravity", "world.wind", "world.linear_drag", "world.quadratic_drag", "ball.0.friction",
+        ["world.gravity", "world.wind", "world.linear_drag", "world.quadratic_drag", "world.damping",
+         "ball.0.friction",
          "material.0.restitution", "plane.0.friction", "wall.0.restitution", "pair.0.friction", "solver.dt", "x"]
     )  # fmt: skip
     value: st.SearchStrategy[Any] = numbers(-1, 1000) | st.lists(numbers(-100, 100), max_size=3) | st.none()

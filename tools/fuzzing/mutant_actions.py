@@ -97,7 +97,7 @@ def _spawned(document: Document, draw: random.Random) -> Document:
 def _setting(document: Document, draw: random.Random) -> Document:
     """Draw a path that may be set in a running scene, and a value."""
     if draw.random() < 0.6:
-        path = draw.choice(("world.gravity", "world.wind", "world.linear_drag", "world.quadratic_drag",
+        path = draw.choice(("world.gravity", "world.wind", "world.linear_drag", "world.quadratic_drag", "world.damping",
                             "surface.sliding_friction", "surface.curl"))  # fmt: skip
     else:
         kind = draw.choice((*SINGLES, "wall", "plane", "grid", "material", "nothing"))

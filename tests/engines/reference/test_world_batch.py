@@ -13,6 +13,7 @@ SHIPS = """
 title = "Two ships that pass through each other, above a wall and a plane"
 [world]
 gravity = [0.0, -2.0]
+damping = {damping}
 duration = 10.0
 bounds = [[-8.0, -5.0], [8.0, 9.0]]
 [solver]
@@ -62,8 +63,8 @@ key = "left"
 NAMES = "ship", "other"
 
 
-def ships(solver: str = "") -> Scene:
-    return loads(SHIPS.format(solver=solver))
+def ships(solver: str = "", damping: float = 1.0) -> Scene:
+    return loads(SHIPS.format(solver=solver, damping=damping))
 
 
 def batch_of(scene: Scene, count: int) -> WorldBatch:
@@ -86,9 +87,12 @@ def numbers_of(pairs: np.ndarray, body: int, count: int) -> set[int]:
     return {other if other >= 0 else count - 1 - other for other in others}
 
 
-@pytest.mark.parametrize("solver", ["", 'integrator = "leapfrog"', 'integrator = "rk4"'])
-def test_worlds_do_what_simulations_do(solver: str) -> None:
-    scene, count, rng = ships(solver), 6, np.random.default_rng(7)
+@pytest.mark.parametrize(
+    ("solver", "damping"),
+    [("", 1.0), ('integrator = "leapfrog"', 1.0), ('integrator = "rk4"', 1.0), ('integrator = "leapfrog"', 0.9)],
+)
+def test_worlds_do_what_simulations_do(solver: str, damping: float) -> None:
+    scene, count, rng = ships(solver, damping), 6, np.random.default_rng(7)
     batch, starts = batch_of(scene, count), random_starts(ships(), count, rng)
     batch.restart(np.arange(count), starts)
     simulations = [start(scene, "reference") for _ in range(count)]
@@ -132,9 +136,8 @@ def test_worlds_do_what_simulations_do(solver: str) -> None:
 
 
 def test_diverged_world_says_so_and_needs_a_restart() -> None:
-    scene = loads(
-        SHIPS.format(solver="").replace("bounds =", "# ").replace("force = [0.0, 4.0]", "force = [0.0, 1e30]")
-    )
+    text = SHIPS.format(solver="", damping=1.0)
+    scene = loads(text.replace("bounds =", "# ").replace("force = [0.0, 4.0]", "force = [0.0, 1e30]"))
     batch, simulation = batch_of(scene, 2), start(scene, "reference")
     bodies = scene.bodies
     columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
@@ -164,6 +167,6 @@ def test_diverged_world_says_so_and_needs_a_restart() -> None:
     ],
 )
 def test_scene_with_more_than_static_contacts_has_no_batch(change: tuple[str, str]) -> None:
-    simulation = start(loads(SHIPS.format(solver="").replace(*change)), "reference")
+    simulation = start(loads(SHIPS.format(solver="", damping=1.0).replace(*change)), "reference")
     assert isinstance(simulation, HasWorldBatch)
     assert simulation.world_batch(2) is None
