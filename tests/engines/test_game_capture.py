@@ -87,6 +87,28 @@ def test_replay_of_a_game_ends_in_its_state_bit_for_bit() -> None:
     assert captured.recording.duration == pytest.approx(STEPS * DT)
 
 
+class Shaker(Platformer):
+    """A game that sets positions of bodies in a crowd, which pymunk's tree of shapes learns in the next step."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.others += [disc(self.space, 21 * (k % 8) - 80, 30 + 21 * (k // 8)) for k in range(40)]
+
+    def update(self, k: int) -> None:
+        if k % 7 == 3:
+            body = self.rng.choice(self.others)
+            body.position = self.rng.uniform(-80, 80), self.rng.uniform(60, 200)
+
+
+def test_positions_that_a_game_sets_keep_the_order_of_contacts() -> None:
+    game = Shaker()
+    captured = play(game)
+    ends = end_of(captured.recording)
+    for body, name in captured.spaces[0].names.items():
+        if body.body_type == pymunk.Body.DYNAMIC:
+            assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
+
+
 def test_changes_of_damping_are_actions() -> None:
     space = balls()
     with capture() as captured:

@@ -55,10 +55,12 @@ class SpaceBodyTable:
             self._members[index].body.moment = moment
 
     def set_position(self, index: int, position: FloatArray) -> None:
-        """Set the position of a body, m."""
-        body = self._members[index].body
-        body.position = float(position[0]), float(position[1])
-        self._space.reindex_shapes_for_body(body)
+        """Set the position of a body that is not static, m.
+
+        The next step updates the tree of its shapes. To do it here would change the order of contacts, compared with a
+        game that sets `body.position`.
+        """
+        self._members[index].body.position = float(position[0]), float(position[1])
         self._state = None
 
     def set_velocity(self, index: int, velocity: FloatArray) -> None:

@@ -107,8 +107,9 @@ def _solid_geometry(element: BodySource) -> ElementGeometry:
         element, [stated for _, stated in pieces_and_densities], [fraction.area for fraction in moments]
     )
     weight = [rho * fraction.area for rho, fraction in zip(density, moments, strict=True)]
-    mass = math.fsum(weight)
-    x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / mass for k in (0, 1))
+    total = math.fsum(weight)
+    mass = total if element.mass is None else element.mass  # to the bit as stated
+    x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / total for k in (0, 1))
     if isinstance(element, Compound) and element.centre_of_mass is not None:
         x, y = element.centre_of_mass
     moment = _stated_moment(element) or math.fsum(
