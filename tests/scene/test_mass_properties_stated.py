@@ -24,7 +24,8 @@ SQUARE = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0))
 
 @given(mass=st.floats(1e-3, 1e6), width=st.floats(0.1, 9.0))
 def test_stated_mass_is_kept_to_the_bit(mass: float, width: float) -> None:
-    text = f"[[body]]\nposition = [0, 0]\nmass = {mass!r}\nbox = [{{ size = [{width!r}, 0.7] }}, {{ size = [0.3, 1.1] }}]\n"
+    boxes = f"[{{ size = [{width!r}, 0.7] }}, {{ size = [0.3, 1.1] }}]"
+    text = f"[[body]]\nposition = [0, 0]\nmass = {mass!r}\nbox = {boxes}\n"
     text += f"[[box]]\nposition = [99, 0]\nmass = {mass!r}\nsize = [{width!r}, 0.3]\n"
     assert loads(text).bodies.mass.tolist() == [mass, mass]
 
