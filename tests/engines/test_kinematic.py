@@ -9,6 +9,7 @@ import pytest
 import sandbox
 from sandbox.action import ActionError, Force, Impulse, Move, Spawn
 from sandbox.engines.contract import Refusal
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
@@ -16,12 +17,16 @@ from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
+from tests.accounts import closed_account
 
-ENGINES = ["pymunk"]
+ENGINES = ["pymunk", "box2d", "reference"]
 every_engine = pytest.mark.parametrize("engine", ENGINES)
 
-SINGLE = 2e-6
+SINGLE = 1e-5
 """m, m/s or rad: 32-bit rounding of Box2D, at positions of a few metres and summed over some hundred steps"""
+
+TURN = 3.0e-4
+"""rad: Box2D turns a body by arctan(ω h), which is (ω h)³/3 less than ω h in each of 200 steps"""
 
 STROKE = {"kind": "stroke", "body": "paddle", "pivot": [0.0, 0.0], "rate": 1.0, "stops": [0.0, 1.0]}
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
@@ -29,7 +34,7 @@ FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
 
 def scene_of(duration: float = 1.0, gravity: float = 0.0, **tables: Any) -> Scene:
     world = {"duration": duration, "gravity": [0.0, gravity], **tables.pop("world", {})}
-    return from_document({"world": world, "solver": {"dt": 0.005}, **tables})
+    return from_document({"world": world, "solver": {"dt": 0.005}} | tables)
 
 
 def ball(x: float, y: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -55,7 +60,7 @@ def test_position_and_angle_follow_the_velocities_whatever_is_in_the_way(engine:
     index = run.names.tolist().index("paddle")
     time = run.time[:, None]
     assert run.position[:, index] == pytest.approx(np.array([-1.0, 1.0]) + time * [2.0, -0.5], abs=SINGLE)
-    assert run.angle[:, index] == pytest.approx(3.0 * run.time, abs=SINGLE)
+    assert run.angle[:, index] == pytest.approx(3.0 * run.time, abs=TURN if engine == "box2d" else SINGLE)
     assert run.velocity[-1, index].tolist() == [2.0, -0.5] and run.angular_velocity[-1, index] == 3.0
 
 
@@ -104,9 +109,9 @@ def test_kinematic_bodies_pass_through_each_other_and_through_fixed_ones(engine:
     assert not len(run.contact_time)
 
 
-@every_engine
-def test_carrier_pulls_a_ball_by_a_rod(engine: str) -> None:
-    """A carrier that turns at ω holds a ball by a rigid rod to its corner: the ball circles at ω, at the rod's end."""
+@pytest.mark.parametrize("engine", ["pymunk", "box2d"])
+def test_carrier_turns_a_ball_on_a_pivot(engine: str) -> None:
+    """A carrier that turns at ω holds a ball at 1 m from its centre: the ball circles at ω."""
     joint = {"kind": "pivot", "between": ["paddle", "ball"], "at": [1.0, 0.0]}
     tables = {
         "ball": [ball(1.0, velocity=[0.0, 2.0], collides="none")],
@@ -129,7 +134,7 @@ def test_actions_set_position_and_velocities(engine: str) -> None:
     frame = simulation.frame()
     index = simulation.bodies.names.index("paddle")
     assert frame.position[index] == pytest.approx([1.0 + 3.0 * 0.5, 2.0], abs=SINGLE)
-    assert frame.angle[index] == pytest.approx(-1.0, abs=SINGLE)
+    assert frame.angle[index] == pytest.approx(-1.0, abs=TURN if engine == "box2d" else SINGLE)
     simulation.apply(Move(time=0, body="paddle", position=(0.0, 0.0), velocity=(0.0, 0.0), angular_velocity=0.0))
     simulation.step()
     assert simulation.frame().position[index].tolist() == [0.0, 0.0]
@@ -178,6 +183,50 @@ def test_kinematic_balls_on_a_floor_are_refused(engine: str) -> None:
     surface = {"sliding_friction": 0.2, "rolling_friction": 0.01}
     with pytest.raises(Refusal, match="kinematic bodies"):
         start(scene_of(ball=[ball(0.0, kinematic=True), ball(1.0, name="b")], surface=surface), engine)
+
+
+def test_reference_refuses_joints_to_kinematic_bodies_and_impacts_one_by_one() -> None:
+    tables: dict[str, Any] = {"ball": [ball(1.0)], "box": [paddle(0.0)]}
+    joint = {"kind": "pivot", "between": ["paddle", "ball"], "at": [1.0, 0.0]}
+    with pytest.raises(Refusal, match="a joint to 'paddle', which is kinematic"):
+        start(scene_of(joint=[joint], **tables), "reference")
+    for key, value in {"detection": "bisect", "impact": "dissipative"}.items():
+        scene = scene_of(**tables)
+        with pytest.raises(Refusal, match="kinematic bodies"):
+            start(scene, "reference", scene.solver.replace(**{key: value}))
+        simulation = start(scene_of(ball=[ball(0.0)]), "reference", scene.solver.replace(**{key: value}))
+        with pytest.raises(ActionError, match="kinematic bodies"):
+            simulation.apply(Spawn(time=0, ball=Ball(position=(3.0, 0.0), radius=0.1, kinematic=True)))
+        simulation.close()
+
+
+@pytest.mark.parametrize("method", ["impulse", "penalty"])
+def test_work_of_a_paddle_on_reference_is_booked_as_drives(method: str) -> None:
+    """A ball of 2 kg at rest leaves a paddle of speed u at 2 u; the paddle's force on it does the work 4 u²."""
+    box = paddle(-1.0, velocity=[3.0, 0.0], restitution=1.0)
+    scene = scene_of(ball=[ball(0.0, restitution=1.0)], box=[box], solver={"dt": 0.005, "response": method})
+    account = closed_account(scene, 100, engine="reference", closes=1e-12)  # rounding
+    error = 0.02 if method == "penalty" else 1e-12  # a contact of ten steps; rounding
+    assert account[Cause.DRIVES] == pytest.approx(4.0 * 3.0**2, rel=error)
+
+
+@pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "rk4"])
+@pytest.mark.parametrize("part", [None, 0.3])
+def test_account_of_reference_closes_with_kinematic_bodies(integrator: str, part: float | None) -> None:
+    scene = scene_of(
+        gravity=-10.0,
+        solver={"dt": 0.01, "integrator": integrator},
+        plane=[FLOOR],
+        box=[
+            paddle(0.0, 0.3, (2.0, 0.2), velocity=[0.5, 1.0], friction=0.6),
+            paddle(0.3, 2.0, (1.0, 0.1), name="mill", angular_velocity=3.0, friction=0.6, restitution=0.8),
+        ],
+        ball=[ball(0.2, 1.5, restitution=0.5, friction=0.5), ball(-0.3, 0.8, name="b"), ball(0.4, 3.0, name="c")],
+    )
+    move = Move(time=0, body="paddle", position=(0.1, 0.9), velocity=(0.0, -1.0))
+    account = closed_account(scene, 60, [(40, move)], part, engine="reference", closes=1e-11)  # hundreds of sums
+    # the paddle of 1 kg becomes slower and is raised from 0.7 m; rounding
+    assert account[Cause.ACTIONS] == pytest.approx(0.5 * (1.0 - 1.25) + 10.0 * (0.9 - 0.7), abs=1e-11)
 
 
 def test_pymunk_refuses_what_it_cannot_combine_with_kinematic_bodies() -> None:

@@ -63,6 +63,7 @@ OWN = frozenset(
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
+        Demand.KINEMATIC,
     }
 )
 
