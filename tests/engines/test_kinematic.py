@@ -11,6 +11,14 @@ from sandbox.action import ActionError, Force, Impulse, Move, Spawn
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
+from sandbox.measure.analytic.solve import closed_form, solution
+from sandbox.measure.metrics.contacts import max_penetration
+from sandbox.measure.metrics.invariants import momentum_drift
+from sandbox.measure.preflight.checks import warnings
+from sandbox.measure.preflight.speed_bound import SpeedBounds
+from sandbox.measure.preflight.trial_run import energy_gain
+from sandbox.measure.preflight.tunnelling import tunnelling_risks
+from sandbox.measure.tradeoff.objective import conserves_energy
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
@@ -267,3 +275,44 @@ def test_key_is_kept_in_a_scene_file() -> None:
     scene = scene_of(box=[paddle(0.0, velocity=[1.0, 0.0])])
     assert loads(dumps(scene)) == scene
     assert scene.bodies.kinematic.tolist() == [True]
+
+
+def lift_scene(**lift: Any) -> Scene:
+    """Return a lift that passes through a wall, and a ball that bounces on it."""
+    return scene_of(
+        gravity=-10.0,
+        plane=[FLOOR],
+        wall=[{"points": [[-1.0, 0.6], [1.0, 0.6]]}],
+        ball=[ball(0.0, 1.5, restitution=1.0)],
+        box=[paddle(0.0, 1.0, (1.0, 0.02), **lift)],
+    )
+
+
+def test_nothing_is_claimed_to_be_conserved_or_solved_with_kinematic_bodies() -> None:
+    scene = lift_scene(velocity=[0.0, 0.5])
+    run = sandbox.run(scene, "pymunk")
+    assert momentum_drift(run, scene) is None and not conserves_energy(scene)
+    assert solution(scene) is None and closed_form(run, scene, 1) is None
+    assert energy_gain(run, scene) == 0.0
+    fallen = closed_form(run, scene, 0)  # free flight holds until the first contact
+    assert fallen is not None and not fallen.valid.all()
+
+
+def test_kinematic_bodies_are_no_missed_contacts_and_no_overlaps_with_static_objects() -> None:
+    scene = lift_scene(velocity=[0.0, -40.0])  # it passes wall and plane in two steps
+    run = sandbox.run(scene, "pymunk", audit=True)
+    assert not (run.missed_pair == 1).any()
+    assert max_penetration(run, scene).max() < 0.05  # that of the ball
+    start = from_document({"box": [paddle(0.0, 0.0)], "plane": [FLOOR], "ball": [ball(5.0, 5.0)]})
+    assert not [each for each in warnings(start, start.solver) if each.kind == "overlap"]
+
+
+def test_fast_kinematic_body_is_a_risk_for_balls_and_not_for_walls() -> None:
+    scene = lift_scene(velocity=[0.0, -40.0], angular_velocity=2.0)
+    risks = tunnelling_risks(scene)
+    assert not [risk for risk in risks if "wall" in risk.thing and risk.ball == "paddle"]
+    speeds = SpeedBounds(scene, contact_matrix(scene))
+    assert speeds.own[1] == pytest.approx(40.0 + 2.0 * 0.5, rel=1e-3)  # the corner is a little farther than 0.5 m
+    assert speeds.unknown == ("kinematic bodies",)
+    at_rest = lift_scene()
+    assert SpeedBounds(at_rest, contact_matrix(at_rest)).bounded

@@ -119,8 +119,13 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
 
 
 def conserves_energy(scene: Scene) -> bool:
-    """Return whether a scene conserves energy: no drag, friction, damper, thrust or drive, and elastic contacts."""
+    """Return whether a scene conserves energy.
+
+    It has no drag, friction, dampers, thrusts, drives and kinematic bodies, and its contacts are elastic.
+    """
     if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.drives:
+        return False
+    if scene.bodies.kinematic.any():
         return False
     if scene.links.figures[:, 2].any():
         return False

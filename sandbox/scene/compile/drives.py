@@ -52,8 +52,7 @@ def is_driven(scene: SceneDescription, bodies: Bodies, *, turning: bool = False)
 def is_immovable(scene: SceneDescription, bodies: Bodies) -> BoolArray:
     """Return which bodies nothing can push, (N,): fixed and kinematic ones, and those of a stroke or plunger drive."""
     prescribed = [drive.body for drive in scene.drives if not isinstance(drive, TorqueDrive)]
-    still: BoolArray = bodies.fixed | bodies.kinematic
-    return still | np.isin(bodies.names, prescribed) if prescribed else still
+    return bodies.immovable | np.isin(bodies.names, prescribed) if prescribed else bodies.immovable
 
 
 def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:
