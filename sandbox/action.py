@@ -80,7 +80,8 @@ class Force(Timed):
 class Move(Timed):
     """Set the position of a body, and its velocity and angular velocity if they are given.
 
-    A fixed body can be moved but cannot have a velocity. A body held by a drive cannot be moved.
+    A fixed body can be moved but cannot have a velocity. A kinematic body keeps the velocities from then on. A body
+    held by a drive cannot be moved.
     """
 
     kind: Literal["move"] = "move"

@@ -221,7 +221,7 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool) -> None:
     click.echo(f"{name}: {scene.title}" if scene.title else name)
     for is_on, what, why in _demand_lines(document.bill):
         mark = click.style("on ", fg="green", bold=True) if is_on else click.style("off", dim=True)
-        click.echo(f"  {mark}  {what:<14} {why}")
+        click.echo(f"  {mark}  {what:<16} {why}")
     for engine, support in document.engines.items():
         _print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
     _print_item(_step_text(scene, document))

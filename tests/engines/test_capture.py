@@ -162,9 +162,36 @@ def limited_joints() -> pymunk.Space:
     return space
 
 
+def kinematic() -> pymunk.Space:
+    """Return a space with kinematic bodies: a mill, a lift that starts within a wall, a platform at rest, a carrier."""
+    space, rng = space_with_walls(), random.Random(4)
+
+    def platform(x: float, y: float, velocity: tuple[float, float] = (0.0, 0.0), spin: float = 0.0) -> pymunk.Body:
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position, body.velocity, body.angular_velocity = (x, y), velocity, spin
+        box = pymunk.Poly.create_box(body, (120, 10))
+        box.friction, box.elasticity = 0.8, 0.5
+        space.add(body, box)
+        return body
+
+    platform(-100, 150, spin=2.0)
+    platform(150, 0, velocity=(-3.0, 40.0))
+    platform(100, 250)
+    carrier, load = platform(-200, 400, velocity=(60.0, 0.0), spin=-0.3), pymunk.Body(2, 100)
+    load.position = -180, 350
+    space.add(load, pymunk.Circle(load, 10), pymunk.PinJoint(carrier, load, (30, 0)))
+    for k in range(30):
+        body = pymunk.Body(3, 200)
+        body.position = rng.uniform(-200, 200), 60 + 20 * k
+        shape = pymunk.Circle(body, 8) if k % 2 else pymunk.Poly.create_box(body, (16, 12))
+        shape.friction, shape.elasticity = 0.6, 0.4
+        space.add(body, shape)
+    return space
+
+
 def state_of(space: pymunk.Space) -> np.ndarray:
-    """Return position of the centre of mass, velocity, angle and angular velocity of the dynamic bodies, (N, 6)."""
-    bodies = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
+    """Return position of the centre of mass, velocity, angle and angular velocity of the moving bodies, (N, 6)."""
+    bodies = [body for body in space.bodies if body.body_type != pymunk.Body.STATIC]
     centres = [b.local_to_world(b.center_of_gravity) if any(b.center_of_gravity) else b.position for b in bodies]
     rows = zip(centres, bodies, strict=True)
     return np.asarray([[*centre, *b.velocity, b.angle, b.angular_velocity] for centre, b in rows])
@@ -172,10 +199,10 @@ def state_of(space: pymunk.Space) -> np.ndarray:
 
 def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, list[float]]:
     """Advance a space and the engine on its scene; return the largest difference after each step."""
-    bodies = [body for body in space.bodies if body.body_type == pymunk.Body.DYNAMIC]
-    captured = capture_space(space, dt=DT, names={body: f"dynamic {k}" for k, body in enumerate(bodies)})
+    bodies = [body for body in space.bodies if body.body_type != pymunk.Body.STATIC]
+    captured = capture_space(space, dt=DT, names={body: f"moving {k}" for k, body in enumerate(bodies)})
     simulation = ENGINES["pymunk"].start(captured.scene)
-    rows = [simulation.bodies.number_of[f"dynamic {k}"] for k in range(len(bodies))]
+    rows = [simulation.bodies.number_of[f"moving {k}"] for k in range(len(bodies))]
     differences = []
     for _ in range(steps):
         space.step(DT)
@@ -186,14 +213,14 @@ def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, lis
     return captured, differences
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
 def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     captured, differences = compare(make())
     assert not captured.omitted
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
 def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     space.damping = 0.9
@@ -203,7 +230,7 @@ def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[]
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
 def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     scene = from_pymunk(space, dt=DT, title="captured")

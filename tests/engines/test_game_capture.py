@@ -176,6 +176,73 @@ def test_longest_space_is_the_recording_and_no_space_is_an_error() -> None:
     assert len(captured.recording.scene.bodies) == 40
 
 
+class PaddleGame:
+    """A game that moves kinematic bodies: a paddle and a platform by their velocities, a door by its positions."""
+
+    def __init__(self) -> None:
+        self.space = space_with_walls()
+        self.balls = [disc(self.space, 60 * k - 150, 100 + 40 * k) for k in range(6)]
+        self.paddle = self._bar((-200, 30), (80, 10))
+        self.platform = self._bar((100, 120), (120, 10))
+        self.door = self._bar((0, 300), (10, 60))
+        self.platform.velocity = 60, 0
+
+    def _bar(self, position: tuple[float, float], size: tuple[float, float]) -> pymunk.Body:
+        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        body.position = position
+        bar = pymunk.Poly.create_box(body, size)
+        bar.friction, bar.elasticity = 0.7, 0.9
+        self.space.add(body, bar)
+        return body
+
+    def update(self, k: int) -> None:
+        """Act before step k."""
+        if abs(self.platform.position.x - 100) > 40:
+            self.platform.velocity = 60.0 if self.platform.position.x < 100 else -60.0, 0
+        if k % 25 == 5:
+            self.paddle.velocity = 0, 300
+            self.paddle.angular_velocity = 3.0
+        if k % 25 == 10:
+            self.paddle.velocity = 20, -300
+            self.paddle.angular_velocity = -3.0
+        if k % 25 == 15:
+            self.paddle.velocity, self.paddle.angular_velocity = (0, 0), 0.0
+        self.door.position = 0, 300 - 2 * (k % 100)
+        if k == 100:
+            self._bar((-100, 250), (60, 10)).angular_velocity = 2.0
+
+
+def test_replay_of_a_game_with_kinematic_bodies_ends_in_its_state_bit_for_bit() -> None:
+    game = PaddleGame()
+    with capture() as captured:
+        for k in range(STEPS):
+            game.update(k)
+            game.space.step(DT)
+    assert not captured.omitted and not captured.inexact
+    assert {action.kind for action in captured.recording.actions} == {"move", "spawn"}
+    ends = end_of(captured.recording)
+    (space,) = captured.spaces
+    moving = {body: name for body, name in space.names.items() if body.body_type != pymunk.Body.STATIC}
+    assert len(moving) == 10
+    for body, name in moving.items():
+        assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
+
+
+def test_hand_that_is_not_in_the_space_is_moved_by_the_game() -> None:
+    """Games drag bodies by a joint to a kinematic body outside the space, which only they move."""
+    space = space_with_walls()
+    ball, hand = disc(space, 0, 100), pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    hand.position = 0, 150
+    space.add(pymunk.PivotJoint(hand, ball, (0, 0), (0, 5)))
+    with capture() as captured:
+        for k in range(60):
+            hand.position = 2 * k, 150
+            space.step(DT)
+    assert not captured.omitted
+    (watched,) = captured.spaces
+    assert end_of(captured.recording)[watched.names[ball]][:2] == [*ball.position]
+
+
 def test_bricks_that_the_game_removes_are_removed() -> None:
     """A static body of its own is a body of the scene; the ball then falls through the place of the brick."""
     space = space_with_walls()

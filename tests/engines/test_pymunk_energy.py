@@ -195,6 +195,48 @@ def test_work_of_a_constant_force_is_booked_as_drives() -> None:
     assert account[Cause.DRIVES] == pytest.approx(0.5 * 1.0 * (2.0 * 0.5) ** 2, rel=1e-12)  # rounding of 50 sums
 
 
+KINEMATIC_SCENE: dict[str, Any] = {
+    "plane": [FLOOR],
+    "box": [
+        {"name": "lift", "position": [0, 0.3], "size": [2, 0.2], "kinematic": True, "velocity": [0.5, 1.0]},
+        {"name": "mill", "position": [0, 3], "size": [1, 0.1], "kinematic": True, "angular_velocity": 3.0},
+    ],
+    "ball": [ball("a", 0.2, 1.5, restitution=0.5, friction=0.5), ball("b", -0.2, 0.8), ball("c", 0.7, 3.0)],
+    "material": [{"name": "rubber", "restitution": 0.8, "friction": 0.6}],
+}
+
+
+@pytest.mark.parametrize(
+    "joints",
+    [
+        [],
+        [{"kind": "spring", "between": ["mill", "c"], "stiffness": 50.0, "damping": 1.0, "rest_length": 0.5}],
+        [{"kind": "rod", "between": ["mill", "c"], "anchors": [[0.3, 0.0], [0.0, 0.0]]}],
+        [
+            {"kind": "pivot", "between": ["mill", "c"], "at": [0.4, 3.0]},
+            {"kind": "motor", "between": ["lift", "b"], "rate": 5.0, "max_torque": 0.1},
+        ],
+    ],
+    ids=["free", "spring", "rod", "pivot and motor"],
+)
+@pytest.mark.parametrize("fraction", [None, 0.3])
+def test_ledger_closes_with_kinematic_bodies(joints: list[dict[str, Any]], fraction: float | None) -> None:
+    boxes = [{**box, "material": "rubber"} for box in KINEMATIC_SCENE["box"]]
+    actions = [(40, Move(time=0, body="lift", position=(0.1, 0.9), velocity=(0.0, -1.0)))]
+    account = closed_account(scene_of(**KINEMATIC_SCENE | {"box": boxes}, joint=joints), 60, actions, fraction)
+    # the lift becomes slower and is raised from 0.7 m; rounding
+    assert account[Cause.ACTIONS] == pytest.approx(0.5 * (1.0 - 1.25) + 10.0 * (0.9 - 0.7), abs=1e-12)
+
+
+def test_work_of_a_paddle_is_that_of_its_elastic_collision() -> None:
+    """A ball of 1 kg at rest leaves a paddle of speed u at 2 u; the paddle's force on it does the work 2 u²."""
+    paddle = {"name": "paddle", "position": [-1, 0], "size": [0.2, 1], "kinematic": True, "velocity": [3, 0]}
+    account = closed_account(
+        scene_of(gravity=0.0, ball=[ball("a", 0, 0, restitution=1.0)], box=[{**paddle, "restitution": 1.0}]), 50
+    )
+    assert account[Cause.DRIVES] == pytest.approx(2.0 * 3.0**2, rel=1e-9)  # pymunk solves one contact to rounding
+
+
 def test_stored_energy_of_a_broken_spring_is_booked_as_parted() -> None:
     spring = {"kind": "spring", "between": ["a"], "stiffness": 100.0, "rest_length": 0.5, "strength": 12.0}
     account = closed_account(scene_of(ball=[ball("a", 0, -0.5)], joint=[spring]), 40)

@@ -338,6 +338,14 @@ PROOFS: dict[Demand, Proof] = {
         scene(ball=[ball(vx=2.0, group="a"), ball(1.0, group="a", name="passed"), ball(1.0, 5.0, name="apart")]),
         both(position(2.0, 0.0), position(1.0, 0.0, body=1)),
     ),
+    # a paddle at −1 m/s hits the ball, which had 1 m/s, at 0.325 s: without loss it then has −3 m/s
+    Demand.KINEMATIC: Proof(
+        scene(
+            ball=[ball(vx=1.0, restitution=1.0)],
+            box=[box(1.4, velocity=[-1.0, 0.0], restitution=1.0, kinematic=True)],
+        ),
+        both(position(0.325 - 3.0 * 0.675, 0.0), position(0.4, 0.0, body=1)),
+    ),
     # gravity within 0.5 m around x = 1: 0.5 s at −4 m/s²
     Demand.ZONES: Proof(
         scene(

@@ -179,6 +179,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
     (Demand.CATEGORIES, True, {"ball": [{**BALL, "categories": ["player"], "mask": ["enemy"]}]}, "player, enemy"),
     (Demand.CATEGORIES, False, {"ball": [BALL]}, "no object names a category"),
+    (Demand.KINEMATIC, True, {"ball": [{**BALL, "kinematic": True}]}, "1 body is kinematic"),
+    (Demand.KINEMATIC, False, {"ball": [BALL]}, "no body is kinematic"),
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.GROUPS, False, {"ball": [BALL]}, "no body names a group"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),

@@ -64,6 +64,7 @@ OWN = frozenset(
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
+        Demand.KINEMATIC,
     }
 )
 

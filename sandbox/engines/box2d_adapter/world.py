@@ -216,9 +216,9 @@ class Box2DWorld:
 
     def _create(self, index: int) -> None:
         store, bodies = self._store, self._store.bodies
-        fixed, driven = bool(bodies.fixed[index]), index in store.mounts
+        fixed, kinematic = bool(bodies.fixed[index]), bool(store.kinematic[index])
         create = self._world.create_static_body if fixed else self._world.create_dynamic_body
-        if driven:
+        if kinematic:
             create = self._world.create_kinematic_body
         body = create(position=self._vector(store.position[index]), rotation=box2d.make_rot(float(store.angle[index])))
         self._bodies[index] = body
@@ -231,7 +231,7 @@ class Box2DWorld:
         if not fixed:
             body.apply_mass_from_shapes()  # finds the extents that decide about continuous collision
             self.set_motion(index)
-        if not (fixed or driven):
+        if not (fixed or kinematic):
             self.set_mass(index)
 
     def _roles(self, index: int) -> list[ShapeRole]:
@@ -375,7 +375,7 @@ class Box2DWorld:
                 coefficients = getattr(self._materials, role.coefficients)
                 shape.friction = float(coefficients.friction[surface])
                 shape.restitution = float(coefficients.restitution[surface])
-            if index >= 0 and not store.bodies.fixed[index] and index not in store.mounts:
+            if index >= 0 and not (store.bodies.fixed[index] or store.kinematic[index]):
                 self.set_mass(index)
         self._collect()
         return replaced
@@ -401,8 +401,8 @@ class Box2DWorld:
         self._world.gravity = self._vector(gravity)
 
     def set_damping(self, linear: float, angular: float) -> None:
-        """Set the damping rates of the velocities and spins of all moving bodies, 1/s."""
-        for index in self.indices.tolist():
+        """Set the damping rates of the velocities and spins of all bodies that forces move, 1/s."""
+        for index in self.indices[~self._store.kinematic[self.indices]].tolist():
             self._bodies[index].linear_damping, self._bodies[index].angular_damping = linear, angular
 
     def remove(self, indices: list[int]) -> None:

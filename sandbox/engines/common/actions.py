@@ -377,6 +377,8 @@ def _movable_body_index(name: str, target: ActionTarget) -> int:
     index = _body_index(name, target)
     if target.bodies.fixed[index]:
         raise ActionError(f"{name!r} is fixed and cannot move")
+    if target.bodies.kinematic[index]:
+        raise ActionError(f"{name!r} is kinematic: no impulse or force changes its motion; set it by a `move` action")
     _refuse_driven(name, target.scene)
     return index
 

@@ -85,27 +85,32 @@ class BodyStore:
         masks = np.asarray([COLLISION_MASKS[element.collides] for element in bodies.elements], dtype=np.int64)
         self.collision_mask: IntArray = np.where(self.present, masks[bodies.element], NOTHING)
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed bodies) or `ALL`"""
-        is_moving = self.moving
-        self.inverse_mass: FloatArray = np.where(is_moving, 1.0 / bodies.mass, 0.0)
+        self.kinematic: BoolArray = bodies.kinematic & self.present
+        """(N,) moves along its path whatever it collides with (kinematic)"""
+        is_pushable = self.moving & ~self.kinematic
+        self.inverse_mass: FloatArray = np.where(is_pushable, 1.0 / bodies.mass, 0.0)
         # A body that nothing can turn gets no inverse moment: its spin stays the same, bit for bit.
-        can_turn = is_moving & (matrix.turnable | self._has_torque)
+        can_turn = is_pushable & (matrix.turnable | self._has_torque)
         self.inverse_moment: FloatArray = np.where(can_turn, 1.0 / bodies.moment, 0.0)
         self.mounts: dict[int, Mount] = {}
         """how drives hold the present bodies, by body index"""
-        self.kinematic: BoolArray = np.zeros(len(bodies), np.bool_)
-        """(N,) moves along its path whatever it collides with (kinematic)"""
-        if self._all_mounts:
+        self.driven: BoolArray = self.kinematic.copy()
+        """(N,) has a drive, or is kinematic"""
+        self.has_driven = bool(self._all_mounts or self.driven.any())
+        """whether a body can be driven"""
+        if self.has_driven:
             self._rebuild_driven()
 
     def _rebuild_driven(self) -> None:
-        """Set up driven bodies: their hinges, and their inverse masses as the solver sees them."""
+        """Set up bodies with a drive: their hinges, and their inverse masses as the solver sees them."""
         names, bodies = self.bodies.names, self.bodies
         indices = {names.index(name): mount for name, mount in self._all_mounts.items() if name in names}
         self.mounts = {n: mount for n, mount in sorted(indices.items()) if self.present[n]}
         self.hinge: FloatArray = np.zeros((len(bodies), 2))
         """(N, 2) m, in the body's frame, the point about which it turns: its centre unless it is on a hinge"""
         for n, mount in self.mounts.items():
-            self.hinge[n], self.kinematic[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
+            self.hinge[n], self.driven[n] = mount.hinge, True
+            self.kinematic[n] = not isinstance(mount.drive, TorqueDrive)
             moment_about_hinge = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
             self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.kinematic[n] else 1.0 / moment_about_hinge
 

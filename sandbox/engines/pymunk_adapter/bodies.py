@@ -275,14 +275,18 @@ class PymunkBodies:
 
     @property
     def _driven(self) -> BoolArray:
-        """(N,) bodies that only the space can move: with thrusts or drives; all if bodies attract, or on a surface."""
+        """(N,) bodies that only the space can move: kinematic ones, and those with thrusts or drives.
+
+        All bodies if they attract each other, or on a surface.
+        """
         space_bodies, scene = self.space_bodies, self.scene
         if space_bodies.field.between_bodies or self.tabletop is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not (scene.thrusts or scene.drives):
-            return np.zeros(len(self.bodies), dtype=np.bool_)
+            return self.bodies.kinematic
         has_thrust, is_driven = space_bodies.thrusts.acts_on, space_bodies.drives.holds
-        return np.asarray([has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)], np.bool_)
+        driven = [has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)]
+        return self.bodies.kinematic | np.asarray(driven, np.bool_)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
         """Continue with a changed scene. Only air, gravity, coefficients, points of walls and solid flags may differ.
@@ -328,6 +332,9 @@ class PymunkBodies:
         bodies = self.bodies.joined_by(single, name)
         if self.tabletop is not None and (reason := next(unsupported_by_steppers(self.setup, bodies), None)):
             raise ActionError(reason)
+        if single.kinematic and (self._half_kick or scene.attractions):
+            other = "half_kick" if self._half_kick else "attraction"
+            raise ActionError(f"pymunk does not model {other} and kinematic bodies together")
         matrix = derive_contacts(self.setup, bodies)
         self.refresh()
         index = len(self.bodies)

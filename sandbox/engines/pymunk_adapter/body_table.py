@@ -23,7 +23,7 @@ class SpaceBody(NamedTuple):
     @property
     def moves(self) -> bool:
         """Whether it is not fixed."""
-        return self.body.body_type != pymunk.Body.STATIC  # kinematic bodies are held by a zone or moved by a drive
+        return self.body.body_type != pymunk.Body.STATIC
 
 
 class SpaceBodyTable:

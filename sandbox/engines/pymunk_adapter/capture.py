@@ -325,34 +325,39 @@ class SpaceElements:
 
     def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return name, motion, mass and filter of a body."""
-        name, is_fixed = self.names[body], body.body_type != pymunk.Body.DYNAMIC
+        name, is_kinematic = self.names[body], self.is_kinematic(body)
         values: KeyValues = {"name": name, "position": _point(body.position)}
         if body.angle:
             values["angle"] = float(body.angle)
-        if is_fixed:
-            values["fixed"] = True
+        if not (is_kinematic or body.body_type == pymunk.Body.DYNAMIC):
             if any(body.velocity) or body.angular_velocity:
-                self.omitted.append(f"the motion of {name}, a kinematic body; a scene keeps it at rest")
-            elif body.body_type == pymunk.Body.KINEMATIC:
-                self.inexact.append(f"{name} is kinematic, and fixed in the scene; code of the game may move it")
+                self.omitted.append(f"the velocity of {name}, which is not in the space")
+            return values | {"fixed": True} | self._filter(name, shapes)
+        self._note_body(body, name)
+        if body.space is not self.space:
+            raise CaptureError(f"{name} is a dynamic body of a joint, and not in the space")
+        if is_kinematic:
+            values["kinematic"] = True
         else:
-            self._note_body(body, name)
-            if body.space is not self.space:
-                raise CaptureError(f"{name} is a dynamic body of a joint, and not in the space")
             values["mass"] = float(body.mass)
             if math.isinf(body.moment):
                 values["fixed_rotation"] = True
             else:
                 values["moment"] = float(body.moment)
-            values["velocity"] = _point(body.velocity)
-            if body.angular_velocity:
-                values["angular_velocity"] = float(body.angular_velocity)
+        values["velocity"] = _point(body.velocity)
+        if body.angular_velocity:
+            values["angular_velocity"] = float(body.angular_velocity)
         return values | self._filter(name, shapes)
+
+    def is_kinematic(self, body: pymunk.Body) -> bool:
+        """Return whether a body moves at its velocity: it is kinematic, and in the space."""
+        return body.body_type == pymunk.Body.KINEMATIC and body.space is self.space
 
     def _note_body(self, body: pymunk.Body, name: str) -> None:
         if getattr(body, "_velocity_func", None) is not None or getattr(body, "_position_func", None) is not None:
             self.omitted.append(f"the velocity or position function of {name}")
-        if self._notes_forces and (any(body.force) or body.torque):
+        is_dynamic = body.body_type == pymunk.Body.DYNAMIC
+        if self._notes_forces and is_dynamic and (any(body.force) or body.torque):
             self.omitted.append(f"the force on {name} that was applied for the next step only")
         if body.is_sleeping:
             self.omitted.append(f"{name} sleeps")
@@ -385,7 +390,8 @@ class SpaceElements:
         if group:
             values["group"] = f"group {group}"
         if collides == "none":
-            self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
+            if not self.is_kinematic(_body_of(shapes[0])):
+                self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
             return values | {"collides": "none"}
         return values | ({"collides": collides} if collides == "fixed" and not self._categories else {})
 
@@ -464,7 +470,7 @@ class FilterKind(NamedTuple):
 
 
 def _filter_kind(shape: pymunk.Shape) -> FilterKind:
-    is_static = _body_of(shape).body_type != pymunk.Body.DYNAMIC
+    is_static = _body_of(shape).body_type == pymunk.Body.STATIC
     return FilterKind(is_static, shape.filter.categories, shape.filter.mask)
 
 

@@ -1,7 +1,8 @@
 """Energy accounting of a pymunk run: the work of gravity, drag, damping, joints, drives and contacts.
 
 A body on a hinge has one degree of freedom: all work on it is an angular impulse about the hinge times a mean spin. The
-work of the drive on a kinematic body follows from its change of momentum, minus the impulses of contacts.
+work of the drive on a kinematic body follows from its change of momentum, minus the impulses of contacts. A body that
+is kinematic by itself counts as driven too: the drive keeps up its velocity and carries its weight.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactPoints
 from sandbox.engines.pymunk_adapter.drives import SpaceDrivenBody, SpaceHingeMotor, SpacePlunger
 from sandbox.engines.pymunk_adapter.forces import acceleration, damping_factor
-from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpulses, motors, springs
+from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpulses, motors, set_unknown_sums, springs
 from sandbox.engines.pymunk_adapter.joints import spring_forces
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.potential import Potential
@@ -193,6 +194,38 @@ def drive_work(
     return DriveWorkSums(driven, weight, potential_change)
 
 
+def kinematic_work(
+    indices: IntArray,
+    states: tuple[EnergyState, EnergyState],
+    means: tuple[FloatArray, FloatArray],
+    other_impulses: list[JointImpulses],
+    joint_sums: ImpulseSums | None,
+    bodies: Bodies,
+    gravity: tuple[float, float],
+) -> float:
+    """Return the work on kinematic bodies that keeps up their velocities against all other impulses, J.
+
+    Args:
+        indices: (K,) of the kinematic bodies.
+        states: at the start of a substep, and at its end or where it is cut off.
+        means: mean velocities (N + 1, 2), m/s, and spins (N + 1,), rad/s.
+        other_impulses: those of contacts and springs.
+        joint_sums: sums of those of other joints and of motors; None: there are none.
+        bodies: all.
+        gravity: m/s².
+    """
+    before, now = states
+    velocity, spin = means
+    sums = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), indices)
+    sums.linear[indices] = bodies.mass[indices, None] * (now.velocity - before.velocity)[indices]
+    sums.angular[indices] = bodies.moment[indices] * (now.spin - before.spin)[indices]
+    for each in other_impulses:
+        sums.subtract(each)
+    work = sums.work(velocity, spin) - (0.0 if joint_sums is None else joint_sums._replace(joined=indices).work(*means))
+    rise = (before.position - now.position)[indices] @ np.asarray(gravity)
+    return work + float(bodies.mass[indices] @ rise)
+
+
 class PymunkEnergyLedger:
     """Energy by cause since accounting was switched on.
 
@@ -245,12 +278,16 @@ class PymunkEnergyLedger:
             included[p.particles.indices] = False
         driven_bodies = p.space_bodies.drives.driven_bodies
         included[p.space_bodies.drives.indices] = False  # accounted separately below
+        kinematic = np.flatnonzero(p.bodies.kinematic & p.present)
+        included[kinematic] = False  # likewise
         end = self._state()
         now = before.interpolated(end, fraction)
         if now is not end:
             p.space_bodies.drives.place_on_hinges(now.position, now.velocity, now.angle, now.spin)
         velocity, spin = self._mean(before, now, included)
         set_mean_driven_velocity(driven_bodies, before, now, velocity, spin)
+        velocity[kinematic] = 0.5 * (before.velocity[kinematic] + now.velocity[kinematic])
+        spin[kinematic] = 0.5 * (before.spin[kinematic] + now.spin[kinematic])
         joints = p.space_bodies.joints.by_kind
         spring_force = spring_forces(joints.springs, end.position, end.angle) if len(joints.springs) else None
         applied = applied_impulses(p, before, included, spring_force, p.h * fraction)
@@ -275,10 +312,18 @@ class PymunkEnergyLedger:
             account.add(Cause.DRIVES, work.driven)
             account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
+        other_impulses, joint_sums = [*by_stiffness, *by_damping, points.joint_impulses], None
         if len(joints.rigid):
             joint_sums = self._unexplained_impulses(before, now, included, applied)
-            for impulses in (*by_stiffness, *by_damping, points.joint_impulses):
+            for impulses in other_impulses:
                 joint_sums.subtract(impulses)
+            if np.isin(kinematic, joint_sums.joined).any():
+                set_unknown_sums(p.space_bodies.joints, end.position, end.angle, joint_sums, included)
+        if len(kinematic):
+            means, gravity = (velocity, spin), p.scene.world.gravity
+            driven = kinematic_work(kinematic, (before, now), means, other_impulses, joint_sums, p.bodies, gravity)
+            account.add(Cause.DRIVES, driven)
+        if joint_sums is not None:
             self._joints(joint_sums, end, fraction, velocity, spin)
 
     def joints_broken(self, indices: IntArray) -> None:

@@ -33,6 +33,7 @@ OWN = frozenset(
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
+        Demand.KINEMATIC,
     }
 )
 
@@ -101,8 +102,12 @@ class PymunkEngine:
             missing.append("half_kick supports gravity only, and the scene has other forces")
         if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
             missing.append("half_kick does not support zones with their own gravity")
+        if settings.half_kick and setup.bodies.kinematic.any():
+            missing.append("half_kick does not support kinematic bodies")
         if scene.drives and scene.attractions:
             missing.append("it does not model attraction and drives together")
+        if setup.bodies.kinematic.any() and scene.attractions:
+            missing.append("it does not model attraction and kinematic bodies together")
         if on_floor(setup):
             missing += unsupported_by_steppers(setup)
         return (*missing, *overload(setup, settings), *size_faults(setup))

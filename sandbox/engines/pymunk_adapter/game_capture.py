@@ -113,7 +113,7 @@ class SpaceCapture:
         self.space, self.dt, self.steps = space, dt, 0
         elements = SpaceElements(space, {}, notes_forces=False)
         captured = scene_of(elements, dt, 10.0, "")
-        self._scene, self._names = captured.scene, elements.names
+        self._scene, self._names, self._is_kinematic = captured.scene, elements.names, elements.is_kinematic
         self._omitted, self._inexact = dict.fromkeys(captured.omitted), dict.fromkeys(captured.inexact)
         self._actions: list[Action] = []
         self._states = {body: MotionState.of(body) for body in self._names}
@@ -191,12 +191,12 @@ class SpaceCapture:
                 continue
             if now.angle != before.angle:
                 self._omitted["angles that the game sets"] = None
-            is_dynamic = body.body_type == pymunk.Body.DYNAMIC
-            if not is_dynamic and now.velocity != before.velocity:
-                self._omitted[f"the motion of {name}, a kinematic body; a scene keeps it at rest"] = None
+            is_moving = body.body_type == pymunk.Body.DYNAMIC or self._is_kinematic(body)
+            if not is_moving and now.velocity != before.velocity:
+                self._omitted[f"the velocity of {name}, which is not in the space"] = None
             x, y = body.local_to_world(body.center_of_gravity) if any(body.center_of_gravity) else now.position
-            velocity = now.velocity if is_dynamic and now.velocity != before.velocity else None
-            is_turned = is_dynamic and now.angular_velocity != before.angular_velocity
+            velocity = now.velocity if is_moving and now.velocity != before.velocity else None
+            is_turned = is_moving and now.angular_velocity != before.angular_velocity
             spin = now.angular_velocity if is_turned else None
             move = Move(time=self.time, body=name, position=(x, y), velocity=velocity, angular_velocity=spin)
             self._actions.append(move)

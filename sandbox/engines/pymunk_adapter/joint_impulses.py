@@ -4,7 +4,7 @@ from typing import NamedTuple, Self, TypeAlias
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.springs import anchors_in_world
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force, relative
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
@@ -134,6 +134,28 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_s
     return JointImpulses(
         motor_links.a, motor_links.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_links))
     )
+
+
+def set_unknown_sums(
+    joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_sums: ImpulseSums, known: BoolArray
+) -> None:
+    """Set the sums on bodies whose changes of momentum do not tell them, from those on the other bodies.
+
+    They are those of the joint impulses that fit the known sums best, by least squares. With redundant joints the split
+    between the joints is arbitrary.
+
+    Args:
+        joints: the joints of the space.
+        position: (N, 2) m.
+        angle: (N,) rad.
+        joint_sums: sum of the impulses of all joints but springs.
+        known: (N,) whether the sum on each body is known.
+    """
+    table, rows = _unit_responses(joints.by_kind.rigid, position, angle), np.repeat(known, 3)
+    unknown = np.linalg.lstsq(table[rows], _stacked(joint_sums)[rows], rcond=None)[0]
+    found = (table[~rows] @ unknown).reshape(-1, 3)
+    others = np.flatnonzero(~known)
+    joint_sums.linear[others], joint_sums.angular[others] = found[:, :2], found[:, 2]
 
 
 def _component_counts(links: JointArrays) -> IntArray:

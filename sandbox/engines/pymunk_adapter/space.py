@@ -129,13 +129,14 @@ class SpaceBodies(SpaceBodyTable):
     def _add(self, index: int, bodies: Bodies, state: list[float]) -> None:
         """Add a body with its state: x, y, angle, vx, vy, ω, mass, moment."""
         x, y, angle, vx, vy, spin, mass, moment = state
-        fixed, name = bool(bodies.fixed[index]), bodies.names[index]
+        fixed, kinematic, name = bool(bodies.fixed[index]), bool(bodies.kinematic[index]), bodies.names[index]
         driven = self.drives.holds(name)
         if driven:
             body = self.drives.body(name, index, bodies, state)
             self._moving += 1
         else:
-            body = pymunk.Body(mass, moment, body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+            kind = pymunk.Body.KINEMATIC if kinematic else pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC
+            body = pymunk.Body(mass, moment, body_type=kind)
             body.position = x, y
             if angle:
                 body.angle = angle
@@ -153,7 +154,7 @@ class SpaceBodies(SpaceBodyTable):
         self._by_name[name], self._name_of[index] = body, name
         if driven:
             self.drives.join(name, index, body, state)
-        elif not fixed:
+        elif not (fixed or kinematic):
             if self.field.attracts:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
@@ -246,7 +247,8 @@ class SpaceBodies(SpaceBodyTable):
             for piece, shape in shapes:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
             needs_moment = matrix.turnable[index] and math.isinf(self.moment(index))
-            if needs_moment and index not in self.drives.indices:
+            is_dynamic = index in self._resting or self._members[index].body.body_type == pymunk.Body.DYNAMIC
+            if needs_moment and is_dynamic and index not in self.drives.indices:
                 self.give_moment(index, float(self._moments[index]))
         if self.drives.driven_bodies:
             self.drives.add_callbacks(self._collision_types)

@@ -485,7 +485,7 @@ class ConvexPipeline(CollisionPipeline):
         length = np.sqrt((displacement[:, :2] ** 2).sum(axis=1))
         if displacement.shape[1] == 3:
             radius = self._store.radius[self.can_touch]
-            if self._store.mounts:
+            if self._store.has_driven:
                 radius = radius + np.hypot(*self._store.hinge[self.can_touch].T)
             length += np.abs(displacement[:, 2]) * radius
         return float(length.max(initial=0.0))
@@ -515,4 +515,4 @@ def is_suitable(pipeline: CollisionPipeline, store: BodyStore) -> bool:
 
 def needs_pieces(store: BodyStore) -> bool:
     """Return whether collisions are detected by convex pieces: not all bodies are discs about their centres."""
-    return store.contact_matrix.solids or len(store.drives) > 0
+    return store.contact_matrix.solids or store.has_driven

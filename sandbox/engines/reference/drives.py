@@ -5,7 +5,8 @@ contacts start there, and its moment of inertia is that about the hinge.
 
 The stops of a hinge are one-sided constraints. If all contacts of a body press it onto its stop as well, it is
 immovable in that substep, because contacts and stop, solved alternately, would not converge in 10 iterations. A body
-moved by a stroke or a plunger is kinematic, and has its planned velocity during the whole substep.
+moved by a stroke or a plunger is kinematic, and has its planned velocity during the whole substep. Bodies that are
+kinematic by themselves keep their velocity.
 """
 
 from abc import ABC, abstractmethod
@@ -45,18 +46,16 @@ STILL = 1e-9
 
 
 class DrivenBody(ABC):
-    """Base class of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `commit`."""
+    """Base class of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `commit`.
 
-    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
-        self.index, self.mount = index, mount
-        self.mass = float(store.bodies.mass[index])
-        self.moment = about_hinge(mount, self.mass, float(store.bodies.moment[index]))
-        """moment of inertia about the hinge, kg·m²"""
+    In states, positions are those of centres of mass, except of bodies on a hinge.
+    """
+
+    def __init__(self, store: BodyStore, index: int) -> None:
+        self.index = index
+        self.mass, self.moment = float(store.bodies.mass[index]), float(store.bodies.moment[index])
+        """mass, kg, and moment of inertia about the point whose position is in states, kg·m²"""
         self.gravity: Point = store.scene.world.gravity
-        self.state: FloatArray = store.drives[mount.number]
-        """(3,) of its drive, as in a frame; written to"""
-        drive = mount.drive
-        self._origin = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
 
     @abstractmethod
     def plan(self, x: State, h: float) -> None:
@@ -81,6 +80,33 @@ class DrivenBody(ABC):
     def commit(self, after: State) -> None:
         """Commit the planned substep, after its contacts are solved."""
 
+    def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
+        """Return position, m, and velocity, m/s, of the centre of mass for poses and rates (N, 3)."""
+        x, y = pose[self.index, :2].tolist()
+        vx, vy = rate[self.index, :2].tolist()
+        return (x, y), (vx, vy)
+
+    def kinetic(self, rate: FloatArray) -> float:
+        """Return the kinetic energy of the body, J, for rates (N, 3)."""
+        vx, vy, spin = rate[self.index].tolist()
+        return 0.5 * float(self.mass * (vx * vx + vy * vy) + self.moment * spin * spin)
+
+    def height(self, pose: FloatArray) -> float:
+        """Return the potential energy in gravity, J, up to a constant."""
+        return -self.mass * float(np.dot(self.gravity, pose[self.index, :2]))
+
+
+class HingedBody(DrivenBody):
+    """A driven body that turns about a hinge, whose position is in states."""
+
+    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
+        super().__init__(store, index)
+        assert isinstance(mount.drive, TorqueDrive | StrokeDrive)
+        self.mount, self._origin = mount, mount.drive.pivot
+        self.moment = about_hinge(mount, self.mass, self.moment)
+        self.state: FloatArray = store.drives[mount.number]
+        """(3,) of its drive, as in a frame; written to"""
+
     def use_hinges(self, x: State) -> None:
         """Replace the centre of mass by the hinge in a state."""
         n = self.index
@@ -103,7 +129,7 @@ class DrivenBody(ABC):
         return -self.mass * (self.gravity[0] * x + self.gravity[1] * y)
 
 
-class HingeMotor(DrivenBody):
+class HingeMotor(HingedBody):
     """A body on a hinge, driven by a torque."""
 
     planned: HingeState
@@ -180,7 +206,7 @@ class HingeMotor(DrivenBody):
         self.state[1] = self.planned.torque
 
 
-class KinematicHinge(DrivenBody):
+class KinematicHinge(HingedBody):
     """A body that turns about a hinge at a prescribed rate."""
 
     def plan(self, x: State, h: float) -> None:
@@ -207,9 +233,11 @@ class DrivenPlunger(DrivenBody):
     """A body that is drawn back along a line and driven forward by a spring."""
 
     def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
-        super().__init__(store, index, mount)
+        super().__init__(store, index)
         assert isinstance(mount.drive, PlungerDrive)
-        self._drive, self._direction = mount.drive, stroke_direction(mount.drive)
+        self._home, self._drive, self._direction = mount.home, mount.drive, stroke_direction(mount.drive)
+        self.state: FloatArray = store.drives[mount.number]
+        """(3,) of its drive, as in a frame; written to"""
 
     def plan(self, x: State, h: float) -> None:
         """Plan the motion by the hand or by the spring, depending on the level."""
@@ -217,15 +245,12 @@ class DrivenPlunger(DrivenBody):
         level, pull, rate = self.state.tolist()
         self._planned = advance_plunger(self._drive, level, pull, rate, h)
 
-    def use_hinges(self, x: State) -> None:
-        """Do nothing: its position is that of the centre."""
-
     def begin(self, x: State) -> None:
         """Write the velocity at the end of the substep, which it has throughout."""
         x[1, self.index, :2] = self._centre_state()[1]
 
     def _centre_state(self) -> tuple[Point, Point]:
-        return plunger_state(self._origin, self._direction, self._planned.pull, self._planned.rate)
+        return plunger_state(self._home, self._direction, self._planned.pull, self._planned.rate)
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep."""
@@ -240,23 +265,29 @@ class DrivenPlunger(DrivenBody):
             after[1, self.index, :2] = 0.0
         self.state[1:] = self._planned.pull, rate
 
-    def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
-        """Return position, m, and velocity, m/s."""
-        x, y = pose[self.index, :2].tolist()
-        vx, vy = rate[self.index, :2].tolist()
-        return (x, y), (vx, vy)
 
-    def kinetic(self, rate: FloatArray) -> float:
-        """Return the kinetic energy of the body, J, for rates (N, 3)."""
-        return 0.5 * self.mass * float(rate[self.index, 0] ** 2 + rate[self.index, 1] ** 2)
+class KinematicBody(DrivenBody):
+    """A body that keeps its velocity and angular velocity."""
 
-    def height(self, pose: FloatArray) -> float:
-        """Return the potential energy in gravity, J, up to a constant."""
-        return -self.mass * float(np.dot(self.gravity, pose[self.index, :2]))
+    def plan(self, x: State, h: float) -> None:
+        """Plan a motion at the present velocities."""
+        self._rate = x[1, self.index].copy()
+        self._end = x[0, self.index] + h * self._rate
+
+    def begin(self, x: State) -> None:
+        """Do nothing: the body has its velocities already."""
+
+    def place(self, moved: State) -> None:
+        """Write the end of the planned substep."""
+        moved[0, self.index], moved[1, self.index] = self._end, self._rate
+
+    def commit(self, after: State) -> None:
+        """Write the end again, without rounding by the solver."""
+        self.place(after)
 
 
 def make_driven_body(store: BodyStore, index: int, mount: Mount) -> DrivenBody:
-    """Return the driven body with an index."""
+    """Return the body with an index, which has a drive."""
     kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
     kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
     return kinds[mount.drive.kind](store, index, mount)
@@ -278,8 +309,10 @@ class Drives:
 
     def __init__(self, store: BodyStore) -> None:
         self._store = store
+        kinematic = np.flatnonzero(store.bodies.kinematic & store.present).tolist()
         self.driven_bodies: list[DrivenBody] = [
-            make_driven_body(store, index, mount) for index, mount in store.mounts.items()
+            *(make_driven_body(store, index, mount) for index, mount in store.mounts.items()),
+            *(KinematicBody(store, index) for index in kinematic),
         ]
         self._hinges = [driven for driven in self.driven_bodies if isinstance(driven, HingeMotor)]
         self._indices: IntArray = np.asarray([driven.index for driven in self.driven_bodies], np.int64)
@@ -296,7 +329,7 @@ class Drives:
     @classmethod
     def of(cls, store: BodyStore, old: Self | None) -> Self | None:
         """Return the drives of the bodies in a body store, with the stop impulses of old ones, or None."""
-        if not store.mounts:
+        if not store.driven.any():
             return None
         new = cls(store)
         stopped = {} if old is None else {hinge.index: hinge for hinge in old._hinges}
@@ -308,7 +341,8 @@ class Drives:
     def use_hinges(self, x: State) -> None:
         """Replace centres of mass by hinges in a state (2, N, 3)."""
         for driven in self.driven_bodies:
-            driven.use_hinges(x)
+            if isinstance(driven, HingedBody):
+                driven.use_hinges(x)
 
     def write_centres(self, x: State) -> None:
         """Write the centres of mass of a state into the body store."""

@@ -60,7 +60,7 @@ class StepEnergyLedger:
         self._inertia = self._all_inertia
         if self._drives is not None:  # the motion of driven bodies is entered separately
             self._inertia = self._all_inertia.copy()
-            self._inertia[list(store.mounts)] = 0.0
+            self._inertia[store.driven] = 0.0
         self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
         self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
         breaks = np.full(len(store.setup.links), np.inf)

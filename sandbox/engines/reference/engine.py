@@ -22,16 +22,20 @@ if TYPE_CHECKING:
 
 
 def _drive_faults(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
-    """Return the demands and settings of a scene with drives that are not supported."""
-    missing = []
+    """Return the demands and settings of a scene with drives or kinematic bodies that are not supported."""
+    missing, driven = [], "drives" if Demand.DRIVES in wanted else "kinematic bodies"
     if settings.detection in ("bisect", "swept"):
-        missing.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
+        missing.append(f"detection {settings.detection!r} does not support {driven}; 'discrete' and 'shrink' do")
     if Demand.ATTRACTION in wanted:
-        missing.append("it does not model attraction and drives together")
+        missing.append(f"it does not model attraction and {driven} together")
     jointed = _fixed_joint_with_drive(setup)
     if jointed is not None:
         body, drive = jointed
         missing.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
+    bodies = setup.bodies
+    kinematic = np.flatnonzero(bodies.kinematic & setup.links.held(len(bodies)))
+    if len(kinematic):
+        missing.append(f"it does not model a joint to {bodies.names[kinematic[0]]!r}, which is kinematic")
     return missing
 
 
@@ -104,6 +108,7 @@ class ReferenceEngine:
         Demand.GROUPS,
         Demand.ZONES,
         Demand.DRIVES,
+        Demand.KINEMATIC,
     }
     knows_impulses: bool = True
     epsilon: float = 2.0**-52
@@ -117,7 +122,7 @@ class ReferenceEngine:
         missing = unmodelled(setup, self.capabilities) + box2d_settings_in(settings)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
-        if Demand.DRIVES in wanted:
+        if wanted & {Demand.DRIVES, Demand.KINEMATIC}:
             missing += _drive_faults(setup, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
             missing.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
@@ -125,8 +130,8 @@ class ReferenceEngine:
             missing.append("stretch applies to joints = 'relaxation' only")
         if settings.half_kick:
             missing.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
-        if settings.impact == "dissipative" and (wanted & CONSTRAINTS or Demand.DRIVES in wanted):
-            missing.append("impact 'dissipative' does not support joints and drives; use 'newton'")
+        if settings.impact == "dissipative" and wanted & (CONSTRAINTS | {Demand.DRIVES, Demand.KINEMATIC}):
+            missing.append("impact 'dissipative' does not support joints, drives and kinematic bodies; use 'newton'")
         if settings.impact == "dissipative" and Demand.SURFACE_SPEED in wanted:
             missing.append("impact 'dissipative' does not support surface speed, which adds energy; use 'newton'")
         if settings.persistence not in (None, 1):

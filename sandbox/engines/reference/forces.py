@@ -23,9 +23,8 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     """
     world = store.scene.world
     moving = store.moving[:, None]
-    if store.mounts:  # their drives apply the forces on them
-        moving = moving.copy()
-        moving[list(store.mounts)] = False
+    if store.has_driven:  # drives apply the forces on their bodies
+        moving = moving & ~store.driven[:, None]
     constant: FloatArray = np.zeros((len(moving), coordinates))
     constant[:, :2] = np.where(moving, store.gravity, 0.0) + store.force * store.inverse_mass[:, None]
     if coordinates == 3:

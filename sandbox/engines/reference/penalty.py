@@ -326,7 +326,7 @@ def smallest_reduced_mass(start: Scene | Setup) -> float:
     """Return the smallest reduced mass, kg, of a pair that can collide; for two equal balls half the mass."""
     setup = Setup.of(start)
     scene, matrix, bodies = setup.scene, contact_matrix(setup), setup.bodies
-    mass, moving, hinged = bodies.mass, ~bodies.fixed, False
+    mass, moving, hinged = bodies.mass, ~(bodies.fixed | bodies.kinematic), False
     if scene.drives:
         mass, moving = mass.copy(), moving.copy()
         for name, mount in mounts(scene).items():

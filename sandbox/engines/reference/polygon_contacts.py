@@ -52,7 +52,7 @@ class WorldPieces:
         self.surface: IntArray = store.contact_matrix.surfaces.of_shape
         self.local: FloatArray = shapes.corner
         self.local_middle: FloatArray = shapes.middle
-        if store.mounts:  # poses are those of hinges
+        if store.has_driven:  # poses are those of hinges
             self.local = shapes.corner - np.repeat(store.hinge[shapes.body], np.diff(shapes.first), axis=0)
             self.local_middle = shapes.middle - store.hinge[shapes.body]
         self.bounding_radius: FloatArray = shapes.bounding_radius
@@ -67,7 +67,7 @@ class WorldPieces:
         self.moves: BoolArray = store.mobile[self.body]
         self.can_touch: BoolArray = store.moving[self.body] & (self.collision_mask > NOTHING)
         self.excluded: IntArray = excluded_pair_keys(store.links)
-        if store.mounts:
+        if store.has_driven:
             self.can_touch = self.can_touch & ~store.kinematic[self.body]
             self.excluded = np.union1d(self.excluded, kinematic_pair_keys(store))
         self.group: IntArray = store.bodies.group

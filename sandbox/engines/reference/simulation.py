@@ -326,6 +326,11 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         """
         if self._settings.detection == "swept" and spec.collides != "none" and not isinstance(spec, Disc):
             raise ActionError("detection 'swept' supports balls only; 'bisect' supports polygons too")
+        if spec.kinematic and self._settings.detection in ("bisect", "swept"):
+            raise ActionError(f"detection {self._settings.detection!r} does not support kinematic bodies")
+        if spec.kinematic and (self._settings.impact == "dissipative" or self.scene.attractions):
+            other = "attraction" if self.scene.attractions else "impact 'dissipative'"
+            raise ActionError(f"reference does not model {other} and kinematic bodies together")
         if self._settings.response == "penalty" and _has_falloff(spec, self.scene):
             raise ActionError("response 'penalty' does not support restitution_falloff; response 'impulse' does")
 

@@ -214,7 +214,7 @@ class WorldState:
     def _turns(self) -> bool:
         """Return whether states need angles: a body turns, or a joint, drive, attraction or thrust may turn it."""
         store = self._store
-        return bool(self._posed or store.mounts or store.inverse_moment.any() or store.angular_velocity.any())
+        return bool(self._posed or store.has_driven or store.inverse_moment.any() or store.angular_velocity.any())
 
     def read_velocities(self) -> bool:
         """Read velocities from the body store after an impulse; return False if `rebuild` is needed instead.

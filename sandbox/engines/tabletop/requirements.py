@@ -60,3 +60,5 @@ def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) 
         yield "it does not model joints, attraction, thrusts or drives on a floor"
     if not bodies.round.all():
         yield "it does not model bodies other than balls on a floor"
+    if bodies.kinematic.any():
+        yield "it does not model kinematic bodies on a floor"

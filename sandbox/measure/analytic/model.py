@@ -49,7 +49,7 @@ class SceneFacts:
     matrix: ContactMatrix
     links: JointArrays
     thrust: BoolArray
-    """(N,) whether a thrust or a drive acts on the body"""
+    """(N,) whether a thrust or a drive acts on the body, or it is kinematic"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -105,9 +105,9 @@ class SceneFacts:
 
 
 def thrust_on(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return on which bodies a thrust or a drive acts, (N,)."""
+    """Return on which bodies a thrust or a drive acts, or which are kinematic, (N,)."""
     movers = [each.body for each in (*scene.thrusts, *scene.drives)]
-    return np.isin(bodies.names, movers) if movers else np.zeros(len(bodies), np.bool_)
+    return bodies.kinematic | np.isin(bodies.names, movers) if movers else bodies.kinematic
 
 
 def direction(vector: FloatArray) -> FloatArray:

@@ -107,7 +107,7 @@ def solution(scene: Scene) -> Solution | None:
     otherwise all are solved together.
     """
     has_filters = len(scene.layers) > 1 or scene.categories or scene.bodies.groups
-    if on_floor(scene) or scene.zones or has_filters:  # no formula includes them
+    if on_floor(scene) or scene.zones or has_filters or scene.bodies.kinematic.any():  # no formula includes them
         return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:

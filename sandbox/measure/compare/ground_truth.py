@@ -65,7 +65,7 @@ METHODS: tuple[dict[str, object], ...] = (
 """Second methods after those of `preferred_settings`: other integrators and other detections of impacts."""
 CHOICES = ("integrator", "detection", "joints", "half_kick")
 """Settings by which two methods of one engine differ."""
-SOURCES = frozenset({Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KICKS, Demand.ZONES})
+SOURCES = frozenset({Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KINEMATIC, Demand.KICKS, Demand.ZONES})
 """Demands that can add energy to a scene, besides wind and emitted bodies."""
 
 

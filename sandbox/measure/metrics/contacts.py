@@ -161,7 +161,7 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
     """
     bodies = scene.bodies
     found = np.zeros(len(run.time))
-    able_bodies, filters = contact_matrix(scene).touches & ~bodies.fixed, collision_filters(scene, bodies)
+    able_bodies, filters = contact_matrix(scene).touches & ~bodies.immovable, collision_filters(scene, bodies)
     all_able = np.flatnonzero(able_bodies)
     for k, plane in enumerate(scene.planes):
         able = np.flatnonzero(able_bodies & filters.meets_fixed(k))
@@ -207,6 +207,6 @@ def _initial_neighbours(scene: Scene) -> list[tuple[int, int]]:
         overlapping = np.hypot(*(bodies.position[i] - bodies.position[j]).T) < bodies.radius[i] + bodies.radius[j]
         for a, b in zip(i[overlapping].tolist(), j[overlapping].tolist(), strict=True):
             pair = (min(a, b), max(a, b))
-            if pair not in apart and not (bodies.fixed[a] and bodies.fixed[b]):
+            if pair not in apart and not (bodies.immovable[a] and bodies.immovable[b]):
                 found.append(pair)
     return sorted(found)[: 4 * MAX_PAIRED_BODIES]

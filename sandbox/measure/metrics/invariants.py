@@ -77,7 +77,8 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
     between moving bodies conserve momentum. None with drag, damping, thrusts, drives, joints or attraction between
     moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired
-    with its momentum; or if the run did not reach its end or ended within a step, whose contacts are not recorded.
+    with its momentum; with kinematic bodies; or if the run did not reach its end or ended within a step, whose contacts
+    are not recorded.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
@@ -86,7 +87,7 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
         return None
     if world.has_drag or world.has_damping or scene.thrusts or scene.drives or _acts_on_static(scene):
         return None
-    if any(zone.holds or zone.gravity is not None for zone in scene.zones):
+    if any(zone.holds or zone.gravity is not None for zone in scene.zones) or bodies.kinematic.any():
         return None
     mass = np.where(bodies.fixed, 0.0, bodies.mass)
     explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]

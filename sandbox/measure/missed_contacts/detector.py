@@ -60,7 +60,8 @@ class Audit:
     inside the body: a passage through it was missed with certainty, so that there are no false alarms, but a contact
     with a corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs
     whose collisions a joint disables, bodies of one group, bodies on different layers or that change their layer within
-    the substep, and bodies that strokes and plungers move through static objects do not count.
+    the substep, and bodies that strokes and plungers move through static objects do not count. Neither do kinematic
+    bodies that pass through static objects or each other.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the number of close pairs.
@@ -174,9 +175,10 @@ class Audit:
         self._part = part = slice(self._offset, int(relevant[-1]) + 1 if len(relevant) else 0)
         self._moves, self._to_all, self._static = moves[part], moving_to_all[part], static[part]
         self._core = bodies.core[part]
-        self._hits_static = self._moves
+        self._immovable = bodies.immovable[part] if bodies.kinematic.any() else None
+        self._hits_static = self._moves & ~bodies.kinematic[part]
         if self._kinematic:  # bodies moved by a stroke or a plunger pass through static objects
-            self._hits_static = self._moves & ~np.isin(bodies.names[part], [*self._kinematic])
+            self._hits_static = self._hits_static & ~np.isin(bodies.names[part], [*self._kinematic])
         self._group = bodies.group[part] if bodies.group.any() else None
         self._smallest_squared = smallest[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._verlet_list = VerletList(self._core, member[part], self._can_collide)
@@ -267,6 +269,8 @@ class Audit:
         able = self._to_all[i] & self._to_all[j]
         able |= self._moves[i] & self._static[j]
         able |= self._static[i] & self._moves[j]
+        if self._immovable is not None:
+            able &= ~(self._immovable[i] & self._immovable[j])
         if self._group is not None:
             able &= (self._group[i] == 0) | (self._group[i] != self._group[j])
         if len(self._apart):

@@ -198,7 +198,7 @@ def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
         return
     bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
     filters = collision_filters(scene, bodies)
-    movers = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    movers = matrix.touches & ~bodies.immovable & (bodies.thin > 0.0)
     found: dict[tuple[str, float], tuple[str, float, int]] = {}
     for index, (plane, name) in enumerate(zip(scene.planes, scene.fixed_names, strict=False)):
         able = np.flatnonzero(movers & filters.meets_fixed(index))

@@ -53,7 +53,7 @@ def initial_contacts(scene: Scene) -> InitialContacts:
         slack = CONTACT_FRACTION * np.minimum(bodies.thin[a], bodies.thin[b])
         away = np.hypot(*(bodies.position[a] - bodies.position[b]).T) - bodies.radius[a] - bodies.radius[b]
         able = filters.meets(a, b) & (away < slack)
-        able &= ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
+        able &= ~(bodies.round[a] & bodies.round[b]) & ~(bodies.immovable[a] & bodies.immovable[b])
         for first, second, limit in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
             examined += 1
             if examined > MAX_PAIRS:

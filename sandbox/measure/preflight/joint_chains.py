@@ -53,7 +53,7 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         return
     bodies, available = scene.bodies, settings.iterations / settings.h
     solver_bias = BIAS if settings.bias is None else settings.bias
-    free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
+    free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
     group_of = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
     for group in np.unique(group_of).tolist():
@@ -61,7 +61,7 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         some = links.some(members)
         bias = float(np.where(np.isnan(some.bias), solver_bias, some.bias).min())  # of the fastest correction
         rate = (1.0 - bias**settings.h) / settings.h
-        inverse = np.where(bodies.fixed, 0.0, 1.0 / bodies.mass)
+        inverse = np.where(bodies.immovable, 0.0, 1.0 / bodies.mass)
         needed = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, inverse)
         if needed <= available * (1.0 + ROUNDING):
             continue
@@ -184,7 +184,7 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     links, depth = scene.links.of(LinkKind.ROD), 0
     if not len(links):
         return
-    is_static = np.append(scene.bodies.fixed, True)  # the world is −1, the last
+    is_static = np.append(scene.bodies.immovable, True)  # the world is −1, the last
     reached = is_static.copy()
     while True:  # one joint farther from the static bodies each time
         next_joints = reached[links.a] ^ reached[links.b]

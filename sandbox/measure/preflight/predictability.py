@@ -57,7 +57,7 @@ def break_notes(scene: Scene) -> Iterator[Diagnostic]:
         return
     matrix = contact_matrix(scene)
     collides_with_all = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
-    balls = np.flatnonzero(collides_with_all & ~bodies.fixed)
+    balls = np.flatnonzero(collides_with_all & ~bodies.immovable)
     if len(balls) < MIN_RACK_BALLS:
         return
     radius = float(bodies.radius[balls].max())
@@ -105,7 +105,7 @@ def event_rate(scene: Scene, matrix: ContactMatrix) -> float:
     rest on another body: without gravity or static objects, or with elastic contacts.
     """
     bodies, pull = scene.bodies, math.hypot(*scene.world.gravity)
-    movers = matrix.touches & ~bodies.fixed
+    movers = matrix.touches & ~bodies.immovable
     count = int(movers.sum())
     if pull == 0.0 or count == 0 or not matrix.mutual or not bodies.round.all() or not scene.fixed:
         return 0.0
@@ -120,7 +120,7 @@ def _columns(scene: Scene) -> int:
     """Return the number of balls that have no ball below them at the start: these come to rest on the ground."""
     bodies = scene.bodies
     down = np.asarray(scene.world.gravity) / math.hypot(*scene.world.gravity)
-    across = bodies.position[~bodies.fixed] @ np.asarray([-down[1], down[0]])
+    across = bodies.position[~bodies.immovable] @ np.asarray([-down[1], down[0]])
     width = 2.0 * float(bodies.radius.min())
     last, columns = -math.inf, 0
     for place in np.sort(across).tolist():
@@ -171,11 +171,11 @@ def lyapunov_time(scene: Scene) -> float | None:
     drag or damping.
     """
     bodies, world, matrix = scene.bodies, scene.world, contact_matrix(scene)
-    movers = matrix.touches & ~bodies.fixed
+    movers = matrix.touches & ~bodies.immovable
     count = int(movers.sum())
     if not matrix.mutual or count < MIN_GAS_BALLS or not bodies.round.all() or len(scene.links) or scene.attractions:
         return None
-    if any(world.gravity) or world.has_drag or world.has_damping:
+    if any(world.gravity) or world.has_drag or world.has_damping or bodies.kinematic.any():
         return None
     area = _area(scene)
     if area is None:

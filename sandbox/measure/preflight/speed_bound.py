@@ -102,6 +102,9 @@ class SpeedBounds:
             found.append("attraction without softening")
         if scene.drives:
             found.append("drives")
+        bodies = scene.bodies
+        if (bodies.kinematic & (bodies.velocity.any(axis=1) | (bodies.angular_velocity != 0.0))).any():
+            found.append("kinematic bodies")
         if self.matrix.moving_surfaces:
             found.append("moving surfaces")
         if len(scene.links.of(LinkKind.MOTOR)):
@@ -117,8 +120,10 @@ class SpeedBounds:
 
     @cached_property
     def start(self) -> FloatArray:
-        """(N,) m/s, speed at the start."""
-        return np.asarray(np.hypot(*self.scene.bodies.velocity.T))
+        """(N,) m/s, speed at the start; of a kinematic body that of its fastest point."""
+        bodies = self.scene.bodies
+        turning = np.where(bodies.kinematic, np.abs(bodies.angular_velocity) * bodies.radius, 0.0)
+        return np.asarray(np.hypot(*bodies.velocity.T) + turning)
 
     @cached_property
     def squared(self) -> FloatArray:
@@ -166,8 +171,9 @@ class SpeedBounds:
     def own(self) -> FloatArray:
         """(N,) m/s, bound by the start, fall and forces of each body.
 
-        It falls from the start until a level floor below it or the end of the run; in scenes with joints or other
-        bodies than balls, also until its tether is taut or it has passed all obstacles.
+        A kinematic body keeps its speed. Others fall from the start until a level floor below them or the end of the
+        run; in scenes with joints or other bodies than balls, also until their tether is taut or they have passed all
+        obstacles.
         """
         scene, bodies = self.scene, self.scene.bodies
         speed = np.sqrt(self.squared) + self.gravity * scene.world.duration
@@ -180,7 +186,7 @@ class SpeedBounds:
                     speed = np.where(~self.matrix.touches, speed, np.minimum(speed, self._speed_after(drop)))
             if len(scene.links) or not bodies.round.all():
                 speed = np.minimum(speed, self._speed_after(np.maximum(self._max_fall(), 0.0)))
-        return self._with_thrust_and_wind(speed)
+        return np.where(bodies.kinematic, self.start, self._with_thrust_and_wind(speed))
 
     def toward(self, thing: Plane | Wall | Post) -> FloatArray:
         """Return the bound by the start, fall and forces of each body at a contact with a static object, (N,) m/s."""
@@ -223,7 +229,7 @@ class SpeedBounds:
         Impacts are limited by the energy of the others. A body that falls past all obstacles causes no further impacts.
         """
         bodies, matrix = self.scene.bodies, self.matrix
-        movers = ~bodies.fixed & matrix.touches
+        movers = ~bodies.immovable & matrix.touches
         own = self.own
         if self.gravity > 0:
             own = np.minimum(own, self._with_thrust_and_wind(self._speed_after(np.maximum(self._max_fall(), 0.0))))

@@ -83,7 +83,7 @@ def _crushed_bodies(
     scene: Scene, settings: Settings, upper: IntArray, lower: IntArray, has: float
 ) -> Iterator[Diagnostic]:
     bodies = scene.bodies
-    able = ~bodies.fixed[upper] & ~bodies.fixed[lower]
+    able = ~bodies.immovable[upper] & ~bodies.immovable[lower]
     if not able.any():
         return
     ratio = np.where(able, bodies.mass[upper] / bodies.mass[lower], 0.0)

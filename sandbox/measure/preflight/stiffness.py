@@ -209,11 +209,11 @@ def fastest_modes(scene: Scene) -> list[SpringMode]:
     links = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
     if not len(links):
         return []
-    free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
+    free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
     label = connected_groups(a, b, len(bodies))
     group_of = label[np.where(b >= 0, b, a)]
-    inverse = np.where(bodies.fixed, 0.0, 1.0) / np.column_stack((bodies.mass, bodies.mass, bodies.moment)).T
+    inverse = np.where(bodies.immovable, 0.0, 1.0) / np.column_stack((bodies.mass, bodies.mass, bodies.moment)).T
     root = np.sqrt(inverse.T)
     found = []
     for group in np.unique(group_of).tolist():
@@ -295,7 +295,7 @@ def orbit_warnings(scene: Scene, settings: Settings, contacts: ContactMatrix) ->
         place = bodies.position[centre] if centre is not None else np.asarray(each.toward)
         away, velocity = bodies.position - place, bodies.velocity
         distance, speed = np.hypot(*away.T), np.hypot(*velocity.T)
-        able = ~bodies.fixed & (distance > 0.0)
+        able = ~bodies.immovable & (distance > 0.0)
         if centre is not None:
             able[centre] = False
         if not able.any():

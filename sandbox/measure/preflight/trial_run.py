@@ -152,7 +152,7 @@ class TrialRun:
     def _penetrations(self) -> Iterator[Diagnostic]:
         """Yield the deepest ball in a plane if its centre was behind the surface."""
         run, bodies = self.run, self.scene.bodies
-        able = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
+        able = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.immovable
         discs = np.flatnonzero(able & (bodies.core > 0.0))
         for thing, name in zip(self.scene.fixed, self.scene.fixed_names, strict=False):
             if not isinstance(thing, Plane) or not len(discs):
@@ -185,6 +185,8 @@ class TrialRun:
         if not any(self.scene.world.gravity) or bodies.round.all() or (bodies.velocity[~bodies.fixed] != 0.0).any():
             return
         if len(self.scene.links) or self.scene.thrusts or self.scene.drives or self.scene.attractions:
+            return
+        if bodies.kinematic.any():
             return
         close = initial_contacts(self.scene)
         stacked = np.unique(np.concatenate((close.first, close.second)))
@@ -234,6 +236,8 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     """
     links = scene.links
     if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
+        return 0.0
+    if scene.bodies.kinematic.any():
         return 0.0
     matrix = contact_matrix(scene)
     if matrix.surfaces.kicks.any() or matrix.moving_surfaces:

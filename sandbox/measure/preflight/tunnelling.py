@@ -17,6 +17,7 @@ from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic, floor_3_d
 from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.filters import collision_filters, reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING
@@ -120,7 +121,7 @@ def tunnelling_risks(scene: Scene, matrix: ContactMatrix | None = None) -> list[
     if not len(movers):
         return []
     speeds = SpeedBounds(scene, matrix)
-    half, struck = bodies.thin[movers], speeds.struck[movers]
+    half, struck, pushable = bodies.thin[movers], speeds.struck[movers], ~bodies.kinematic[movers]
     found: list[TunnellingRisk] = []
 
     def add(able: BoolArray, reach: FloatArray, speed: FloatArray, thing: str) -> None:
@@ -140,12 +141,14 @@ def tunnelling_risks(scene: Scene, matrix: ContactMatrix | None = None) -> list[
     filters = collision_filters(scene, bodies)
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if isinstance(thing, Plane) or thing.solid:
-            add(filters.meets_fixed(k)[movers], half + _half_depth(thing), speeds.toward(thing)[movers], name)
+            add(
+                pushable & filters.meets_fixed(k)[movers], half + _half_depth(thing), speeds.toward(thing)[movers], name
+            )
     fixed = np.flatnonzero(bodies.fixed & matrix.touches)
     if matrix.mutual and len(fixed):
         thinnest = fixed[bodies.thin[fixed].argmin()]
         add(
-            np.ones(len(movers), np.bool_),
+            pushable,
             half + float(bodies.thin[thinnest]),
             speeds.own[movers],
             bodies.names[thinnest],
@@ -191,10 +194,12 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     reach = half[:, None] + half
     only_two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
     closing = unstruck[:, None] + unstruck
-    if only_two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
+    has_forces = scene.attractions or scene.thrusts or is_driven(scene, bodies).any()
+    if only_two and not len(scene.links) and not has_forces:
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
     meets = collision_filters(scene, bodies).meets(number[:, None], number)
+    meets &= ~(bodies.kinematic[number][:, None] & bodies.kinematic[number])
     other, _ = _shortest_safe(reach, np.where(meets, closing, 0.0))
     rows = np.arange(len(number))
     speed = np.where(meets[rows, other], closing[rows, other], 0.0)

@@ -120,9 +120,12 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, damping, friction, damper, thrust, drive or motor, no joint that gives way, and elastic contacts.
+    It has no drag, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way, and
+    elastic contacts.
     """
     if scene.world.has_drag or scene.world.has_damping or scene.thrusts or scene.drives:
+        return False
+    if scene.bodies.kinematic.any():
         return False
     springs, motors = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING), scene.links.of(LinkKind.MOTOR)
     if springs.figures[:, 2].any() or len(motors) or scene.links.is_limited.any():

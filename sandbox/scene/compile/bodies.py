@@ -240,6 +240,16 @@ class Bodies:
         return np.asarray([isinstance(e, Disc) for e in self.elements], dtype=np.bool_)[self.element]
 
     @cached_property
+    def kinematic(self) -> BoolArray:
+        """(N,) whether each moves at its velocity and angular velocity, which no collision or force changes."""
+        return np.asarray([isinstance(e, BodySpec) and e.kinematic for e in self.elements], np.bool_)[self.element]
+
+    @cached_property
+    def immovable(self) -> BoolArray:
+        """(N,) whether nothing can push each: it is fixed or kinematic."""
+        return self.fixed | self.kinematic
+
+    @cached_property
     def all_round(self) -> bool:
         """Whether all bodies are single discs about their centres of mass."""
         return bool(self.round.all())

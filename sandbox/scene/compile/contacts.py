@@ -251,6 +251,8 @@ class Kinds(NamedTuple):
     """(K,)"""
     fixed: BoolArray
     """(K,)"""
+    kinematic: BoolArray
+    """(K,)"""
     to_all: BoolArray
     """(K,) of bodies whose `collides` is `all`"""
     to_any: BoolArray
@@ -292,8 +294,10 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     kinds = _kinds(bodies, surfaces, filters)
     surface, to_all = kinds.surface, kinds.to_all
     moving, static = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
+    pushable = moving & ~kinds.kinematic
     pair = np.outer(moving & to_all, moving & to_all) & ~(np.eye(len(surface), dtype=bool) & kinds.alone)
-    pair |= np.outer(moving, static & to_all) | np.outer(static & to_all, moving)
+    pair &= pushable[:, None] | pushable
+    pair |= np.outer(pushable, static & to_all) | np.outer(static & to_all, pushable)
     pair &= (kinds.layers[:, None] & kinds.layers) != 0
     accepts = (kinds.categories[:, None] & kinds.mask) != 0
     pair &= accepts & accepts.T
@@ -305,7 +309,7 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     has_friction = surfaces.friction > 0
     ground = [
         (
-            moving & (kinds.layers & layers != 0) & (kinds.categories & mask != 0) & (kinds.mask & categories != 0),
+            pushable & (kinds.layers & layers != 0) & (kinds.categories & mask != 0) & (kinds.mask & categories != 0),
             rows,
         )
         for (layers, categories, mask), rows in _equal_colliders(filters)
@@ -376,33 +380,35 @@ def _distinct_rows(*columns: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def _kinds(bodies: Bodies, surfaces: PairTable, filters: CollisionFilters) -> Kinds:
-    """Group pieces by (surface, layers, categories, mask, ball, fixed, collides with all, collides with any)."""
+    """Group pieces by (surface, layers, categories, mask, kinematic, ball, fixed, collides with all, with any)."""
     collides = [element.collides for element in bodies.elements]
     collides_with_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
     collides_with_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
     traits = (
-        bodies.round.astype(np.int64) << 3
+        bodies.kinematic.astype(np.int64) << 4
+        | bodies.round.astype(np.int64) << 3
         | bodies.fixed.astype(np.int64) << 2
         | collides_with_all << 1
         | collides_with_any
     )
     body = _body_of_piece(bodies)
     distinct, row = _distinct_rows(filters.layers, filters.categories, filters.mask)
-    traits |= row << 4
+    traits |= row << 5
     count = max(len(distinct), 1)
-    code = surfaces.of_shape * (count << 4) + (traits if body is None else traits[body])
+    code = surfaces.of_shape * (count << 5) + (traits if body is None else traits[body])
     counts = np.bincount(code if body is None else np.unique(np.column_stack((code, body)), axis=0)[:, 0])
     present = np.flatnonzero(counts)
     row_of = np.zeros(len(counts), np.int64)
     row_of[present] = np.arange(len(present))
-    bits = [(present >> k & 1).astype(bool) for k in range(4)]
-    layers, categories, mask = (distinct[(present >> 4) % count] if len(distinct) else distinct).T
+    bits = [(present >> k & 1).astype(bool) for k in range(5)]
+    layers, categories, mask = (distinct[(present >> 5) % count] if len(distinct) else distinct).T
     return Kinds(
-        surface=(present >> 4) // count,
+        surface=(present >> 5) // count,
         layers=layers,
         categories=categories,
         mask=mask,
         fixed=bits[2],
+        kinematic=bits[4],
         to_all=bits[1],
         to_any=bits[0],
         ball=bits[3],

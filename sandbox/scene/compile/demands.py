@@ -65,6 +65,7 @@ class Demand(StrEnum):
     CATEGORIES = "categories"
     GROUPS = "groups"
     ZONES = "zones"
+    KINEMATIC = "kinematic bodies"
 
 
 BALLS = frozenset(
@@ -186,6 +187,12 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     categories = scene.categories
     yield Demand.CATEGORIES, bool(categories), ", ".join(categories) if categories else "no object names a category"
     yield Demand.GROUPS, bool(bodies.groups), ", ".join(bodies.groups) if bodies.groups else "no body names a group"
+    kinematic = int(bodies.kinematic.sum())
+    yield (
+        Demand.KINEMATIC,
+        kinematic > 0,
+        _count(kinematic, "body is kinematic", "bodies are kinematic", "no body is kinematic"),
+    )
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())

@@ -44,15 +44,15 @@ def mounts(scene: SceneDescription) -> dict[str, Mount]:
 
 
 def is_driven(scene: SceneDescription, bodies: Bodies, *, turning: bool = False) -> BoolArray:
-    """Return which bodies are driven, (N,); optionally only those that rotate."""
+    """Return which bodies have a drive or are kinematic, (N,); optionally only those that can rotate."""
     driven = [drive.body for drive in scene.drives if not (turning and isinstance(drive, PlungerDrive))]
-    return np.isin(bodies.names, driven) if driven else np.zeros(len(bodies), dtype=np.bool_)
+    return bodies.kinematic | np.isin(bodies.names, driven) if driven else bodies.kinematic
 
 
 def is_immovable(scene: SceneDescription, bodies: Bodies) -> BoolArray:
-    """Return which bodies no joint can move, (N,): fixed bodies, and those of a stroke or plunger drive."""
+    """Return which bodies nothing can push, (N,): fixed and kinematic ones, and those of a stroke or plunger drive."""
     prescribed = [drive.body for drive in scene.drives if not isinstance(drive, TorqueDrive)]
-    return bodies.fixed | np.isin(bodies.names, prescribed) if prescribed else bodies.fixed
+    return bodies.immovable | np.isin(bodies.names, prescribed) if prescribed else bodies.immovable
 
 
 def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:

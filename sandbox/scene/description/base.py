@@ -139,6 +139,8 @@ class BodySpec(BodySource):
     """velocity of the centre of mass, m/s"""
     fixed: bool = False
     """Never moves, as if infinitely heavy."""
+    kinematic: bool = False
+    """Moves at its velocity and angular velocity, which no collision or force changes, as if infinitely heavy."""
     moment: Moment | None = None
     """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""
     fixed_rotation: bool = False

@@ -53,8 +53,9 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
             yield ("joint", k, "between"), "all its bodies are fixed; at least one must be able to move"
         elif all(name in index and is_driven[index[name]] for name in joint.between):
             driven = next(name for name in joint.between if not bodies.fixed[index[name]])
-            message = f"no joint can move these bodies: the drive of {driven!r} prescribes its motion"
-            yield ("joint", k, "between"), message
+            is_kinematic = bodies.kinematic[index[driven]]
+            why = f"{driven!r} is kinematic" if is_kinematic else f"the drive of {driven!r} prescribes its motion"
+            yield ("joint", k, "between"), f"no joint can move these bodies: {why}"
         else:
             yield from _check_rod(k, joint, bodies, index)
             yield from _check_pulley(k, joint, bodies, index)
@@ -130,6 +131,8 @@ def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
             yield ("thrust", k, "body"), f"no body is named {thrust.body!r}; {_known(bodies)}"
         elif bodies.fixed[bodies.number_of[thrust.body]]:
             yield ("thrust", k, "body"), f"{thrust.body!r} is fixed and cannot move"
+        elif bodies.kinematic[bodies.number_of[thrust.body]]:
+            yield ("thrust", k, "body"), f"{thrust.body!r} is kinematic; no force changes its motion"
         if thrust.end is not None and thrust.end <= thrust.begin:
             yield ("thrust", k, "end"), "must be later than `begin`"
 
@@ -169,6 +172,8 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
         yield "body", f"{drive.body!r} already has a drive; a body can have one drive only"
     if single.fixed:
         yield "body", f"{drive.body!r} is fixed; remove `fixed`, because the drive holds the body"
+    if single.kinematic:
+        yield "body", f"{drive.body!r} is kinematic; remove `kinematic`, because the drive moves the body"
     if single.fixed_rotation and not isinstance(drive, PlungerDrive):
         yield "body", f"{drive.body!r} has a fixed rotation; remove `fixed_rotation`, because the drive turns the body"
     if any(single.velocity) or single.angular_velocity:
@@ -365,6 +370,8 @@ def _check_shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[Lo
         yield ("shot", k, "ball"), f"{shot.ball!r} is not a single ball"
     elif bodies.fixed[number]:
         yield ("shot", k, "ball"), f"{shot.ball!r} is fixed and cannot move"
+    elif bodies.kinematic[number]:
+        yield ("shot", k, "ball"), f"{shot.ball!r} is kinematic and cannot be struck"
     elif any(math.dist(bodies.position[number], pocket.position) < pocket.radius for pocket in scene.pockets):
         yield ("shot", k, "ball"), f"{shot.ball!r} is in a pocket, where it cannot be struck"
     if any(each.ball == shot.ball for each in scene.shots[:k]):

@@ -173,9 +173,19 @@ def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
         elif not (1e-200 <= moment <= 1e200):
             yield location, f"has a moment of inertia of {moment:g} kg·m²; it must be 1e-200 to 1e200 kg·m²"
     for location, element in _elements(scene):
-        if isinstance(element, BodySpec) and element.fixed and (any(element.velocity) or element.angular_velocity):
-            key = "velocity" if any(element.velocity) else "angular_velocity"
-            yield (*location, key), "a fixed body cannot move; remove this key, or `fixed`"
+        if isinstance(element, BodySpec):
+            yield from (((*location, key), message) for key, message in _check_immovable(element))
+
+
+def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
+    """Yield the keys that a fixed or kinematic body cannot have, with the reasons."""
+    if single.fixed and (any(single.velocity) or single.angular_velocity):
+        key = "velocity" if any(single.velocity) else "angular_velocity"
+        yield key, "a fixed body cannot move; remove this key, or `fixed`"
+    if single.fixed and single.kinematic:
+        yield "kinematic", "cannot be combined with `fixed`; remove one of the two"
+    if single.kinematic and single.fixed_rotation:
+        yield "fixed_rotation", "has no effect on a kinematic body, which nothing turns; remove it"
 
 
 def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:

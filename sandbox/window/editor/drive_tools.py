@@ -121,7 +121,7 @@ def _body_at(scene: Scene, point: Point, tolerance: float, message: str) -> int:
     driven = {drive.body for drive in scene.drives}
     for body in bodies_at(scene, point, tolerance):
         is_single = isinstance(element_at(scene, element_of_body(scene, body)), BodySpec)
-        if is_single and not scene.bodies.fixed[body]:
+        if is_single and not scene.bodies.immovable[body]:
             if scene.bodies.names[body] in driven:
                 raise PlacementError(f"{scene.bodies.names[body]} has a drive already; its properties show it")
             return body

@@ -36,7 +36,7 @@ class ThrustGesture(Gesture):
             PlacementError: there is no body that moves.
         """
         super().__init__(scene)
-        found = [k for k in bodies_at(scene, point, tolerance) if not scene.bodies.fixed[k]]
+        found = [k for k in bodies_at(scene, point, tolerance) if not scene.bodies.immovable[k]]
         if not found:
             raise PlacementError("a thrust needs a body that moves: press on it, and drag the arrow of the force")
         self._body, self.name, self.begin, self.end = found[0], name, point, point

@@ -70,8 +70,8 @@ def joint_changes(
     assert one is not None
     if one == other:
         raise PlacementError("both ends are on the same body; click another body or the world")
-    if other is None and scene.bodies.fixed[one]:
-        raise PlacementError("a fixed body needs no joint to the world; click a body that moves")
+    if other is None and scene.bodies.immovable[one]:
+        raise PlacementError("a fixed or kinematic body needs no joint to the world; click a body that forces move")
     if kind == "gear":
         return _gear(scene, one, other, name)
     names, changes = _names(scene, [one] if other is None else [one, other])
@@ -128,8 +128,8 @@ def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name
     found = bodies_at(scene, end.click, tolerance)[:2]
     if not found:
         raise PlacementError(f"a {kind} needs a body: click a body, or two that lie on each other")
-    if all(scene.bodies.fixed[k] for k in found):
-        raise PlacementError("a fixed body needs no joint to the world; click a body that moves")
+    if all(scene.bodies.immovable[k] for k in found):
+        raise PlacementError("a fixed or kinematic body needs no joint to the world; click a body that forces move")
     found.sort(key=lambda k: (bool(scene.bodies.round[k]), -float(scene.bodies.radius[k])))  # a wheel comes second
     names, changes = _names(scene, found)
     point = [round_value(x) for x in end.anchor]

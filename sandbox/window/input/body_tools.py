@@ -59,7 +59,7 @@ class BodyTools:
     def grab(self, live: LiveView, paused: bool) -> None:
         """Start to drag the selected body at its picked point, which may have moved since.
 
-        While paused, dragging moves the body; otherwise a spring pulls it. A static body cannot be pulled.
+        While paused, dragging moves the body; otherwise a spring pulls it. Fixed and kinematic bodies cannot be pulled.
 
         Raises:
             ActionError: the body cannot be dragged.
@@ -73,7 +73,7 @@ class BodyTools:
         self._moving, self._target = paused, self._pick_position
         if paused:
             self._grip = _rotated(self._offset, float(live.frame.angle[index]) - self._angle)
-        elif live.bodies.fixed[index]:
+        elif live.bodies.immovable[index]:
             return
         else:
             self._grip = _rotated(self._offset, -self._angle)

@@ -36,6 +36,7 @@ def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, body_index: int
             f"ω {format_si(spin, 'rad/s')}",
             f"E kin {format_si(kinetic, 'J')}",
         ]
+        lines += ["kinematic"] if bodies.kinematic[body_index] else []
     lines.insert(1, f"x {format_si(x, 'm')}, {format_si(y, 'm')}")
     lines.append(f"m {format_si(mass, 'kg')}, {_size(bodies, body_index)}")
     if not (bodies.fixed[body_index] or bodies.round[body_index]):  # a disc has I = ½ m r²

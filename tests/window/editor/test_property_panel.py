@@ -394,7 +394,7 @@ def test_click_in_the_edited_text_places_the_caret_and_a_drag_selects() -> None:
 
 
 def test_show_keeps_focus_and_text_while_the_field_exists() -> None:
-    edited = Edited()
+    edited = Edited(size=(1280, 900))
     edited.click("radius")
     edited.type("2")
     edited.panel.show((section(World, {}), section(Ball, {**BALL, "position": [5.0, 5.0], "radius": 0.1})))

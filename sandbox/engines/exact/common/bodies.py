@@ -111,11 +111,13 @@ class EventDrivenBodies(BodyStore):
         """Add a validated body and return its index.
 
         Raises:
-            ActionError: it overlaps another object, is not a ball, has a group, is not supported on a `[surface]`, or
-                the scene would have more different surfaces than allowed.
+            ActionError: it overlaps another object, is not a ball, has a group, is kinematic, is not supported on a
+                `[surface]`, or the scene would have more different surfaces than allowed.
         """
         if single.group is not None:
             raise ActionError("exact does not model groups; pymunk, reference and box2d do")
+        if single.kinematic:
+            raise ActionError("exact does not model kinematic bodies; pymunk, reference and box2d do")
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]

@@ -129,7 +129,7 @@ class Contents:
         bodies = setup.bodies
         self._thrusts = _thrusts_by_body(setup)
         pushed = np.asarray([name in self._thrusts for name in bodies.names], np.bool_)
-        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed)
+        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic)
         self._has_shapes: BoolArray = np.asarray(self._is_in_space & (self._matrix.touches | bodies.fixed))
         self.hidden: IntArray = np.flatnonzero(~self._has_shapes)
         """bodies whose shapes are outside the space, because nothing can touch them"""
@@ -190,15 +190,21 @@ class Contents:
         if bodies.fixed[index]:
             kind = f"fixed {kind}"
             new = "body = pymunk.Body(body_type=pymunk.Body.STATIC)"
+        elif bodies.kinematic[index]:
+            kind = f"kinematic {kind}"
+            new = "body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)"
         else:
             new = "body = pymunk.Body({mass}, {moment})"
             moment = float(bodies.moment[index])
             is_turnable = self._matrix.turnable[index]
             values |= {
-                "velocity": literal(tuple(bodies.velocity[index].tolist())),
-                "angular_velocity": literal(float(bodies.angular_velocity[index])),
                 "mass": literal(float(bodies.mass[index])),
                 "moment": literal(moment if is_turnable else math.inf),
+            }
+        if not bodies.fixed[index]:
+            values |= {
+                "velocity": literal(tuple(bodies.velocity[index].tolist())),
+                "angular_velocity": literal(float(bodies.angular_velocity[index])),
             }
             state += ["body.velocity = {velocity}", "body.angular_velocity = {angular_velocity}"]
         if name in self._thrusts:
