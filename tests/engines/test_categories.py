@@ -142,6 +142,21 @@ def test_tunnelling_is_forecast_only_through_objects_that_can_be_hit() -> None:
     assert "wall-1" not in hit({**wall, "mask": ["player"]})
 
 
+@every_engine
+@pytest.mark.parametrize("mask", [["player"], None], ids=["passes", "hits"])
+def test_passages_that_filters_allow_are_no_missed_contacts(engine: str, mask: list[str] | None) -> None:
+    values = {} if mask is None else {"mask": mask}
+    target = ball(1.0, categories=["shot"], **values)
+    wall = {"points": [[2.0, -1.0], [2.0, 1.0]], **values}
+    plane = {"point": [4.0, 0.0], "normal": [-1.0, 0.0], **values}
+    bullet = ball(0.0, 200.0, categories=["enemy"], mask=["shot", "enemy", "player"])
+    scene = from_document(
+        {"world": {"duration": 0.1}, "solver": {"dt": 0.02}, "ball": [bullet, target], "wall": [wall], "plane": [plane]}
+    )
+    missed = len(sandbox.run(scene, engine, continuous=False if engine == "box2d" else None).missed_time)
+    assert (missed == 0) == (mask is not None)
+
+
 def test_categories_are_kept_in_files() -> None:
     scene = scene_with(
         ball=[ball(0.0, categories=[], mask=["shot", "enemy"])],

@@ -216,8 +216,9 @@ KINEMATIC_SCENE: dict[str, Any] = {
             {"kind": "pivot", "between": ["mill", "c"], "at": [0.4, 3.0]},
             {"kind": "motor", "between": ["lift", "b"], "rate": 5.0, "max_torque": 0.1},
         ],
+        [{"kind": "rod", "between": ["c"], "anchors": [[0.0, 0.0], [0.7, 4.0]]}],
     ],
-    ids=["free", "spring", "rod", "pivot and motor"],
+    ids=["free", "spring", "rod", "pivot and motor", "rod to the world"],
 )
 @pytest.mark.parametrize("fraction", [None, 0.3])
 def test_ledger_closes_with_kinematic_bodies(joints: list[dict[str, Any]], fraction: float | None) -> None:

@@ -221,7 +221,9 @@ def kinematic_work(
     sums.angular[indices] = bodies.moment[indices] * (now.spin - before.spin)[indices]
     for each in other_impulses:
         sums.subtract(each)
-    work = sums.work(velocity, spin) - (0.0 if joint_sums is None else joint_sums._replace(joined=indices).work(*means))
+    work = sums.work(velocity, spin)
+    if joint_sums is not None:
+        work -= joint_sums._replace(joined=np.intersect1d(indices, joint_sums.joined)).work(velocity, spin)
     rise = (before.position - now.position)[indices] @ np.asarray(gravity)
     return work + float(bodies.mass[indices] @ rise)
 

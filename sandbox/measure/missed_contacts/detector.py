@@ -16,6 +16,7 @@ from sandbox.measure.missed_contacts.swept_geometry import CLEAR, DEEP, JUMP, ap
 from sandbox.measure.missed_contacts.verlet_list import VerletList
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.derived import derived_once
+from sandbox.scene.compile.filters import collision_filters
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 
@@ -59,9 +60,9 @@ class Audit:
     This is exact for discs. Of any other body, the radius is `Bodies.core`, the largest disc about the centre of mass
     inside the body: a passage through it was missed with certainty, so that there are no false alarms, but a contact
     with a corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs
-    whose collisions a joint disables, bodies of one group, bodies on different layers or that change their layer within
-    the substep, and bodies that strokes and plungers move through static objects do not count. Neither do kinematic
-    bodies that pass through static objects or each other.
+    whose collisions a joint or their categories disable, bodies of one group, bodies on different layers or that change
+    their layer within the substep, and bodies that strokes and plungers move through static objects do not count.
+    Neither do kinematic bodies that pass through static objects or each other.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the number of close pairs.
@@ -70,6 +71,7 @@ class Audit:
     def __init__(self, start: Scene | Setup, bodies: Bodies | None = None) -> None:
         setup = Setup.of(start)
         scene = setup.scene
+        self._scene = scene
         self._static_geometry = _static_geometry(setup)
         self._apart = setup.links.apart()
         self._kinematic = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
@@ -97,6 +99,7 @@ class Audit:
             bodies: all bodies.
         """
         self._examine()
+        self._scene = scene
         self._static_geometry = StaticGeometry.of(scene)
         self._classify_bodies(bodies)
 
@@ -180,6 +183,7 @@ class Audit:
         if self._kinematic:  # bodies moved by a stroke or a plunger pass through static objects
             self._hits_static = self._hits_static & ~np.isin(bodies.names[part], [*self._kinematic])
         self._group = bodies.group[part] if bodies.group.any() else None
+        self._filters = collision_filters(self._scene, bodies) if self._scene.categories else None
         self._smallest_squared = smallest[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._verlet_list = VerletList(self._core, member[part], self._can_collide)
 
@@ -262,7 +266,7 @@ class Audit:
         when, body = np.nonzero(fast & self._hits_static)
         on = layer_bits[when, body] if len(layer_bits) else None
         paths = SweptCircles(when, body + self._offset, start[when, body], end[when, body], self._core[body], on)
-        return self._static_geometry.missed(paths, self._history)
+        return self._static_geometry.missed(paths, self._history, self._filters)
 
     def _can_collide(self, i: IntArray, j: IntArray) -> BoolArray:
         """Return which pairs of bodies can collide."""
@@ -273,6 +277,8 @@ class Audit:
             able &= ~(self._immovable[i] & self._immovable[j])
         if self._group is not None:
             able &= (self._group[i] == 0) | (self._group[i] != self._group[j])
+        if self._filters is not None:
+            able &= self._filters.share_categories(i + self._offset, j + self._offset)
         if len(self._apart):
             pair = pair_keys(np.minimum(i, j) + self._offset, np.maximum(i, j) + self._offset)
             able &= ~np.isin(pair, pair_keys(*self._apart.T))

@@ -18,6 +18,7 @@ from sandbox.measure.missed_contacts.swept_geometry import (
     closest_to_segment,
     dot,
 )
+from sandbox.scene.compile.filters import CollisionFilters
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
@@ -109,23 +110,28 @@ class StaticGeometry:
     def __len__(self) -> int:
         return len(self.point) + len(self.tail)
 
-    def missed(self, paths: SweptCircles, history: ContactHistory) -> tuple[IntArray, IntArray]:
+    def missed(
+        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None = None
+    ) -> tuple[IntArray, IntArray]:
         """Return substeps (M,) and pairs (M, 2) that missed a contact, as `Audit` defines it.
 
         Args:
             paths: paths of the circles.
             history: contacts that the engine found; entry k precedes substep k.
+            filters: of the bodies and static objects, if some belong to collision categories.
         """
         found = [(np.empty(0, np.int64), np.empty((0, 2), np.int64))]
         parts = len(paths.body) * max(len(self.point), len(self.tail)) // CHUNK + 1
         for part in np.array_split(np.arange(len(paths.body)), parts):
             if len(part) and len(self.point):
-                found.append(self._planes(paths.some(part), history))
+                found.append(self._planes(paths.some(part), history, filters))
             if len(part) and len(self.tail):
-                found.append(self._walls(paths.some(part), history))
+                found.append(self._walls(paths.some(part), history, filters))
         return np.concatenate([when for when, _ in found]), np.concatenate([pair for _, pair in found])
 
-    def _planes(self, paths: SweptCircles, history: ContactHistory) -> tuple[IntArray, IntArray]:
+    def _planes(
+        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None
+    ) -> tuple[IntArray, IntArray]:
         # Most bodies clearly end above; one product finds them, with more rounding.
         above = paths.end @ self.normal.T - dot(self.point, self.normal)
         rounding = 1e-12 * (np.abs(paths.end).max() + np.abs(self.point).max())
@@ -140,14 +146,18 @@ class StaticGeometry:
         entered &= (dot(move, move) >= (JUMP * paths.radius) ** 2)[:, None]
         if paths.on is not None:
             entered &= (paths.on[:, None] & self.plane_layers) != 0
+        if filters is not None:
+            entered &= filters.share_categories_with_fixed(paths.body[:, None], np.arange(len(self.point)))
         i, plane = np.nonzero(entered)
         when, pair = paths.when[i], np.column_stack((paths.body[i], -1 - plane))
         in_time = history.found(when + 1, pair) & (last[i, plane] >= -BACKING)
         missed = ~in_time & ~history.found(when, pair)
         return when[missed], pair[missed]
 
-    def _walls(self, paths: SweptCircles, history: ContactHistory) -> tuple[IntArray, IntArray]:
-        i, s = self._in_reach(paths)
+    def _walls(
+        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None
+    ) -> tuple[IntArray, IntArray]:
+        i, s = self._in_reach(paths, filters)
         tail, along, contact = self.tail[s], self.along[s], paths.radius[i] + self.half[s]
         here, there = paths.start[i], paths.end[i]
         nearest2, crossed = closest_to_segment(here, there, tail, along)
@@ -177,7 +187,7 @@ class StaticGeometry:
         missed = through | (entered & ~in_time)
         return when[missed], pair[missed]
 
-    def _in_reach(self, paths: SweptCircles) -> tuple[IntArray, IntArray]:
+    def _in_reach(self, paths: SweptCircles, filters: CollisionFilters | None) -> tuple[IntArray, IntArray]:
         """Return paths and segments, (K,) each, that can be in contact on a path that can skip a test."""
         middle = self.tail + 0.5 * self.along
         size = 0.5 * np.sqrt(dot(self.along, self.along)) + self.half
@@ -190,6 +200,8 @@ class StaticGeometry:
         is_near &= length2[:, None] >= (JUMP * (paths.radius[:, None] + self.half)) ** 2
         if paths.on is not None:
             is_near &= (paths.on[:, None] & self.layers) != 0
+        if filters is not None:
+            is_near &= filters.share_categories_with_fixed(paths.body[:, None], -1 - self.number)
         i, s = np.nonzero(is_near)
         first = offset_from_segment(paths.start[i], self.tail[s], self.along[s])
         reach = paths.radius[i] + self.half[s] + np.sqrt(length2[i])
