@@ -207,6 +207,12 @@ def test_spawned_bodies_collide_by_their_categories(engine: str) -> None:
     assert simulation.frame().velocity[0, 0] == pytest.approx(2.0, abs=1e-5)  # 32-bit rounding in Box2D
 
 
+@pytest.mark.parametrize("key", ["categories", "mask"])
+def test_categories_that_are_no_list_are_refused_with_an_example(key: str) -> None:
+    with pytest.raises(SceneError, match=r'must be an array of names, such as \["a", "b"\], is "all"'):
+        from_document({"ball": [ball(0.0, **{key: "all"})]})
+
+
 def test_a_surface_has_no_categories() -> None:
     with pytest.raises(SceneError, match=r"has a \[surface\] and the category 'player'"):
         from_document({"surface": {"sliding_friction": 0.2}, "ball": [ball(0.0, categories=["player"])]})

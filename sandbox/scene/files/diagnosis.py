@@ -44,6 +44,9 @@ _LARGE = 1e5
 """Bounds beyond this only protect the engines from extreme values: a message states such a bound only if it is the
 violated one. The same holds for a smallest positive value below its reciprocal."""
 
+_NAME_LISTS = ("categories", "mask", "layers")
+"""Keys whose values are lists of names"""
+
 _DEGREES = 720
 """Largest magnitude, two turns, that may be an angle given in degrees by mistake."""
 
@@ -79,6 +82,8 @@ def explain(details: Any) -> LocatedMessage:
         expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
     elif kind == "tuple_type" and len(location) == 1:
         expected = f"tables, each under a heading [[{location[0]}]]"
+    elif kind == "tuple_type" and location[-1] in _NAME_LISTS:
+        expected = 'an array of names, such as ["a", "b"]'
     elif kind in ("model_type", "model_attributes_type") and location[-1] == "kick":
         expected = "a table, such as { speed = 3.0 }"
     elif location[:1] == ("joint",) and location[-1] == "between":
