@@ -55,12 +55,15 @@ class SpaceBodyTable:
             self._members[index].body.moment = moment
 
     def set_position(self, index: int, position: FloatArray) -> None:
-        """Set the position of a body that is not static, m.
+        """Set the position of a body, m.
 
-        The next step updates the tree of its shapes. To do it here would change the order of contacts, compared with a
-        game that sets `body.position`.
+        The next step updates the tree of shapes that are not static. To do it here would change the order of contacts,
+        compared with a game that sets `body.position`.
         """
-        self._members[index].body.position = float(position[0]), float(position[1])
+        body = self._members[index].body
+        body.position = float(position[0]), float(position[1])
+        if body.body_type == pymunk.Body.STATIC:
+            self._space.reindex_shapes_for_body(body)
         self._state = None
 
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
