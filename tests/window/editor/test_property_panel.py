@@ -25,8 +25,8 @@ SIZE = (1280, 720)
 BALL = {"name": "cue", "position": [0.0, 1.5], "radius": 0.05, "restitution": 0.8}
 TYPED_OF_BALL = [
     "name", "material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour", "categories",
-    "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment", "group", "radius",
-    "spin",
+    "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment", "group",
+    "radius", "spin",
 ]  # fmt: skip
 
 
