@@ -82,6 +82,9 @@ def category_bits(colliders: Sequence[Collider], known: tuple[str, ...]) -> tupl
 
     A scene without categories has a single one, to which all belong.
     """
+    if not known:
+        every = np.ones(len(colliders), np.int64)
+        return every, every
     bits = np.asarray([bits_of_categories(each, known) for each in colliders], np.int64).reshape(-1, 2)
     return bits[:, 0], bits[:, 1]
 

@@ -217,7 +217,10 @@ class JointArrays:
 
     def turned(self, count: int) -> BoolArray:
         """Return which of `count` bodies a joint can rotate."""
-        found, turns = np.zeros(count, np.bool_), self.turns
+        found = np.zeros(count, np.bool_)
+        if not len(self):
+            return found
+        turns = self.turns
         found[self.a[turns[:, 0]]] = True
         found[self.b[turns[:, 1]]] = True
         return found
