@@ -9,7 +9,7 @@ from sandbox.engines.registry import ENGINES
 from sandbox.measure.preflight import FAILED, Diagnostic
 from sandbox.measure.preflight.checks import CHECKS, Check
 from sandbox.measure.run.runner import run
-from sandbox.scene.compile.demands import JOINTS, Demand
+from sandbox.scene.compile.demands import JOINT_LIMITS, JOINTS, Demand
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
 from tests.cli.calling import DROP, FAULTY, json_of, lines_of, write_scene
@@ -98,7 +98,9 @@ def test_demands_and_engines_are_printed_one_per_line(tmp_path: Path, capfd: pyt
     scene = write_scene(tmp_path)
     status, out, err = lines_of(capfd, "check", scene)
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
-    engines_begin = 1 + len(Demand) - len(JOINTS) + 1  # all kinds of joints are one line if the scene has none
+    engines_begin = (
+        1 + len(Demand) - len(JOINTS | JOINT_LIMITS) + 1
+    )  # all kinds of joints are one line if the scene has none
     marks = {line.split()[1]: line.split()[0] for line in out[1:engines_begin]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
     assert out[engines_begin : engines_begin + len(ENGINES)] == [

@@ -497,7 +497,7 @@ def test_space_is_not_changed() -> None:
 
 
 EXAMPLES = (
-    *("balls_and_lines", "box2d_pyramid", "breakout", "camera", "constraints", "copy_and_pickle"),
+    *("balls_and_lines", "box2d_pyramid", "camera", "constraints", "copy_and_pickle"),
     *("damped_rotary_spring_pointer", "deformable", "flipper", "planet", "platformer", "playground"),
     *("shapes_for_draw_demos", "slide_and_pinjoint", "tank"),
 )

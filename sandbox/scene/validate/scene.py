@@ -52,7 +52,8 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_zones(scene)
     if len(scene.layers) > 1:
         found += check_layers(scene)
-    found += check_categories(scene)
+    if scene.categories:
+        found += check_categories(scene)
     found += [*shapeless, *_check_world(scene)]
     if shapeless:  # the other checks need the bodies
         return [*found, *_check_names_only(scene, {location[:2] for location, _ in shapeless})]
