@@ -412,3 +412,10 @@ def test_complete_run_with_other_values_is_refused(
     damage(arrays)
     np.savez_compressed(path, **arrays)
     assert message in refusal(path)
+
+
+def test_run_whose_steps_miss_the_duration_by_rounding_is_loaded(tmp_path: Path) -> None:
+    text = "[world]\nduration = 0.4166666666666667\n[solver]\ndt = 0.016666666666666684\n"
+    found = run(loads(text + "[[ball]]\nposition = [0, 0]\nradius = 1\nvelocity = [1, 0]\n"), "pymunk")
+    assert found.time[-1] != 25 * found.info["settings"]["dt"]  # by 4e-16 s
+    assert Trajectory.load(found.save(tmp_path / "run.npz")).time[-1] == found.time[-1]
