@@ -46,8 +46,8 @@ PAGES = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 WINDOWS = ("play", "replay")
 EXIT = re.compile(r"\s+# exits with (\d+)$")
-COMPILING = re.compile(r"^compiling .*\n", re.MULTILINE)
-"""Line that is printed once, at the first compilation of kernels."""
+BY_TIME = re.compile(r"^(compiling .*|[\d,]+ of [\d,]+ runs done; .*)\n", re.MULTILINE)
+"""Lines that depend on time: at the first compilation of kernels, and every ten seconds of a command."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def _command(example: Example, line: str, output: str | None, folder: Path) -> I
     )
     if done.returncode != status:
         yield f"{example.location}: {line}\nexited with {done.returncode}, not {status}\n{done.stderr[-2000:]}"
-    elif output is not None and not _same(output, printed := done.stdout + COMPILING.sub("", done.stderr)):
+    elif output is not None and not _same(output, printed := done.stdout + BY_TIME.sub("", done.stderr)):
         yield f"{example.location}: {line}\nexpected\n{output}\nprinted\n{printed}"
 
 
