@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from sandbox.echo import short_repr
-from sandbox.levels.safe_xml import refuse
-from sandbox.resource_limits import SESSION_SIZE, read_limited
+from sandbox.levels.level_files import read_text, refuse
+from sandbox.resource_limits import SESSION_SIZE
 from sandbox.scene.errors import quoted
 from sandbox.scene.files.document import NestingError, check_text
 
@@ -99,16 +99,7 @@ def read_json(path: Path, file: str) -> JsonNode:
     Raises:
         SceneError: the file cannot be read, is larger than `SESSION_SIZE`, or is no JSON.
     """
-    try:
-        content = read_limited(path, SESSION_SIZE.value)
-    except OSError as error:
-        refuse(file, f"cannot be read: {error.strerror or error}")
-    except ValueError:
-        refuse(file, f"is too large: {SESSION_SIZE.remedy(2 * SESSION_SIZE.value)}")
-    try:
-        return parse_json(content.decode("utf-8-sig"), file)
-    except UnicodeDecodeError:
-        refuse(file, "is not UTF-8 text")
+    return parse_json(read_text(path, file, SESSION_SIZE), file)
 
 
 def parse_json(text: str, file: str) -> JsonNode:

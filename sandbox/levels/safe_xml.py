@@ -5,13 +5,12 @@ Entities are refused, so that nothing expands (billion laughs) and nothing is fe
 """
 
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import NoReturn
 from xml.parsers import expat
 
 from sandbox.echo import short_repr
-from sandbox.resource_limits import FILE_SIZE, read_limited
-from sandbox.scene.errors import Fault, SceneError
+from sandbox.levels.level_files import refuse
+from sandbox.resource_limits import FILE_SIZE
 
 MAX_XML_ELEMENTS = 200_000
 """Elements of a file; they are read in a second."""
@@ -47,36 +46,6 @@ class XmlNode:
     def find_all(self, tag: str) -> list["XmlNode"]:
         """Return the children with this tag."""
         return [child for child in self.children if child.tag == tag]
-
-
-def refuse(file: str, message: str, line: int | None = None, path: str = "") -> NoReturn:
-    """Raise a `SceneError` with one fault."""
-    raise SceneError([Fault(file, line, path, message)])
-
-
-def read_text(path: Path, file: str) -> str:
-    """Return the text of a file.
-
-    Args:
-        path: path of the file.
-        file: its name in faults.
-
-    Raises:
-        SceneError: it cannot be read, is larger than `FILE_SIZE`, or is not UTF-8 text.
-    """
-    try:
-        content = read_limited(path, FILE_SIZE.value)
-    except OSError as error:
-        refuse(file, f"cannot be read: {error.strerror or error}")
-    except ValueError:
-        refuse(file, f"is too large: {FILE_SIZE.remedy(2 * FILE_SIZE.value)}")
-    if content[:2] == b"\x1f\x8b":
-        refuse(file, "is compressed; save it as plain text: .svg instead of .svgz, .tmx instead of .tmx.gz")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        refuse(file, "is not UTF-8 text; Inkscape and Tiled write UTF-8", line)
 
 
 def parse_xml(text: str, file: str) -> XmlNode:

@@ -22,6 +22,7 @@ from sandbox.levels.builder import (
     normal_key,
     role_of_words,
 )
+from sandbox.levels.level_files import read_text, refuse
 from sandbox.levels.outlines import (
     Affine,
     LevelShape,
@@ -34,7 +35,7 @@ from sandbox.levels.outlines import (
     rectangle_shape,
     translation,
 )
-from sandbox.levels.safe_xml import MAX_XML_ELEMENTS, XmlNode, parse_xml, read_text, refuse
+from sandbox.levels.safe_xml import MAX_XML_ELEMENTS, XmlNode, parse_xml
 from sandbox.levels.scene_text import LevelElement
 from sandbox.levels.svg_paths import PathError, Subpath, subpaths
 from sandbox.levels.svg_values import (

@@ -26,6 +26,7 @@ from sandbox.levels.builder import (
     normal_key,
     role_of_words,
 )
+from sandbox.levels.level_files import read_text, refuse
 from sandbox.levels.outlines import (
     Affine,
     CircleShape,
@@ -39,7 +40,7 @@ from sandbox.levels.outlines import (
     rotation,
     translation,
 )
-from sandbox.levels.safe_xml import XmlNode, parse_xml, read_text, refuse
+from sandbox.levels.safe_xml import XmlNode, parse_xml
 from sandbox.levels.scene_text import LevelElement
 from sandbox.levels.tables import LevelRole
 from sandbox.levels.tiled_values import (

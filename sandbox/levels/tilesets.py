@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from sandbox.levels.level_files import read_text
 from sandbox.levels.outlines import Affine, TileRectangle
-from sandbox.levels.safe_xml import XmlNode, parse_xml, read_text
+from sandbox.levels.safe_xml import XmlNode, parse_xml
 from sandbox.levels.tiled_values import TiledError, integer_of, number_of, tile_size_of
 from sandbox.scene.description.base import Point
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.filters import bits_of
+from sandbox.scene.compile.filters import bits_of_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import mask_of
 from sandbox.scene.geometry.neighbours import near_pairs
@@ -215,7 +215,7 @@ def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
     count = min(len(position), len(bodies))
     radius, is_disc = bodies.radius[: len(position)], bodies.round[:count]
     found, layers = np.zeros(len(position), np.bool_), scene.layers
-    layer_bits = bits_of(frame.layer, len(position))
+    layer_bits = bits_of_layers(frame.layer, len(position))
     is_valid = present & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
     solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(is_valid & ~is_disc).tolist()}
     with np.errstate(all="ignore"):
@@ -279,7 +279,7 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
     solid = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element[:count]]
     with np.errstate(all="ignore"):
         is_near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
-    is_near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
+    is_near &= frame.present[:count] & solid & (bits_of_layers(frame.layer, count) & bit != 0)
     others = [hull for number in np.flatnonzero(is_near).tolist() for hull in hulls_of(bodies, frame, number)]
     return all(hull_gap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
 

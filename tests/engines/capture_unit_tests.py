@@ -8,8 +8,9 @@ spaces matter.
 import json
 import sys
 import unittest
-from collections import Counter
+from collections.abc import Callable, Iterator
 from typing import Any
+from unittest.mock import patch
 
 import pymunk
 import pymunk.tests
@@ -28,30 +29,40 @@ def main() -> None:
     """Run the unit tests and print the rows."""
     rows: list[tuple[str, float | None, bool]] = []
     seen: set[pymunk.Space] = set()
-    count: Counter[str] = Counter()
-    running = ""
+    for test in unit_tests():
+        name = test.id().removeprefix("pymunk.tests.")
+        with patch.object(pymunk.Space, "step", examining_step(name, rows, seen)):
+            test.run(unittest.TestResult())
+    sys.stdout.write(json.dumps(rows))
 
-    class Result(unittest.TestResult):
-        def startTest(self, test: unittest.TestCase) -> None:  # noqa: N802, name of unittest
-            nonlocal running
-            running = test.id().removeprefix("pymunk.tests.")
-            super().startTest(test)
+
+def unit_tests() -> Iterator[unittest.TestCase]:
+    """Yield the unit tests of pymunk."""
+    suites: list[Any] = [unittest.defaultTestLoader.loadTestsFromName(f"pymunk.tests.test_{name}") for name in MODULES]
+    while suites:
+        each = suites.pop(0)
+        if isinstance(each, unittest.TestCase):
+            yield each
+        else:
+            suites = [*each, *suites]
+
+
+def examining_step(
+    name: str, rows: list[tuple[str, float | None, bool]], seen: set[pymunk.Space]
+) -> Callable[[pymunk.Space, float], None]:
+    """Return a `Space.step` that examines spaces before their first step, and adds a row for each."""
+    count = 0
 
     def step(self: pymunk.Space, dt: float) -> None:
-        if self not in seen and count[running] < SPACES_PER_TEST:
+        nonlocal count
+        if self not in seen and count < SPACES_PER_TEST:
             seen.add(self)
-            count[running] += 1
-            setattr(pymunk.Space, "step", STEP)  # noqa: B010, a method
-            try:
-                rows.append((running, *examine(self)))
-            finally:
-                setattr(pymunk.Space, "step", step)  # noqa: B010
+            count += 1
+            with patch.object(pymunk.Space, "step", STEP):
+                rows.append((name, *examine(self)))
         STEP(self, dt)
 
-    setattr(pymunk.Space, "step", step)  # noqa: B010
-    load = unittest.defaultTestLoader.loadTestsFromName
-    unittest.TestSuite(load(f"pymunk.tests.test_{name}") for name in MODULES).run(Result())
-    sys.stdout.write(json.dumps(rows))
+    return step
 
 
 def examine(space: pymunk.Space) -> tuple[float | None, bool]:

@@ -15,7 +15,7 @@ from sandbox.engines.contract import Refusal
 from sandbox.measure.metrics.contacts import max_penetration
 from sandbox.measure.preflight.checks import warnings
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
@@ -104,7 +104,7 @@ def test_bits_of_engines_state_the_relation_of_the_contact_matrix(
     matrix, bodies = contact_matrix(scene), scene.bodies
     bits = [bits_of_body(scene, bodies, k, int(bodies.layer[k])) for k in range(len(balls))]
     static = [bits_of_static(scene, each) for each in scene.walls]
-    meets = collision_filters(scene, bodies)
+    meets = filter_table(scene, bodies)
     for i in range(len(balls)):
         for j in range(i + 1, len(balls)):
             by_bits = bool(bits[i][0] & bits[j][1]) and bool(bits[j][0] & bits[i][1])

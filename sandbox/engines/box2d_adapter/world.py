@@ -32,7 +32,7 @@ from sandbox.engines.box2d_adapter.materials import ShapeMaterials, shape_materi
 from sandbox.engines.box2d_adapter.requirements import surfaces_in_use
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.colliders import wall_segments
-from sandbox.engines.common.collision_bits import bits_of_body, bits_of_static, collision_bits
+from sandbox.engines.common.collision_bits import bits_of_body, bits_of_static, static_categories
 from sandbox.engines.common.contact_log import ContactBatch
 from sandbox.scene.description.base import BACKING
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
@@ -242,9 +242,7 @@ class Box2DWorld:
             return [ShapeRole(categories, mask, "static")]
         if not self._materials.is_split:
             return [ShapeRole(categories, mask, "against_moving")]
-        count = len(store.scene.categories)
-        every_layer, every_category = (1 << len(store.scene.layers)) - 1, (1 << max(count, 1)) - 1
-        static, _ = collision_bits(True, "all", every_layer, every_category, count=count)
+        static = static_categories(store.scene)
         roles = (
             ShapeRole(categories, mask & static, "against_static"),
             ShapeRole(categories, mask & ~static, "against_moving"),

@@ -66,6 +66,12 @@ def _ones(bits: int) -> Iterator[int]:
     return (k for k in range(bits.bit_length()) if bits >> k & 1)
 
 
+def static_categories(scene: SceneDescription) -> int:
+    """Return all categories that static objects of a scene can have."""
+    layers, categories = len(scene.layers), max(len(scene.categories), 1)
+    return _repeated(STATIC, (1 << layers) - 1, (1 << categories) - 1, categories)
+
+
 def too_many_categories(scene: SceneDescription, max_bits: int) -> list[str]:
     """Return why the filters of an engine have too few bits for a scene; nothing if they have enough."""
     layers, categories = len(scene.layers), max(len(scene.categories), 1)

@@ -16,7 +16,7 @@ from sandbox.engines.common.actions import derive_contacts, has_same_bodies
 from sandbox.engines.common.lifetimes import NO_BODIES
 from sandbox.engines.common.zones import ZoneTracker
 from sandbox.engines.pymunk_adapter.particles import Particles
-from sandbox.engines.pymunk_adapter.requirements import air_faults
+from sandbox.engines.pymunk_adapter.requirements import combination_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.bodies import Bodies
@@ -295,7 +295,7 @@ class PymunkBodies:
             ActionError: the settings or the engine do not support the change.
         """
         scene = setup.scene
-        if faults := air_faults(scene, self._half_kick > 0.0):
+        if faults := combination_faults(scene, self._half_kick > 0.0, bool(self.bodies.kinematic.any())):
             raise ActionError(faults[0])
         bodies, matrix = self.bodies, self._contact_matrix
         same_bodies = spawned is None and has_same_bodies(scene, self.scene)
@@ -332,9 +332,8 @@ class PymunkBodies:
         bodies = self.bodies.joined_by(single, name)
         if self.tabletop is not None and (reason := next(unsupported_by_steppers(self.setup, bodies), None)):
             raise ActionError(reason)
-        if single.kinematic and (self._half_kick or scene.attractions):
-            other = "half_kick" if self._half_kick else "attraction"
-            raise ActionError(f"pymunk does not model {other} and kinematic bodies together")
+        if faults := combination_faults(scene, self._half_kick > 0.0, bool(bodies.kinematic.any())):
+            raise ActionError(f"pymunk: {faults[0]}")
         matrix = derive_contacts(self.setup, bodies)
         self.refresh()
         index = len(self.bodies)

@@ -11,28 +11,25 @@ rounding.
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import pymunk
 
 from sandbox.engines.common.base import BIAS
-from sandbox.engines.common.collision_bits import KINDS
-from sandbox.engines.pymunk_adapter.engine import FILTER_BITS, PERSISTENCE
+from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
+from sandbox.engines.pymunk_adapter.shape_filters import MAX_CATEGORIES, FilterKind, SceneFilters
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import MAX_SPEED, Collides
+from sandbox.scene.description.base import MAX_SPEED
 from sandbox.scene.editing.elements import unique_name
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
 KeyValues: TypeAlias = dict[str, Any]
-MAX_CATEGORIES = FILTER_BITS // KINDS
-"""Largest number of collision categories that the engine `pymunk` can have."""
-
 MIN_RADIUS = 1e-9
 """m, smallest radius of a capsule, and length of a rod"""
 
@@ -168,10 +165,8 @@ class SpaceElements:
                 if body is not None and (body.body_type == pymunk.Body.DYNAMIC or body in used)
             )
         )
-        kinds = {_filter_kind(shape) for shape in self._shapes}
-        self._collides = collides_by_filter(kinds)
-        self._categories = categories_by_filter(kinds) if None in self._collides.values() else {}
-        self._moving_groups = {each.filter.group for each in self._shapes if not _filter_kind(each).is_static}
+        self._filters = SceneFilters.of({FilterKind.of(shape) for shape in self._shapes})
+        self._moving_groups = {each.filter.group for each in self._shapes if not FilterKind.of(each).is_static}
         self.names = self._unique_names(names)
         """name of each body"""
 
@@ -246,7 +241,7 @@ class SpaceElements:
 
     def _collider(self, shape: pymunk.Shape) -> tuple[str, KeyValues]:
         """Return the table and the values of a wall or post."""
-        values = self._surface(shape) | self._categories_of(shape)
+        values = self._surface(shape) | self._filter_of(shape)
         if shape.filter.group and shape.filter.group in self._moving_groups:
             self.omitted.append("groups of static shapes")
         if isinstance(shape, pymunk.Circle):
@@ -381,29 +376,19 @@ class SpaceElements:
         """Return what a body collides with."""
         if not shapes:
             return {}
-        filters = [
-            (shape.filter.group, self._collides[_filter_kind(shape)], self._categories_of(shape)) for shape in shapes
-        ]
+        filters = [(shape.filter.group, self._filter_of(shape)) for shape in shapes]
         if any(each != filters[0] for each in filters):
             self.omitted.append(f"the different filters of the shapes of {name}")
-        group, collides, values = filters[0]
-        if group:
-            values["group"] = f"group {group}"
-        if collides == "none":
-            if not self.is_kinematic(_body_of(shapes[0])):
-                self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
-            return values | {"collides": "none"}
-        return values | ({"collides": collides} if collides == "fixed" and not self._categories else {})
+        group, values = filters[0]
+        if values.get("collides") == "none" and not self.is_kinematic(_body_of(shapes[0])):
+            self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
+        return values | ({"group": f"group {group}"} if group else {})
 
-    def _categories_of(self, shape: pymunk.Shape) -> KeyValues:
-        """Return the categories and the mask of a shape, where `collides` alone cannot state them."""
-        if not self._categories:
-            return {}
-        if len(_category_names(self._categories)) > MAX_CATEGORIES:
+    def _filter_of(self, shape: pymunk.Shape) -> KeyValues:
+        """Return what a shape collides with."""
+        if self._filters.has_too_many_categories:
             self.omitted.append(f"categories and masks of shape filters, of which more than {MAX_CATEGORIES} differ")
-            return {}
-        categories, mask = self._categories[_filter_kind(shape)]
-        return {"categories": list(categories), "mask": list(mask)}
+        return dict(self._filters.values[FilterKind.of(shape)])
 
     # Joints
 
@@ -454,74 +439,6 @@ def _ends_of(shape: pymunk.Shape) -> tuple[pymunk.Vec2d, ...]:
         return shape.a, shape.b
     assert isinstance(shape, pymunk.Circle)
     return (shape.offset,)
-
-
-class FilterKind(NamedTuple):
-    """Which shapes a shape can collide with, apart from its group."""
-
-    is_static: bool
-    categories: int
-    mask: int
-
-    def meets(self, other: "FilterKind") -> bool:
-        """Return whether shapes of two kinds can collide."""
-        can_move = not (self.is_static and other.is_static)
-        return can_move and bool(self.categories & other.mask and other.categories & self.mask)
-
-
-def _filter_kind(shape: pymunk.Shape) -> FilterKind:
-    is_static = _body_of(shape).body_type == pymunk.Body.STATIC
-    return FilterKind(is_static, shape.filter.categories, shape.filter.mask)
-
-
-def collides_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, Collides | None]:
-    """Return what each kind of shapes of a space collides with, as a scene states it; None if it cannot.
-
-    Two bodies of a scene collide if both collide with all, or if one is static and the other collides with something.
-    Other filters need categories.
-    """
-    static, moving = {kind for kind in kinds if kind.is_static}, {kind for kind in kinds if not kind.is_static}
-    found: dict[FilterKind, Collides | None] = {}
-    for kind in moving:
-        meets = {other for other in kinds if kind.meets(other)}
-        if not meets:
-            found[kind] = "none"
-        elif meets == static:
-            found[kind] = "fixed"
-        else:
-            found[kind] = "all"
-    free = {kind for kind in moving if found[kind] == "all"}
-    for kind in free:
-        if {other for other in kinds if kind.meets(other)} != static | free:
-            found[kind] = None
-    wanted = {kind for kind in moving if found[kind] != "none"}
-    return found | {kind: "all" if all(kind.meets(other) for other in wanted) else None for kind in static}
-
-
-def categories_by_filter(kinds: Set[FilterKind]) -> dict[FilterKind, tuple[list[str], list[str]]]:
-    """Return the categories and the mask of each kind of shapes, as names.
-
-    Bits that the same kinds have in their categories, and the same in their masks, are one category. It is called by
-    the number of the first of these bits. Bits that no kind collides with, or none has, are left out.
-    """
-    ordered = sorted(kinds)
-    names: dict[tuple[tuple[bool, ...], tuple[bool, ...]], str] = {}
-    for bit in range(32):
-        members = tuple(bool(kind.categories >> bit & 1) for kind in ordered)
-        seekers = tuple(bool(kind.mask >> bit & 1) for kind in ordered)
-        if any(members) and any(seekers):
-            names.setdefault((members, seekers), f"bit {bit}")
-    return {
-        kind: (
-            [name for (members, _), name in names.items() if members[k]],
-            [name for (_, seekers), name in names.items() if seekers[k]],
-        )
-        for k, kind in enumerate(ordered)
-    }
-
-
-def _category_names(of_kind: Mapping[FilterKind, tuple[list[str], list[str]]]) -> set[str]:
-    return {name for lists in of_kind.values() for names in lists for name in names}
 
 
 _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}

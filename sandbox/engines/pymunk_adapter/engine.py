@@ -1,12 +1,13 @@
 """PymunkEngine: the demands that pymunk supports, and its defaults of settings. Only `start` imports pymunk."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
-from sandbox.engines.pymunk_adapter.requirements import air_faults, size_faults
+from sandbox.engines.pymunk_adapter.requirements import combination_faults, size_faults
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINT_LIMITS, JOINTS, SURFACES, Demand, unmodelled
 from sandbox.scene.compile.scene import Scene
@@ -53,6 +54,12 @@ SPACE_DEFAULTS = {
 }
 """Values of these attributes in a new space (pymunk 7.3.1)"""
 
+
+def is_space_default(attribute: str, value: float) -> bool:
+    """Return whether an attribute of a `pymunk.Space` has its default, which pymunk rounds to 32 bits."""
+    return math.isclose(value, SPACE_DEFAULTS[attribute], rel_tol=1e-5)
+
+
 FILTER_BITS = 30
 """Bits of pymunk's collision filters that bodies and static colliders may use; zones use the other two."""
 
@@ -97,17 +104,7 @@ class PymunkEngine:
             missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
         if settings.stretch is not None:
             missing.append("stretch applies to joints = 'relaxation', which it does not have")
-        missing += air_faults(scene, settings.half_kick)
-        if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
-            missing.append("half_kick supports gravity only, and the scene has other forces")
-        if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
-            missing.append("half_kick does not support zones with their own gravity")
-        if settings.half_kick and setup.bodies.kinematic.any():
-            missing.append("half_kick does not support kinematic bodies")
-        if scene.drives and scene.attractions:
-            missing.append("it does not model attraction and drives together")
-        if setup.bodies.kinematic.any() and scene.attractions:
-            missing.append("it does not model attraction and kinematic bodies together")
+        missing += combination_faults(scene, settings.half_kick, bool(setup.bodies.kinematic.any()))
         if on_floor(setup):
             missing += unsupported_by_steppers(setup)
         return (*missing, *overload(setup, settings), *size_faults(setup))

@@ -1,4 +1,4 @@
-"""What pymunk requires of a scene: drag and damping, and the size of its space. Nothing here imports pymunk."""
+"""What pymunk requires of a scene: which parts it combines, and the size of its space. Nothing here imports pymunk."""
 
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.contacts import contact_matrix
@@ -6,17 +6,33 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 
 
-def air_faults(scene: Scene, half_kick: bool) -> list[str]:
-    """Return why pymunk does not support the drag and damping of a scene, with or without the setting `half_kick`."""
+def combination_faults(scene: Scene, half_kick: bool, has_kinematic: bool) -> list[str]:
+    """Return the parts and settings of a scene that pymunk does not support together.
+
+    Args:
+        scene: the scene.
+        half_kick: whether the setting `half_kick` is on.
+        has_kinematic: whether a body is kinematic, of the scene or added by an action.
+    """
     world, found = scene.world, []
     if half_kick and world.has_drag:
         found.append("half_kick does not support drag")
     if half_kick and world.has_damping:
         found.append("half_kick does not support damping")
-    if world.has_damping and world.has_drag:
-        found.append("it does not model drag and damping together")
-    if world.has_damping and scene.drives:
-        found.append("it does not model drives and damping together")
+    if half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
+        found.append("half_kick supports gravity only, and the scene has other forces")
+    if half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
+        found.append("half_kick does not support zones with their own gravity")
+    if half_kick and has_kinematic:
+        found.append("half_kick does not support kinematic bodies")
+    for first, second, together in (
+        ("drag", "damping", world.has_drag and world.has_damping),
+        ("drives", "damping", scene.drives and world.has_damping),
+        ("attraction", "drives", scene.attractions and scene.drives),
+        ("attraction", "kinematic bodies", scene.attractions and has_kinematic),
+    ):
+        if together:
+            found.append(f"it does not model {first} and {second} together")
     return found
 
 

@@ -16,9 +16,9 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.broad_phase import FIRST, SECOND, CandidatePairs
 from sandbox.engines.reference.manifold import KIND, Manifolds
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table, fixed_layers
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.fixed import Wall, mask_of
+from sandbox.scene.description.fixed import Wall
 
 EQUAL = 1e-9
 """Relative difference of two distances below which both segments meet at one vertex of a wall."""
@@ -113,7 +113,7 @@ class CollisionFilter:
     def __init__(self, store: BodyStore) -> None:
         self._store, scene = store, store.scene
         planes = slice(len(scene.planes))
-        self._collider_bits: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
+        self._collider_bits: IntArray = fixed_layers(scene)
         every = (1 << len(scene.layers)) - 1
         self._filters_planes = bool((self._collider_bits[planes] != every).any() or (scene.categories and scene.planes))
         self.walls = OneWayWalls(store) if any(wall.one_way for wall in scene.walls) else None
@@ -129,7 +129,7 @@ class CollisionFilter:
     def rebuild(self, position: FloatArray) -> None:
         """Update after a change of the body store; positions are (N, ≥ 2) m."""
         self._bits: IntArray = 1 << self._store.layer
-        self._filters = collision_filters(self._store.scene, self._store.bodies)
+        self._filters = filter_table(self._store.scene, self._store.bodies)
         self._is_movable: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
         self._segment_collider = self._store.fixtures.segment_collider
         if self.walls is not None:

@@ -1,15 +1,11 @@
 """Lines of code with which a game sets a recommended setting: pymunk, Box2D, or the `[solver]` of a scene file."""
 
-import math
 from dataclasses import dataclass
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS, scale_for
-from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS
+from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, is_space_default
 from sandbox.formatting import format_quantity
 from sandbox.scene.description.world import Settings
-
-SAME_VALUE = 1e-5
-"""Relative: pymunk rounds its defaults to 32-bit numbers."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +43,7 @@ def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bo
     lines = [
         f"space.{name} = {float(f'{value:.12g}') if isinstance(value, float) else value!r}"
         for name, value in values.items()
-        if not math.isclose(value, SPACE_DEFAULTS[name], rel_tol=SAME_VALUE)
+        if not is_space_default(name, value)
     ]
     lines.append(f"dt = 1 / {fps:.17g}")
     count = settings.substeps
@@ -67,7 +63,7 @@ def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bo
 def _pymunk_remarks(settings: Settings, zoom: float, is_slop_stated: bool) -> list[str]:
     assert settings.slop is not None
     default = SPACE_DEFAULTS["collision_slop"]
-    if math.isclose(settings.slop, default, rel_tol=SAME_VALUE):
+    if is_space_default("collision_slop", settings.slop):
         return []
     source = "stated in the scene" if is_slop_stated else "the sandbox's default, 1 % of the smallest radius"
     pixels = settings.slop * zoom

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from sandbox.action import Switch
-from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.assembly import (
     AdviceMeasurements,
@@ -19,7 +19,6 @@ from sandbox.measure.advice.assembly import (
     settings_change,
 )
 from sandbox.measure.advice.forecast import forecast, game_notes
-from sandbox.measure.advice.game_code import SAME_VALUE
 from sandbox.measure.advice.result import (
     Advice,
     FallbackKind,
@@ -307,7 +306,7 @@ def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Confi
         return []
     slop = SPACE_DEFAULTS["collision_slop"]
     changed, present = configuration.with_option("slop", slop), space.resolved(configuration).slop
-    is_known = present is not None and math.isclose(present, slop, rel_tol=SAME_VALUE)  # pymunk keeps 32 bits of it
+    is_known = present is not None and is_space_default("collision_slop", present)
     is_new = space.is_valid(changed) and not is_known
     return [changed] if is_new else []
 

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.metrics.clearance import IndexPair, clearance, plane_clearance
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.filters import collision_filters, reachable_layers
+from sandbox.scene.compile.filters import filter_table, fixed_layers, reachable_layers
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.fixed import Plane, mask_of
+from sandbox.scene.description.fixed import Plane
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.trajectory import Trajectory
 
@@ -40,11 +40,6 @@ def first_collision(run: Trajectory) -> float | None:
     return float(times.min()) if len(times) else None
 
 
-def layers_of_fixed(scene: Scene) -> IntArray:
-    """Return the layers of each static object as bits, (F,)."""
-    return np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
-
-
 def share_layer(run: Trajectory, scene: Scene, pair: tuple[int, int]) -> BoolArray:
     """Return in which frames two bodies share a layer, (T,); always true for zones and pockets."""
     always = np.ones(len(run.time), np.bool_)
@@ -53,7 +48,7 @@ def share_layer(run: Trajectory, scene: Scene, pair: tuple[int, int]) -> BoolArr
         return always
     layer_bit = 1 << run.layer[:, first].clip(0).astype(np.int64)
     if second < 0:
-        return np.asarray(layer_bit & layers_of_fixed(scene)[-1 - second] != 0)
+        return np.asarray(layer_bit & fixed_layers(scene)[-1 - second] != 0)
     return np.asarray(run.layer[:, first] == run.layer[:, second])
 
 
@@ -61,7 +56,7 @@ def can_share_layer(scene: Scene, pair: tuple[int, int]) -> bool:
     """Return whether two bodies can ever be on one layer."""
     first, second = pair
     reachable = reachable_layers(scene, scene.bodies)
-    other = reachable[second] if second >= 0 else layers_of_fixed(scene)[-1 - second]
+    other = reachable[second] if second >= 0 else fixed_layers(scene)[-1 - second]
     return bool(reachable[first] & other)
 
 
@@ -161,10 +156,9 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
     """
     bodies = scene.bodies
     found = np.zeros(len(run.time))
-    able_bodies, filters = contact_matrix(scene).touches & ~bodies.immovable, collision_filters(scene, bodies)
-    all_able = np.flatnonzero(able_bodies)
+    can_touch, filters = contact_matrix(scene).touches & ~bodies.immovable, filter_table(scene, bodies)
     for k, plane in enumerate(scene.planes):
-        able = np.flatnonzero(able_bodies & filters.meets_fixed(k))
+        able = np.flatnonzero(can_touch & filters.meets_fixed(k))
         point, normal = np.asarray(plane.point), np.asarray(plane.normal) / math.hypot(*plane.normal)
         discs = able[bodies.round[able]]
         if len(discs):
@@ -174,10 +168,10 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
             above = plane_clearance(bodies, number, run.position[:, number], run.angle[:, number], point, normal)
             found = np.maximum(found, -above)
     others = [-1 - k for k, thing in enumerate(scene.fixed) if not isinstance(thing, Plane) and thing.solid]
-    paired = all_able[:MAX_PAIRED_BODIES]
+    paired = np.flatnonzero(can_touch)[:MAX_PAIRED_BODIES]
     pairs = [(body, thing) for thing in others for body in paired[filters.meets_fixed(-1 - thing)[paired]].tolist()]
     mutual = contact_matrix(scene).mutual and len(scene.layers) == 1  # bodies on different layers can pass each other
-    if mutual and not bodies.round[all_able].all():
+    if mutual and not bodies.round[can_touch].all():
         neighbours = np.asarray(_initial_neighbours(scene), np.int64).reshape(-1, 2)
         pairs += [(a, b) for a, b in neighbours[filters.meets(*neighbours.T)].tolist()]
     # A body that can change its layer can be above another without colliding: only bodies that cannot are examined.

@@ -16,7 +16,7 @@ from sandbox.measure.missed_contacts.swept_geometry import CLEAR, DEEP, JUMP, ap
 from sandbox.measure.missed_contacts.verlet_list import VerletList
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.derived import derived_once
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 
@@ -183,7 +183,7 @@ class Audit:
         if self._kinematic:  # bodies moved by a stroke or a plunger pass through static objects
             self._hits_static = self._hits_static & ~np.isin(bodies.names[part], [*self._kinematic])
         self._group = bodies.group[part] if bodies.group.any() else None
-        self._filters = collision_filters(self._scene, bodies) if self._scene.categories else None
+        self._filters = filter_table(self._scene, bodies) if self._scene.categories else None
         self._smallest_squared = smallest[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
         self._verlet_list = VerletList(self._core, member[part], self._can_collide)
 

@@ -18,10 +18,10 @@ from sandbox.measure.missed_contacts.swept_geometry import (
     closest_to_segment,
     dot,
 )
-from sandbox.scene.compile.filters import CollisionFilters
+from sandbox.scene.compile.filters import FilterTable, fixed_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Point
-from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.fixed import Plane, Post, Wall
 
 PLANE_ROUNDING = 1e-11
 """m: smallest tolerance at planes. Engines build planes from shapes of kilometres, whose rounding is 3e-13 m."""
@@ -93,7 +93,7 @@ class StaticGeometry:
             rows += [(*a, *b) for a, b in pairwise(line)]
             half += [width] * (len(line) - 1)
             number += [-1 - k] * (len(line) - 1)
-        masks = np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
+        masks = fixed_layers(scene)
         things = -1 - np.asarray(number, dtype=np.int64)
         ends = np.asarray(rows, dtype=np.float64).reshape(-1, 4)
         return cls(
@@ -111,7 +111,7 @@ class StaticGeometry:
         return len(self.point) + len(self.tail)
 
     def missed(
-        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None = None
+        self, paths: SweptCircles, history: ContactHistory, filters: FilterTable | None = None
     ) -> tuple[IntArray, IntArray]:
         """Return substeps (M,) and pairs (M, 2) that missed a contact, as `Audit` defines it.
 
@@ -130,7 +130,7 @@ class StaticGeometry:
         return np.concatenate([when for when, _ in found]), np.concatenate([pair for _, pair in found])
 
     def _planes(
-        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None
+        self, paths: SweptCircles, history: ContactHistory, filters: FilterTable | None
     ) -> tuple[IntArray, IntArray]:
         # Most bodies clearly end above; one product finds them, with more rounding.
         above = paths.end @ self.normal.T - dot(self.point, self.normal)
@@ -155,7 +155,7 @@ class StaticGeometry:
         return when[missed], pair[missed]
 
     def _walls(
-        self, paths: SweptCircles, history: ContactHistory, filters: CollisionFilters | None
+        self, paths: SweptCircles, history: ContactHistory, filters: FilterTable | None
     ) -> tuple[IntArray, IntArray]:
         i, s = self._in_reach(paths, filters)
         tail, along, contact = self.tail[s], self.along[s], paths.radius[i] + self.half[s]
@@ -187,7 +187,7 @@ class StaticGeometry:
         missed = through | (entered & ~in_time)
         return when[missed], pair[missed]
 
-    def _in_reach(self, paths: SweptCircles, filters: CollisionFilters | None) -> tuple[IntArray, IntArray]:
+    def _in_reach(self, paths: SweptCircles, filters: FilterTable | None) -> tuple[IntArray, IntArray]:
         """Return paths and segments, (K,) each, that can be in contact on a path that can skip a test."""
         middle = self.tail + 0.5 * self.along
         size = 0.5 * np.sqrt(dot(self.along, self.along)) + self.half

@@ -26,7 +26,7 @@ from sandbox.measure.preflight.tunnelling import (
     tunnelling_risks,
 )
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
@@ -197,7 +197,7 @@ def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
     if settings.detection not in (None, "discrete") or context.is_continuous:
         return
     bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
-    filters = collision_filters(scene, bodies)
+    filters = filter_table(scene, bodies)
     movers = matrix.touches & ~bodies.immovable & (bodies.thin > 0.0)
     found: dict[tuple[str, float], tuple[str, float, int]] = {}
     for index, (plane, name) in enumerate(zip(scene.planes, scene.fixed_names, strict=False)):

@@ -13,11 +13,11 @@ from sandbox.measure.preflight.tunnelling import collide_with_all
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.drives import is_driven
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.neighbours import near_pairs
-from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, OVERLAP_BUDGET, count_overlaps
+from sandbox.scene.validate.bodies import OVERLAP_BUDGET
 
 CONTACT_FRACTION = 0.02
 """Largest clearance of a contact as a fraction of the half width of the thinner body."""
@@ -47,7 +47,7 @@ def initial_contacts(scene: Scene) -> InitialContacts:
     apart = {(a, b) for a, b in scene.links.apart().tolist()}
     if len(colliding) < 2 or bodies.round[colliding].all():
         return InitialContacts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-    examined, filters = 0, collision_filters(scene, bodies)
+    examined, filters = 0, filter_table(scene, bodies)
     for i, j in near_pairs(bodies.position[colliding], 2.05 * float(bodies.radius[colliding].max())):
         a, b = np.minimum(colliding[i], colliding[j]), np.maximum(colliding[i], colliding[j])
         slack = CONTACT_FRACTION * np.minimum(bodies.thin[a], bodies.thin[b])
@@ -117,72 +117,25 @@ def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts
 
 
 def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
-    """Return the number of overlapping pairs of moving balls, and the deepest of them."""
-    bodies = scene.bodies
+    """Return the number of overlapping pairs of moving balls that can collide, and the deepest of them."""
+    bodies, filters = scene.bodies, filter_table(scene, scene.bodies)
     balls = np.flatnonzero(collide_with_all(bodies) & matrix.touches & ~bodies.fixed & bodies.round)
-    max_pairs = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(balls)  # a scene with more is refused
-    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[balls]
-    position, radius = bodies.position[balls], bodies.radius[balls]
-    if scene.categories:
-        return _filtered_balls(scene, balls)
-    count = count_overlaps(position, radius, max_pairs, owner)
     first, second = scene.links.apart().T
-    joined = np.isin(first, balls) & np.isin(second, balls)
-    joined &= (bodies.group[first] == 0) | (bodies.group[first] != bodies.group[second])
-    away = (
-        np.hypot(*(bodies.position[first] - bodies.position[second]).T) - bodies.radius[first] - bodies.radius[second]
-    )
-    count -= int((joined & (away < 0.0)).sum())
-    if count <= 0:
-        return 0, (0.0, "", "")
-    keys = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
-    deepest, i, j = _deepest(position, radius, owner, balls, keys, len(bodies))
-    return count, (deepest, bodies.names[i], bodies.names[j])
-
-
-def _filtered_balls(scene: Scene, balls: IntArray) -> tuple[int, Overlap]:
-    """Return the number of overlapping pairs among some balls that can collide by their filters, and the deepest."""
-    bodies, filters = scene.bodies, collision_filters(scene, scene.bodies)
-    apart = {(min(pair), max(pair)) for pair in scene.links.apart().tolist()}
+    joined = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
     count, deepest, examined = 0, (0.0, "", ""), 0
     for i, j in near_pairs(bodies.position[balls], 2.0 * float(bodies.radius[balls].max(initial=0.0))):
-        a, b = np.minimum(balls[i], balls[j]), np.maximum(balls[i], balls[j])
-        depth = bodies.radius[a] + bodies.radius[b] - np.hypot(*(bodies.position[a] - bodies.position[b]).T)
-        overlaps = filters.meets(a, b) & (depth > 0.0)
-        for row in zip(depth[overlaps].tolist(), a[overlaps].tolist(), b[overlaps].tolist(), strict=True):
-            if row[1:] not in apart:
-                count, deepest = count + 1, max(deepest, (row[0], bodies.names[row[1]], bodies.names[row[2]]))
+        low, high = np.minimum(balls[i], balls[j]), np.maximum(balls[i], balls[j])
+        depth = bodies.radius[low] + bodies.radius[high] - np.hypot(*(bodies.position[low] - bodies.position[high]).T)
+        apart = ~filters.meets(low, high) | (bodies.kinematic[low] & bodies.kinematic[high])
+        depth[apart | np.isin(low * len(bodies) + high, joined)] = 0.0
+        count += int(np.count_nonzero(depth > 0.0))
+        k = int(depth.argmax()) if len(depth) else -1
+        if k >= 0 and depth[k] > deepest[0]:
+            deepest = float(depth[k]), bodies.names[int(low[k])], bodies.names[int(high[k])]
         examined += len(i)
         if examined > OVERLAP_BUDGET:
             break
     return count, deepest
-
-
-def _deepest(
-    position: FloatArray, radius: FloatArray, owner: IntArray, indices: IntArray, apart: IntArray, count: int
-) -> tuple[float, int, int]:
-    """Return the depth, m, and the indices of the two discs that overlap most.
-
-    Args:
-        position: (M, 2) m.
-        radius: (M,) m.
-        owner: (M,); two discs of one owner are no pair.
-        indices: (M,) indices among all bodies.
-        apart: (K,) pairs that do not collide, as index of the first × count + index of the second.
-        count: number of all bodies.
-    """
-    deepest, examined = (0.0, int(indices[0]), int(indices[0])), 0
-    for i, j in near_pairs(position, 2.0 * float(radius.max())):
-        low, high = np.minimum(indices[i], indices[j]), np.maximum(indices[i], indices[j])
-        depth = radius[i] + radius[j] - np.hypot(*(position[i] - position[j]).T)
-        depth[(owner[i] == owner[j]) | np.isin(low * count + high, apart)] = -np.inf
-        k = int(np.argmax(depth)) if len(depth) else -1
-        if k >= 0 and depth[k] > deepest[0]:
-            deepest = float(depth[k]), int(low[k]), int(high[k])
-        examined += len(i)
-        if examined > OVERLAP_BUDGET:
-            break
-    return deepest
 
 
 def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overlap]:
@@ -193,7 +146,7 @@ def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overl
     """
     if scene.surface is not None:
         return
-    bodies, filters = scene.bodies, collision_filters(scene, scene.bodies)
+    bodies, filters = scene.bodies, filter_table(scene, scene.bodies)
     able = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
     examined = measured = 0
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):

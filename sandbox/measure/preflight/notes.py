@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.engines.box2d_adapter.engine import Box2DEngine
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, MAX_TURN, scale_for
-from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, PymunkEngine
+from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, PymunkEngine, is_space_default
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
@@ -157,9 +157,9 @@ def _pymunk(scene: Scene, engine: str | None) -> Iterator[Diagnostic]:
     values: Details = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
     texts = []
     for name, value in values.items():
-        own = SPACE_DEFAULTS[name]
-        is_own = math.isclose(cast(float, value), own, rel_tol=1e-5)  # pymunk rounds its defaults to 32 bits
-        texts.append(f"space.{name} = {value:.3g}" + ("" if is_own else f" (pymunk's default: {own:.3g})"))
+        is_default = is_space_default(name, cast(float, value))
+        texts.append(f"space.{name} = {value:.3g}")
+        texts[-1] += "" if is_default else f" (pymunk's default: {SPACE_DEFAULTS[name]:.3g})"
     message = (
         f"pymunk: {', '.join(texts)}; bodies may overlap by {100.0 * slop / half:.3g} % of the narrowest half width"
     )

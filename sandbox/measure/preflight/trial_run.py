@@ -26,7 +26,7 @@ from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.filters import collision_filters
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Post, Wall
@@ -154,7 +154,7 @@ class TrialRun:
         """Yield the deepest ball in a plane if its centre was behind the surface."""
         run, bodies = self.run, self.scene.bodies
         able = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.immovable
-        filters = collision_filters(self.scene, bodies)
+        filters = filter_table(self.scene, bodies)
         for index, (thing, name) in enumerate(zip(self.scene.planes, self.scene.fixed_names, strict=False)):
             discs = np.flatnonzero(able & (bodies.core > 0.0) & filters.meets_fixed(index))
             if not len(discs):

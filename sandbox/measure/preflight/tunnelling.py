@@ -18,7 +18,7 @@ from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.drives import is_driven
-from sandbox.scene.compile.filters import collision_filters, reachable_layers
+from sandbox.scene.compile.filters import filter_table, reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
@@ -138,7 +138,7 @@ def tunnelling_risks(scene: Scene, matrix: ContactMatrix | None = None) -> list[
         if fastest.safe_h < groups[0].safe_h * (1.0 - ROUNDING):
             found.append(fastest)
 
-    filters = collision_filters(scene, bodies)
+    filters = filter_table(scene, bodies)
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if isinstance(thing, Plane) or thing.solid:
             add(
@@ -198,7 +198,7 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     if only_two and not len(scene.links) and not has_forces:
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
-    meets = collision_filters(scene, bodies).meets(number[:, None], number)
+    meets = filter_table(scene, bodies).meets(number[:, None], number)
     meets &= ~(bodies.kinematic[number][:, None] & bodies.kinematic[number])
     other, _ = _shortest_safe(reach, np.where(meets, closing, 0.0))
     rows = np.arange(len(number))

@@ -23,7 +23,7 @@ from sandbox.measure.run.loop import RunCallbacks, RunEnd, WorkCallback, run_loo
 from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
 from sandbox.progress import ProgressCallback
 from sandbox.provenance import versions
-from sandbox.scene.compile.filters import bits_of
+from sandbox.scene.compile.filters import bits_of_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_STEPS
@@ -246,7 +246,7 @@ class TimedAudit:
     def _layers(self) -> IntArray:
         """Return the layer of each body as a bit, (N,)."""
         frame = self._simulation.frame()
-        return bits_of(frame.layer, len(frame.position))
+        return bits_of_layers(frame.layer, len(frame.position))
 
     def _shared_layers(self) -> IntArray | None:
         """Return the layer of each body throughout the last substep as a bit; 0 for a body that changed its layer."""

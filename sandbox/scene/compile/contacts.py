@@ -20,7 +20,7 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.drives import is_driven
-from sandbox.scene.compile.filters import CollisionFilters, collision_filters
+from sandbox.scene.compile.filters import FilterTable, filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, HasMaterial
@@ -290,7 +290,7 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     """Derive the contact matrix of a setup with given bodies."""
     scene = setup.scene
     surfaces = pair_table(scene, bodies)
-    filters = collision_filters(scene, bodies)
+    filters = filter_table(scene, bodies)
     kinds = _kinds(bodies, surfaces, filters)
     surface, to_all = kinds.surface, kinds.to_all
     moving, static = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
@@ -362,7 +362,7 @@ def _can_enter_zone(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArra
     return np.asarray(detectable & ((reached & zone_layers != 0) | still_inside))
 
 
-def _equal_colliders(filters: CollisionFilters) -> Iterator[tuple[tuple[int, int, int], IntArray]]:
+def _equal_colliders(filters: FilterTable) -> Iterator[tuple[tuple[int, int, int], IntArray]]:
     """Yield the layers, categories and masks of static colliders as bits, with the indices of those that have them."""
     distinct, row = _distinct_rows(filters.fixed_layers, filters.fixed_categories, filters.fixed_mask)
     for k, (layers, categories, mask) in enumerate(distinct.tolist()):
@@ -382,7 +382,7 @@ def _distinct_rows(*columns: IntArray) -> tuple[IntArray, IntArray]:
     return table[first], row.reshape(-1)
 
 
-def _kinds(bodies: Bodies, surfaces: PairTable, filters: CollisionFilters) -> Kinds:
+def _kinds(bodies: Bodies, surfaces: PairTable, filters: FilterTable) -> Kinds:
     """Group pieces by (surface, layers, categories, mask, kinematic, ball, fixed, collides with all, with any)."""
     collides = [element.collides for element in bodies.elements]
     collides_with_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]

@@ -18,8 +18,8 @@ from sandbox.scene.description.scene import SceneDescription
 
 
 @dataclass(frozen=True, eq=False)
-class CollisionFilters:
-    """Filters of N bodies and F static colliders, as bit masks."""
+class FilterTable:
+    """Layers, categories, masks and groups of N bodies and F static colliders; all but groups are bit masks."""
 
     layers: IntArray
     """(N,) layers that each body can reach"""
@@ -62,16 +62,16 @@ class CollisionFilters:
         )
 
 
-def collision_filters(scene: SceneDescription, bodies: Bodies) -> CollisionFilters:
+def filter_table(scene: SceneDescription, bodies: Bodies) -> FilterTable:
     """Return the filters of bodies and of the static colliders of a scene."""
     categories, mask = category_bits(bodies.elements, scene.categories)
     fixed_categories, fixed_mask = category_bits(scene.fixed, scene.categories)
-    return CollisionFilters(
+    return FilterTable(
         layers=reachable_layers(scene, bodies),
         categories=categories[bodies.element],
         mask=mask[bodies.element],
         group=bodies.group,
-        fixed_layers=np.asarray([mask_of(each.layers, scene.layers) for each in scene.fixed], np.int64),
+        fixed_layers=fixed_layers(scene),
         fixed_categories=fixed_categories,
         fixed_mask=fixed_mask,
     )
@@ -90,11 +90,16 @@ def category_bits(colliders: Sequence[Collider], known: tuple[str, ...]) -> tupl
 
 
 def bits_of_categories(collider: Collider, known: tuple[str, ...]) -> tuple[int, int]:
-    """Return the categories and the mask of a collider as bits, with the same limits as `category_bits`."""
+    """Return the categories and the mask of a collider as bits; without any names there is one, to which all belong."""
     if collider.categories is None and collider.mask is None:
         every = (1 << max(len(known), 1)) - 1
         return every, every
     return mask_of(collider.categories, known), mask_of(collider.mask, known)
+
+
+def fixed_layers(scene: SceneDescription) -> IntArray:
+    """Return the layers of each static collider as bits, (F,)."""
+    return np.asarray([mask_of(each.layers, scene.layers) for each in scene.fixed], np.int64)
 
 
 def reachable_layers(scene: SceneDescription, bodies: Bodies) -> IntArray:
@@ -113,6 +118,6 @@ def reachable_layers(scene: SceneDescription, bodies: Bodies) -> IntArray:
     return np.asarray(np.where(can_move, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
 
 
-def bits_of(layer: IntArray | None, count: int) -> IntArray:
+def bits_of_layers(layer: IntArray | None, count: int) -> IntArray:
     """Return the layers of bodies as bit masks, (N,), from a frame's indices; default: the first layer."""
     return np.ones(count, np.int64) if layer is None else 1 << layer
