@@ -142,7 +142,8 @@ class SetParameter(Timed):
     """Change a parameter of the running scene.
 
     Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
-    `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution` and `friction`.
+    `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution`, `friction`, `surface_speed`
+    and `surface_velocity`.
     """
 
     kind: Literal["set"] = "set"
@@ -289,13 +290,15 @@ _SETTABLE = (
     "surface.curl",
 )
 
-SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution, friction or surface_speed"
+_SETTABLE_OF_SURFACES = ("restitution", "friction", "surface_speed", "surface_velocity")
+
+SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution, friction, surface_speed or surface_velocity"
 """Parameters of a running scene that can be changed, as text for messages."""
 
 
 def is_settable(path: str) -> bool:
     """Return whether a parameter of a running scene can be changed."""
-    return path in _SETTABLE or path.rpartition(".")[2] in ("restitution", "friction", "surface_speed")
+    return path in _SETTABLE or path.rpartition(".")[2] in _SETTABLE_OF_SURFACES
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:

@@ -57,7 +57,13 @@ def _colours() -> st.SearchStrategy[str]:
 
 @st.composite
 def _elements(draw: st.DrawFn, required: Document, optional: Document, materials: list[str]) -> Document:
-    optional = {**optional, **_coefficients(), "surface_speed": numbers(-10, 10), "colour": _colours()}
+    optional = {
+        **optional,
+        **_coefficients(),
+        "surface_speed": numbers(-10, 10),
+        "surface_velocity": pairs(-10, 10),
+        "colour": _colours(),
+    }
     if materials:
         optional["material"] = st.sampled_from(materials)
     return dict(draw(st.fixed_dictionaries(required, optional=optional)))

@@ -88,6 +88,23 @@ def mixed() -> pymunk.Space:
     return space
 
 
+def moving_surfaces() -> pymunk.Space:
+    """Return a space of conveyor belts, and bodies that drive themselves by their surfaces."""
+    space, rng = space_with_walls(), random.Random(5)
+    for k, x in enumerate((-200, 0, 200)):
+        belt = pymunk.Segment(space.static_body, (x - 80, 60 + 40 * k), (x + 80, 90 + 40 * k), 4)
+        belt.friction, belt.surface_velocity = 0.8, (60 - 50 * k, 10 * k)
+        space.add(belt)
+    for k in range(25):
+        body = pymunk.Body(3, 400)
+        body.position = rng.uniform(-250, 250), rng.uniform(150, 500)
+        shape: pymunk.Shape = pymunk.Circle(body, 9) if k % 2 else pymunk.Poly.create_box(body, (20, 14))
+        shape.friction, shape.elasticity = 0.9, 0.1
+        shape.surface_velocity = (30 * (k % 3), 0)
+        space.add(body, shape)
+    return space
+
+
 def joints() -> pymunk.Space:
     """Return a space with a chain, and with one joint of each kind that a scene has."""
     space = pymunk.Space()
@@ -213,14 +230,14 @@ def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, lis
     return captured, differences
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
 def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     captured, differences = compare(make())
     assert not captured.omitted
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
 def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     space.damping = 0.9
@@ -230,7 +247,7 @@ def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[]
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
 def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     scene = from_pymunk(space, dt=DT, title="captured")
@@ -390,7 +407,6 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
         (lambda s, b, c: setattr(b, "velocity_func", _velocity_function), "velocity or position function of body-1"),
         (lambda s, b, c: b.apply_force_at_local_point((1, 0)), "force on body-1"),
         (lambda s, b, c: setattr(c, "elasticity", 1.5), "elasticity of 1.5"),
-        (lambda s, b, c: setattr(c, "surface_velocity", (1, 0)), "surface velocities"),
         (
             lambda s, b, c: [setattr(each, "filter", pymunk.ShapeFilter(group=3)) for each in s.shapes],
             "groups of static",

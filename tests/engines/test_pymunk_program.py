@@ -201,6 +201,31 @@ position = [2.0, 2.6]
 radius = 0.5
 friction = 0.9
 """,
+    "surface velocities": """
+[[wall]]
+points = [[-5.0, 2.0], [5.0, 2.0]]
+thickness = 0.2
+friction = 0.7
+surface_velocity = [2.0, 0.0]
+[[wall]]
+points = [[-5.0, 0.0], [5.0, 0.0]]
+friction = 0.7
+surface_speed = 1.0
+[[box]]
+position = [0.0, 2.5]
+size = [0.5, 0.5]
+friction = 0.8
+[[ball]]
+position = [2.0, 2.6]
+radius = 0.5
+friction = 0.9
+surface_velocity = [-1.0, 0.5]
+[[ball]]
+position = [3.0, 0.6]
+radius = 0.5
+friction = 0.9
+surface_velocity = [-1.0, 0.5]
+""",
     "layers": """
 [[wall]]
 points = [[-5.0, 2.0], [5.0, 1.0]]

@@ -69,6 +69,7 @@ FEATURES: dict[str, Document] = {
     "wall": {"wall": [{**_WALL, "points": [[-5, 1], [0, 0.5], [5, 1]], "restitution": 0.5}]},
     "kicking wall": {"wall": [{**_WALL, "kick": {"speed": 2.0}}]},
     "moving wall": {"wall": [{**_WALL, "surface_speed": 1.0, "friction": 0.5}]},
+    "drifting wall": {"wall": [{**_WALL, "surface_velocity": [1.0, -2.0], "friction": 0.5}]},
     "one-way wall": {"wall": [{**_WALL, "one_way": True}]},
     "open wall": {"wall": [{**_WALL, "solid": False}]},
     "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},

@@ -175,6 +175,13 @@ PROOFS: dict[Demand, Proof] = {
         scene(world=GRAVITY, ball=[ball(0.0, 0.25)], plane=[{**FLOOR, "friction": 0.4, "surface_speed": 1.5}]),
         velocity(0.5, 0.0),
     ),
+    # likewise, to the left
+    Demand.SURFACE_VELOCITY: Proof(
+        scene(
+            world=GRAVITY, ball=[ball(0.0, 0.25)], plane=[{**FLOOR, "friction": 0.4, "surface_velocity": [-1.5, 1.0]}]
+        ),
+        velocity(-0.5, 0.0),
+    ),
     # the wall, upwards, lets bodies pass from right to left
     Demand.ONE_WAY: Proof(
         scene(ball=[ball(2.0, vx=-2.0), ball(0.0, 0.7, vx=2.0)], wall=[{**WALL, "one_way": True}]),

@@ -131,6 +131,97 @@ def test_speed_can_be_changed_during_a_run(config: EngineConfig) -> None:
     simulation.close()
 
 
+VELOCITY_ENGINES = [c for c in IMPULSE_CONFIGS if c.engine in ("pymunk", "reference")]
+
+
+@each_config(VELOCITY_ENGINES)
+@pytest.mark.parametrize("shape", ["ball", "box"])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_surface_velocity_is_a_vector_on_all_sides(config: EngineConfig, shape: str, side: float) -> None:
+    """Above and below a slab, and however it is turned, bodies are driven along the vector: `surface_speed` turns."""
+    slab = {"position": [0.0, 0.0], "size": [30.0, 1.0], "fixed": True, "angle": np.pi, "friction": MU}
+    slab |= {"surface_velocity": [SPEED, 7.0]}  # the component along the normal has no effect
+    body = {"position": [0.0, side], "radius": 0.5} if shape == "ball" else {"position": [0, side], "size": [1.0, 1.0]}
+    bodies = {"ball": [body]} if shape == "ball" else {}
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, -side * G], "duration": 1.5},
+            "box": [slab, *([body] if shape == "box" else [])],
+            **bodies,
+        }
+    )
+    if config.settings.get("detection") == "swept":
+        config = EngineConfig(config.engine, {**config.settings, "detection": "bisect"})  # that supports polygons
+    result, moving = run(config, scene), int(np.flatnonzero(~scene.bodies.fixed)[0])
+    final = SPEED / 3.0 if shape == "ball" else SPEED
+    velocity = result.velocity[:, moving, 0]
+    assert velocity == pytest.approx(np.minimum(MU * G * result.time, final), abs=2.0 * STEP)
+    assert velocity[-1] == pytest.approx(final, abs=1e-4)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+@pytest.mark.parametrize("kind", ["plane", "ball"])
+def test_closed_form_with_a_surface_velocity(slope: float, kind: str) -> None:
+    """A velocity of the plane along itself is the same as a speed; that of a body has the opposite effect."""
+    n = np.asarray([-slope, 1.0]) / np.hypot(slope, 1.0)
+    along = np.asarray([n[1], -n[0]])
+    belt = {"point": [0, 0], "normal": [-slope, 1.0], "friction": MU}
+    body: dict[str, Any] = {"position": (0.5 * n).tolist(), "velocity": (-0.5 * along).tolist(), "radius": 0.5}
+    start = {"world": {"gravity": [0.0, -G], "duration": 1.5}, "solver": {"dt": 0.001}}
+    by_speed = from_document({**start, "plane": [{**belt, "surface_speed": SPEED}], "ball": [body]})
+    sign = 1.0 if kind == "plane" else -1.0
+    moved = {"plane": belt, "ball": body}
+    moved[kind] = {**moved[kind], "surface_velocity": (sign * SPEED * along).tolist()}
+    by_velocity = from_document({**start, **{key: [value] for key, value in moved.items()}})
+    exact, expected = solution(by_velocity), solution(by_speed)
+    assert exact is not None and expected is not None
+    times = np.linspace(0.0, 1.5, 31)
+    assert exact.at(times).position == pytest.approx(expected.at(times).position, abs=1e-12)
+    for engine in ("pymunk", "reference"):
+        result = sandbox.run(by_velocity, engine)
+        assert result.position == pytest.approx(expected.at(result.time).position, abs=7e-3)  # a·t·h/2
+
+
+@each_config(VELOCITY_ENGINES)
+def test_surface_velocities_of_two_bodies_subtract(config: EngineConfig) -> None:
+    """Discs whose surfaces move at the same velocity do not rub; at different ones, friction ends the difference."""
+    for velocities, change in (([[0.0, 0.3], [0.0, 0.3]], 0.0), ([[0.0, 0.3], [0.0, -0.3]], 0.1)):
+        balls = [ball(0.0, 0.0, velocity=[1.0, 0.0]), ball(1.5, 0.0)]
+        balls = [{**b, "friction": MU, "surface_velocity": v} for b, v in zip(balls, velocities, strict=True)]
+        result = run(config, from_document({"world": {"gravity": [0.0, 0.0], "duration": 1.0}, "ball": balls}))
+        expected = np.asarray([[0.5, -change], [0.5, change]])
+        assert result.velocity[-1] == pytest.approx(expected, abs=config.impact_rounding(1e-9))
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_work_of_a_surface_velocity_is_half_lost_to_friction(engine: str) -> None:
+    plane = {"point": [0, 0], "normal": [0, 1], "friction": MU, "surface_velocity": [SPEED, 0.0]}
+    document = {"world": {"gravity": [0.0, -G], "duration": 1.5}, "solver": {"dt": 0.001}, "plane": [plane]}
+    result = sandbox.run(from_document({**document, "ball": [ball(0.0, 0.5)]}), engine, account=True)
+    account = dict(zip(result.info["causes"], result.account[-1].tolist(), strict=True))
+    assert account["drives"] == pytest.approx(SPEED**2 / 3.0, rel=1e-9)
+    assert account["friction"] == pytest.approx(-(SPEED**2) / 6.0, rel=2e-2)  # the impulse of one step is divided
+    assert sum(account.values()) == pytest.approx(result.energy[-1] - result.energy[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["exact", "box2d"])
+def test_engines_without_surface_velocities_refuse_them(engine: str) -> None:
+    plane = {"point": [0, 0], "normal": [0, 1], "friction": MU, "surface_velocity": [SPEED, 0.0]}
+    result = sandbox.run(from_document({"plane": [plane], "ball": [ball(0.0, 0.5)]}), engine)
+    assert result.status == "refused" and "surface velocity" in result.reason
+
+
+@each_config(VELOCITY_ENGINES)
+def test_surface_velocity_can_be_changed_during_a_run(config: EngineConfig) -> None:
+    simulation = config.start(belt_scene("plane", ball=[ball(0.0, 0.5, name="b")]))
+    for path, value in (("plane[0].surface_speed", 0.0), ("plane[0].surface_velocity", [-1.0, 0.0])):
+        simulation.apply(SetParameter(time=0.0, path=path, value=value))
+    for _ in range(1500):
+        simulation.step()
+    assert simulation.frame().velocity[0, 0] == pytest.approx(-1.0 / 3.0, abs=1e-3)
+    simulation.close()
+
+
 def test_exact_fails_in_a_corner_with_a_moving_surface() -> None:
     lines = [{"points": [[-2, 2], [0, 0]]}, {"points": [[0, 0], [2, 2]], "surface_speed": 1.0, "friction": 0.5}]
     document = {"world": {"gravity": [0.0, -G], "duration": 5.0}, "wall": lines, "ball": [ball(0.1, 2.0)]}

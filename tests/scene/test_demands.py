@@ -119,6 +119,18 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
         {"ball": [BALL], "plane": [{**PLANE, "surface_speed": 1}]},
         "no surface with friction",
     ),
+    (
+        Demand.SURFACE_VELOCITY,
+        True,
+        {"ball": [{**BALL, "friction": 1}], "plane": [{**PLANE, "surface_velocity": [1, 0]}]},
+        "1 surface moves along a vector",
+    ),
+    (
+        Demand.SURFACE_VELOCITY,
+        False,
+        {"ball": [{**BALL, "friction": 1}], "plane": [{**PLANE, "surface_speed": 1}]},
+        "no surface with friction",
+    ),
     (Demand.ONE_WAY, True, {"ball": [BALL], "wall": [{**WALL, "one_way": True}] * 2}, "2 one-way walls"),
     (Demand.ONE_WAY, False, {"ball": [BALL], "wall": [WALL]}, "none"),
     (Demand.PASSABLE, True, {"ball": [BALL], "post": [{**POST, "solid": False}]}, "1 wall or post"),

@@ -79,8 +79,10 @@ class BodyStore:
         self.fixed_surface: IntArray = surfaces.of_fixed
         self.restitution: FloatArray = surfaces.restitution
         self.friction: FloatArray = surfaces.friction
-        self.tangential: FloatArray = np.stack((surfaces.friction, surfaces.slip_target), axis=-1)
-        """(S, S, 2) coefficient of friction and slip target, m/s, of pairs of surfaces"""
+        self.tangential: FloatArray = np.concatenate(
+            (np.stack((surfaces.friction, surfaces.slip_target), axis=-1), surfaces.slip_velocity), axis=-1
+        )
+        """(S, S, 4) coefficient of friction, slip target, m/s, and slip velocity, (2,) m/s, of pairs of surfaces"""
         self.falloff: FloatArray = surfaces.falloff
         masks = np.asarray([COLLISION_MASKS[element.collides] for element in bodies.elements], dtype=np.int64)
         self.collision_mask: IntArray = np.where(self.present, masks[bodies.element], NOTHING)

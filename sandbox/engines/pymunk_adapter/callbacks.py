@@ -279,8 +279,9 @@ class PairCallbacks:
         coefficients = known[0]
         arbiter.restitution, arbiter.friction = coefficients.restitution, coefficients.friction
         if coefficients.slip_target:
-            n = arbiter.normal
-            arbiter.surface_velocity = coefficients.slip_target * n.y, -coefficients.slip_target * n.x
+            n, velocity = arbiter.normal, arbiter.surface_velocity  # that of the shapes, computed anew in each step
+            slip = coefficients.slip_target
+            arbiter.surface_velocity = velocity.x + slip * n.y, velocity.y - slip * n.x
         if coefficients.is_constant:
             return
         closing = closing_speed(arbiter)

@@ -364,9 +364,9 @@ class SpaceElements:
         elasticity = float(shape.elasticity)
         if elasticity > 1.0:
             self.omitted.append(f"an elasticity of {elasticity:g}, which adds energy; the scene has a restitution of 1")
-        if any(shape.surface_velocity):
-            self.omitted.append("surface velocities")
         values: KeyValues = {"restitution": min(elasticity, 1.0), "friction": float(shape.friction)}
+        if any(shape.surface_velocity):
+            values["surface_velocity"] = _point(shape.surface_velocity)
         colour = getattr(shape, "color", None)
         if colour is not None:
             values["colour"] = "#" + "".join(f"{min(max(int(each), 0), 255):02x}" for each in tuple(colour)[:3])

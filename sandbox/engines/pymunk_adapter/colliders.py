@@ -173,7 +173,7 @@ def _surface_factors(matrix: ContactMatrix) -> SurfaceFactors:
 
 
 class SurfaceSetter:
-    """Sets elasticity and friction of shapes, so that every pair has exactly its coefficients."""
+    """Sets elasticity, friction and surface velocity of shapes, so that every pair has exactly its coefficients."""
 
     def __init__(self, space: pymunk.Space, h: float) -> None:
         self.one_way_walls = SpaceOneWayWalls(space, h)
@@ -182,6 +182,8 @@ class SurfaceSetter:
         """pairs that no factors can represent"""
         self._elasticity: list[float] = []
         self._friction: list[float] = []
+        self._velocity: list[Point] = []
+        self._has_velocity = False
 
     def rebuild(self, matrix: ContactMatrix, jointed: set[int]) -> None:
         """Compute the factors of each surface, and the callbacks of pairs that no factors can represent.
@@ -192,6 +194,8 @@ class SurfaceSetter:
         """
         surfaces, touching = matrix.surfaces, matrix.touching
         self._elasticity, self._friction, unfactored = _surface_factors(matrix)
+        self._velocity = [each.velocity for each in surfaces.surfaces]
+        self._has_velocity = self._has_velocity or any(map(any, self._velocity))
         solid = matrix.solid
         corrected = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
         self.pair_callbacks.rebuild(surfaces, set(unfactored), corrected)
@@ -202,6 +206,8 @@ class SurfaceSetter:
         """Set the surface of a shape."""
         shape.elasticity = self._elasticity[surface]
         shape.friction = self._friction[surface]
+        if self._has_velocity:
+            shape.surface_velocity = self._velocity[surface]
         shape.collision_type = surface + 1  # 0 is pymunk's default for shapes without a type
 
 

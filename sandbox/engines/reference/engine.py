@@ -132,15 +132,19 @@ class ReferenceEngine:
             missing.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
         if settings.impact == "dissipative" and wanted & (CONSTRAINTS | {Demand.DRIVES, Demand.KINEMATIC}):
             missing.append("impact 'dissipative' does not support joints, drives and kinematic bodies; use 'newton'")
-        if settings.impact == "dissipative" and Demand.SURFACE_SPEED in wanted:
-            missing.append("impact 'dissipative' does not support surface speed, which adds energy; use 'newton'")
+        if settings.impact == "dissipative":
+            missing += [
+                f"impact 'dissipative' does not support {demand}, which adds energy; use 'newton'"
+                for demand in (Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY)
+                if demand in wanted
+            ]
         if settings.persistence not in (None, 1):
             missing.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
         if settings.response == "penalty":
             missing += self._penalty_faults(setup, settings)
             if settings.impact is not None:
                 missing.append("impact applies to response 'impulse' only")
-            for demand in (Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED):
+            for demand in (Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY):
                 if demand in wanted:
                     missing.append(f"response 'penalty' does not model {demand}; 'impulse' does")
         else:

@@ -194,11 +194,7 @@ def find_ball_contacts(
                 _write_circle_contact(
                     out, row, position[i, 0], position[i, 1], radius[i], radius[j], separation, nx, ny
                 )
-                out.friction[row], out.slip_target[row] = (
-                    tangential[surface[i], surface[j], 0],
-                    tangential[surface[i], surface[j], 1],
-                )
-                out.surface_pair[row] = surface[i] * len(tangential) + surface[j]
+                write_surfaces(out, row, tangential, surface[i], surface[j])
             row += 1
     return row
 
@@ -231,11 +227,7 @@ def find_plane_contacts(
                     out.key[row] = (1 << KIND) + pair_key(i, p)
                     out.first[row], out.second[row] = i, -1 - collider[p]
                     _write_circle_contact(out, row, position[i, 0], position[i, 1], radius[i], 0.0, separation, nx, ny)
-                    out.friction[row], out.slip_target[row] = (
-                        tangential[surface[i], other, 0],
-                        tangential[surface[i], other, 1],
-                    )
-                    out.surface_pair[row] = surface[i] * len(tangential) + other
+                    write_surfaces(out, row, tangential, surface[i], other)
                 row += 1
     return row
 
@@ -289,13 +281,26 @@ def find_segment_contacts(
                 _write_circle_contact(
                     out, row, position[i, 0], position[i, 1], radius[i], segments[s, 4], separation, nx, ny
                 )
-                out.friction[row], out.slip_target[row] = (
-                    tangential[surface[i], other, 0],
-                    tangential[surface[i], other, 1],
-                )
-                out.surface_pair[row] = surface[i] * len(tangential) + other
+                write_surfaces(out, row, tangential, surface[i], other)
             row += 1
     return row
+
+
+@bare_kernel
+def write_surfaces(out: Manifolds, row: int, tangential: FloatArray, first: int, second: int) -> None:
+    """Write the surfaces of a contact whose normal has been written, and their coefficients, into row `row`.
+
+    Args:
+        out: buffer of manifolds.
+        row: its row.
+        tangential: (S, S, 4) as `BodyStore.tangential`.
+        first: surface of the first body.
+        second: surface of the second.
+    """
+    out.friction[row] = tangential[first, second, 0]
+    across = tangential[first, second, 3] * out.normal[row, 0] - tangential[first, second, 2] * out.normal[row, 1]
+    out.slip_target[row] = tangential[first, second, 1] + across
+    out.surface_pair[row] = first * len(tangential) + second
 
 
 @bare_kernel

@@ -18,7 +18,7 @@ from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.broad_phase import FIRST, ROUNDING, SECOND, contains_key, pair_key
 from sandbox.engines.reference.internal_edges import correct_internal_edge
-from sandbox.engines.reference.manifold import KIND, Manifolds, is_covered
+from sandbox.engines.reference.manifold import KIND, Manifolds, is_covered, write_surfaces
 from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces, next_corner
 from sandbox.resource_limits import MEMORY
 from sandbox.scene.compile.joint_arrays import JointArrays
@@ -188,7 +188,7 @@ class NarrowPhaseInput(NamedTuple):
     """Parameters of the narrow phase, and its scratch memory."""
 
     tangential: FloatArray
-    """(S, S, 2) coefficient of friction and slip target, m/s, of pairs of surfaces"""
+    """(S, S, 4) as `BodyStore.tangential`"""
     max_separation: float
     """m, separation below which there is a contact"""
     scratch: FloatArray
@@ -358,8 +358,6 @@ def _write(
             out.anchor[row, 1] = (bx - x) * nx + (by - y) * ny - half
             out.offset[row, 0] = (y - ay) * nx - (x - ax) * ny
             out.offset[row, 1] = (y - by) * nx - (x - bx) * ny
-            out.friction[row] = query.tangential[surface, other, 0]
-            out.slip_target[row] = query.tangential[surface, other, 1]
-            out.surface_pair[row] = surface * len(query.tangential) + other
+            write_surfaces(out, row, query.tangential, surface, other)
         row += 1
     return row

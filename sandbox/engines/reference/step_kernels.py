@@ -106,7 +106,7 @@ class BodyColumns(NamedTuple):
     restitution: FloatArray
     """(S·S,)"""
     tangential: FloatArray
-    """(S, S, 2), as in `BodyStore`"""
+    """(S, S, 4), as in `BodyStore`"""
     thrust_body: IntArray
     """(T,) index of the body that each thrust acts on"""
     thrust_point: FloatArray

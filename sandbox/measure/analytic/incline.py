@@ -151,7 +151,9 @@ def incline_motion(facts: SceneFacts, number: int) -> InclineMotion | None:
     if pair is None:
         return None
     friction = float(facts.matrix.surfaces.friction[pair])
-    surface_speed = -float(facts.matrix.surfaces.slip_target[pair]) if friction > 0.0 else 0.0
+    surfaces = facts.matrix.surfaces
+    slip = float(surfaces.slip_velocity[pair] @ along) + float(surfaces.slip_target[pair])
+    surface_speed = -slip if friction > 0.0 else 0.0
     height = float((start - point) @ normal)
     if bodies.round[number]:
         radius, foot = float(bodies.radius[number]), None

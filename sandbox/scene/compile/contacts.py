@@ -6,8 +6,8 @@ shape; bodies that can touch only frictionless surfaces need no moment of inerti
 Restitution and friction belong to a *pair* of materials. A `[[pair]]` states them. For other pairs (`mix`) a value
 stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and the default is 0. A value
 stated on a shape takes precedence over its material's. The same holds for the falloff of restitution with speed, except
-that the values of two sides add. Surface speeds add as well: each surface runs clockwise around its object. Kicks and
-one-way walls belong to one side.
+that the values of two sides add. Surface speeds add as well: each surface runs clockwise around its object. Surface
+velocities of two sides subtract: they are vectors of the world. Kicks and one-way walls belong to one side.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +23,7 @@ from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.filters import FilterTable, filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, HasMaterial
+from sandbox.scene.description.base import BodySource, HasMaterial, SurfaceVelocity
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.description.world import Kick
@@ -41,6 +41,8 @@ class ContactMaterial(NamedTuple):
     kick: Kick | None = None
     one_way: bool = False
     speed: float = 0.0
+    """m/s"""
+    velocity: SurfaceVelocity = (0.0, 0.0)
     """m/s"""
 
 
@@ -70,7 +72,10 @@ class PairTable:
     """(S, S) s/m, of each pair, symmetric"""
     slip_target: FloatArray
     """(S, S) m/s, of each pair, symmetric: velocity of the second body relative to the first, to the left of the normal
-    towards the second, at which their surfaces do not slip"""
+    towards the second, at which their surfaces do not slip; without that by surface velocities"""
+    slip_velocity: FloatArray
+    """(S, S, 2) m/s, of each pair, antisymmetric: velocity of the second body relative to the first, at which surface
+    velocities alone do not slip. Its component to the left of the normal adds to `slip_target`"""
 
     def __deepcopy__(self, _: dict[int, Any]) -> Self:
         """Return itself: it never changes, so that copies of a simulation can share it."""
@@ -105,6 +110,8 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
     speed = np.asarray([s.speed for s in surfaces], dtype=np.float64)
     slip_target = 0.0 - np.add.outer(speed, speed)  # without speeds +0, not −0
+    velocity = np.asarray([s.velocity for s in surfaces], dtype=np.float64).reshape(-1, 2)
+    slip_velocity = velocity[:, None] - velocity
     by_material: dict[str | None, list[int]] = {}
     for index, surface in enumerate(surfaces):
         by_material.setdefault(surface.material, []).append(index)
@@ -121,7 +128,7 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     if not bodies.round.all():
         shapes = bodies.shapes
         of_shape = of_part[begin[bodies.element[shapes.body]] + shapes.part]
-    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff, slip_target)
+    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff, slip_target, slip_velocity)
 
 
 def surface_parts(elements: Sequence[BodySource]) -> list[HasMaterial]:
@@ -145,6 +152,9 @@ def _with_body_surface(part: HasMaterial, body: HasMaterial) -> HasMaterial:
         restitution_falloff=body.restitution_falloff if part.restitution_falloff is None else part.restitution_falloff,
         friction=body.friction if part.friction is None else part.friction,
         surface_speed=part.surface_speed if "surface_speed" in part.model_fields_set else body.surface_speed,
+        surface_velocity=(
+            part.surface_velocity if "surface_velocity" in part.model_fields_set else body.surface_velocity
+        ),
     )
 
 
@@ -170,10 +180,10 @@ def index_surfaces(
         kept = element.material if element.material in paired else None
         kick = element.kick if isinstance(element, Wall | Post) else None
         one_way = isinstance(element, Wall) and element.one_way
-        return index_by_surface.setdefault(
-            ContactMaterial(kept, restitution, friction, falloff, kick, one_way, element.surface_speed),
-            len(index_by_surface),
+        surface = ContactMaterial(
+            kept, restitution, friction, falloff, kick, one_way, element.surface_speed, element.surface_velocity
         )
+        return index_by_surface.setdefault(surface, len(index_by_surface))
 
     of_element = np.asarray([index_of(element) for element in elements], dtype=np.int64)
     return tuple(index_by_surface)[len(known) :], of_element
@@ -232,11 +242,24 @@ class ContactMatrix:
         return float(np.max(self.surfaces.restitution[self.touching], initial=0.0))
 
     @property
-    def moving_surfaces(self) -> int:
-        """Number of surfaces with a speed and friction against another that can touch them."""
-        rubs = np.asarray((self.touching & (self.surfaces.friction > 0.0)).any(axis=1))
-        moves = np.asarray([each.speed != 0.0 for each in self.surfaces.surfaces], np.bool_)
-        return int(np.count_nonzero(moves & rubs))
+    def surfaces_with_speed(self) -> int:
+        """Number of surfaces with a speed, and with friction against another that can touch them."""
+        return self._count_rubbing([each.speed != 0.0 for each in self.surfaces.surfaces])
+
+    @property
+    def surfaces_with_velocity(self) -> int:
+        """Number of surfaces with a velocity, and with friction against another that can touch them."""
+        return self._count_rubbing([any(each.velocity) for each in self.surfaces.surfaces])
+
+    @property
+    def moving_surfaces(self) -> bool:
+        """Whether a surface with friction against another that can touch it moves."""
+        return self.surfaces_with_speed + self.surfaces_with_velocity > 0
+
+    def _count_rubbing(self, wanted: list[bool]) -> int:
+        """Return how many of the wanted (S,) surfaces have friction against another that can touch them."""
+        rubs = (self.touching & (self.surfaces.friction > 0.0)).any(axis=1)
+        return int(np.count_nonzero(np.asarray(wanted, np.bool_) & rubs))
 
     @property
     def friction(self) -> float:

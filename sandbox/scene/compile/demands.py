@@ -35,6 +35,7 @@ class Demand(StrEnum):
     FALLOFF = "falloff"
     KICKS = "kicks"
     SURFACE_SPEED = "surface speed"
+    SURFACE_VELOCITY = "surface velocity"
     ONE_WAY = "one-way walls"
     PASSABLE = "openings"
     RODS = "rods"
@@ -87,7 +88,16 @@ BALLS = frozenset(
 """Demands of scenes of balls and static colliders. Engines list their capabilities; a new demand is supported by
 none."""
 
-SURFACES = frozenset({Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED, Demand.ONE_WAY, Demand.PASSABLE})
+SURFACES = frozenset(
+    {
+        Demand.FALLOFF,
+        Demand.KICKS,
+        Demand.SURFACE_SPEED,
+        Demand.SURFACE_VELOCITY,
+        Demand.ONE_WAY,
+        Demand.PASSABLE,
+    }
+)
 """Properties of surfaces beyond restitution and friction."""
 
 FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS, Demand.PUCKS})
@@ -208,8 +218,12 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
     largest = float(np.max(surfaces.falloff[matrix.touching & (surfaces.restitution > 0.0)], initial=0.0))
     why = f"up to {largest:g} s/m" if largest else "restitution does not depend on speed"
     yield Demand.FALLOFF, largest > 0.0, why
-    why = _count(matrix.moving_surfaces, "surface moves", "surfaces move", "no surface with friction moves")
-    yield Demand.SURFACE_SPEED, matrix.moving_surfaces > 0, why
+    none = "no surface with friction moves"
+    count = matrix.surfaces_with_speed
+    yield Demand.SURFACE_SPEED, count > 0, _count(count, "surface moves", "surfaces move", none)
+    count = matrix.surfaces_with_velocity
+    why = _count(count, "surface moves along a vector", "surfaces move along a vector", none)
+    yield Demand.SURFACE_VELOCITY, count > 0, why
     touched = np.asarray(matrix.touching.any(axis=1))
     of_fixed = touched[surfaces.of_fixed]
     for demand, has_property, one, many, none in (

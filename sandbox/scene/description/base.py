@@ -60,6 +60,7 @@ Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
 SurfaceSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
+SurfaceVelocity = tuple[SurfaceSpeed, SurfaceSpeed]
 Falloff = Annotated[float, Field(ge=0, le=1e6)]
 """Decrease of restitution with speed, s/m: e(v) = e / (1 + f·v), v the speed of approach."""
 
@@ -95,6 +96,9 @@ class HasMaterial(Part):
     surface_speed: SurfaceSpeed = 0.0
     """speed of the surface, m/s, as of a conveyor belt or a drum: to the right of the outward normal, clockwise around
     the object"""
+    surface_velocity: SurfaceVelocity = (0.0, 0.0)
+    """velocity of the surface relative to the object, m/s, on all its sides and however it is turned; adds to
+    `surface_speed`"""
     colour: Colour | None = None
     """colour in the window, `#rrggbb`"""
 

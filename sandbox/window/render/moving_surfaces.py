@@ -1,19 +1,21 @@
-"""Moving surfaces: chevrons that travel along the outlines of objects with a surface speed.
+"""Moving surfaces: chevrons that travel along the outlines of objects with a surface speed or velocity.
 
 Each object has an outline that its surface follows, clockwise for a positive speed: a line for a plane, a closed curve
-for walls, posts and bodies.
+for walls, posts and bodies. With a surface velocity, chevrons travel in its direction on all sides: they are where
+parallel lines across the velocity, which move with it, cross the outline.
 """
 
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.contacts import surface_parts
-from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.base import BodySource, HasMaterial, Point
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.shapes import Piece, geometry_of
@@ -26,29 +28,56 @@ SPACING = 26.0
 HALF_WIDTH, LENGTH = 3.6, 4.6
 """px, half width and length of a chevron"""
 MAX_CHEVRONS = 600
+STEEP = 0.2
+"""Cosine of the angle between a velocity and an edge, below which the edge has no chevrons"""
 ARC_STEPS = 24
 """Segments of a full circle"""
 COLOUR = mix_colours(BACKGROUND, YELLOW, 0.75)
+
+Chevron: TypeAlias = tuple[float, float, float, float]
+"""Position of a chevron, px, and its direction."""
 
 
 def draw_moving_surfaces(view: DrawContext) -> None:
     """Draw chevrons along all visible moving surfaces of a scene."""
     drawn = 0
-    for outline, speed in _outlines(view):
-        for x, y, along_x, along_y in _chevrons(view, outline, speed):
+    for outline in _outlines(view):
+        for x, y, along_x, along_y in _chevrons(view, outline):
             drawn += 1
             if drawn > MAX_CHEVRONS:
                 return
             _draw_chevron(view, x, y, along_x, along_y)
 
 
-def _outlines(view: DrawContext) -> Iterator[tuple[FloatArray, float]]:
-    """Yield the outlines (K, 2), m, clockwise, and speeds of visible objects with a moving surface."""
+class MovingOutline(NamedTuple):
+    """Outline of an object whose surface moves."""
+
+    points: FloatArray
+    """(K, 2) m, clockwise"""
+    origin: FloatArray
+    """(2,) m, a point of the object"""
+    speed: float
+    """m/s, along the outline"""
+    velocity: FloatArray
+    """(2,) m/s"""
+
+    @classmethod
+    def of(cls, surface: HasMaterial, points: FloatArray, origin: FloatArray) -> "MovingOutline":
+        """Return the outline of an object with the motion of a surface."""
+        return cls(points, origin, surface.surface_speed, np.asarray(surface.surface_velocity))
+
+
+def _is_moving(surface: HasMaterial) -> bool:
+    return surface.surface_speed != 0.0 or any(surface.surface_velocity)
+
+
+def _outlines(view: DrawContext) -> Iterator[MovingOutline]:
+    """Yield the outlines of visible objects with a moving surface."""
     scene, bodies, frame = view.snapshot.scene, view.snapshot.bodies, view.snapshot.frame
     for collider in scene.fixed:
-        if collider.surface_speed and (isinstance(collider, Plane) or collider.solid):
-            for outline in _outline_of(view, collider):
-                yield outline, collider.surface_speed
+        if _is_moving(collider) and (isinstance(collider, Plane) or collider.solid):
+            for points, origin in _outline_of(view, collider):
+                yield MovingOutline.of(collider, points, np.asarray(origin))
     moving = [_has_moving_surface(element) for element in bodies.elements]
     if not any(moving):
         return
@@ -58,25 +87,27 @@ def _outlines(view: DrawContext) -> Iterator[tuple[FloatArray, float]]:
         element = bodies.elements[bodies.element[index]]
         parts, cos, sin = surface_parts([element]), math.cos(frame.angle[index]), math.sin(frame.angle[index])
         for piece in geometry_of(element).pieces:
-            if parts[piece.part].surface_speed:
+            if _is_moving(parts[piece.part]):
                 x, y = _around_piece(piece).T
-                turned = np.column_stack((cos * x - sin * y, sin * x + cos * y))
-                yield frame.position[index] + turned, parts[piece.part].surface_speed
+                turned, centre = np.column_stack((cos * x - sin * y, sin * x + cos * y)), frame.position[index]
+                yield MovingOutline.of(parts[piece.part], centre + turned, centre)
 
 
 def _has_moving_surface(element: BodySource) -> bool:
     if not isinstance(element, Compound):  # at once, as all elements are asked in each frame
-        return bool(element.surface_speed)
-    return any(part.surface_speed for part in surface_parts([element]))
+        return _is_moving(element)
+    return any(map(_is_moving, surface_parts([element])))
 
 
-def _outline_of(view: DrawContext, collider: Plane | Wall | Post) -> Iterator[FloatArray]:
+def _outline_of(view: DrawContext, collider: Plane | Wall | Post) -> Iterator[tuple[FloatArray, Point]]:
+    """Yield each outline of a static collider, with a point of it."""
     if isinstance(collider, Post):
-        yield _around_piece(Piece(((0.0, 0.0),), collider.radius)) + np.asarray(collider.position)
+        yield _around_piece(Piece(((0.0, 0.0),), collider.radius)) + np.asarray(collider.position), collider.position
     elif isinstance(collider, Wall):
-        yield from (_around_piece(Piece(ends, 0.5 * collider.thickness)) for ends in pairwise(_points(collider)))
+        for ends in pairwise(_points(collider)):
+            yield _around_piece(Piece(ends, 0.5 * collider.thickness)), ends[0]
     else:
-        yield _along_plane(view, collider)
+        yield _along_plane(view, collider), collider.point
 
 
 def _points(wall: Wall) -> tuple[tuple[float, float], ...]:
@@ -120,16 +151,24 @@ def _turn(before: FloatArray, after: FloatArray) -> float:
     return angle if angle > 0.0 else math.pi if before @ after < 0.0 else 0.0
 
 
-def _chevrons(view: DrawContext, outline: FloatArray, speed: float) -> Iterator[tuple[float, float, float, float]]:
-    """Yield position, px, and direction of the visible chevrons on an outline."""
-    pixels = view.camera.to_screen(outline)
+def _chevrons(view: DrawContext, outline: MovingOutline) -> Iterator[Chevron]:
+    """Yield the visible chevrons on an outline."""
+    pixels = view.camera.to_screen(np.vstack((outline.points, outline.origin)))
     if not np.isfinite(pixels).all():
         return
+    if outline.speed:
+        yield from _along_outline(view, pixels[:-1], outline.speed)
+    if outline.velocity.any():
+        yield from _across_velocity(view, pixels[:-1], pixels[-1], outline.velocity)
+
+
+def _along_outline(view: DrawContext, pixels: FloatArray, speed: float) -> Iterator[Chevron]:
+    """Yield chevrons that travel along an outline (K, 2), px, at a speed, m/s."""
     lengths = np.hypot(*np.diff(pixels, axis=0).T)
     total, spacing = float(lengths.sum()), SPACING * view.ui_scale
     if total < spacing:
         return
-    if (outline[0] == outline[-1]).all():
+    if (pixels[0] == pixels[-1]).all():
         spacing = total / round(total / spacing)
     phase, sign = math.fmod(speed * view.snapshot.frame.time * view.camera.scale, spacing), math.copysign(1.0, speed)
     area, begin = pygame.Rect((0, 0), view.camera.size), 0.0
@@ -143,6 +182,29 @@ def _chevrons(view: DrawContext, outline: FloatArray, speed: float) -> Iterator[
                 x, y = a[0] + distance * along[0], a[1] + distance * along[1]
                 yield x, y, sign * along[0], sign * along[1]
         begin += length
+
+
+def _across_velocity(
+    view: DrawContext, pixels: FloatArray, origin: FloatArray, velocity: FloatArray
+) -> Iterator[Chevron]:
+    """Yield chevrons where lines across a velocity, m/s, which move with it, cross an outline (K, 2), px."""
+    spacing, speed = SPACING * view.ui_scale, math.hypot(*velocity)
+    direction = velocity * (1.0, -1.0) / speed  # y points down on the screen
+    phase = math.fmod(speed * view.snapshot.frame.time * view.camera.scale, spacing)
+    area = pygame.Rect((0, 0), view.camera.size)
+    for a, b in pairwise(pixels.tolist()):
+        clipped = clip_segment((a[0], a[1]), (b[0], b[1]), area, 10.0 * view.ui_scale)
+        if clipped is None:
+            continue
+        start, end = np.asarray(clipped)
+        edge, length = end - start, math.dist(*clipped)
+        first, last = float((start - origin) @ direction) - phase, float((end - origin) @ direction) - phase
+        if abs(last - first) <= STEEP * length:
+            continue
+        along = edge / math.copysign(length, last - first)
+        for k in range(math.ceil(min(first, last) / spacing), math.ceil(max(first, last) / spacing)):
+            x, y = start + edge * ((k * spacing - first) / (last - first))
+            yield float(x), float(y), float(along[0]), float(along[1])
 
 
 def _draw_chevron(view: DrawContext, x: float, y: float, along_x: float, along_y: float) -> None:

@@ -24,9 +24,9 @@ from tests.window.pressing import FOCUS_LOST, key, move, press, release, wheel
 SIZE = (1280, 720)
 BALL = {"name": "cue", "position": [0.0, 1.5], "radius": 0.05, "restitution": 0.8}
 TYPED_OF_BALL = [
-    "name", "material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour", "categories",
-    "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment", "group",
-    "radius", "spin",
+    "name", "material", "restitution", "restitution_falloff", "friction", "surface_speed", "surface_velocity", "colour",
+    "categories", "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment",
+    "group", "radius", "spin",
 ]  # fmt: skip
 
 

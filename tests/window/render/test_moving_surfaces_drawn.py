@@ -46,6 +46,27 @@ def test_chevrons_travel_with_time() -> None:
     assert changed_pixels(*pictures).any()
 
 
+@pytest.mark.parametrize("name", OBJECTS)
+def test_surface_velocities_have_chevrons_that_travel(name: str) -> None:
+    (kind, (table,)) = next(iter(OBJECTS[name].items()))
+    model = from_document({kind: [{**table, "surface_velocity": [1.0, 0.3]}]})
+    still = render(snapshot(from_document(OBJECTS[name])))
+    early, late = (render(snapshot(model, frame=frame(model, time=time))) for time in (0.0, 0.1))
+    assert changed_pixels(still, early).sum() > 20
+    assert changed_pixels(early, late).any()
+
+
+def test_chevrons_of_a_velocity_point_along_it_on_both_sides() -> None:
+    """Above and below a wall they are mirror images, which those of a speed are not."""
+    still, moving = (
+        render(snapshot(from_document({"wall": [{"points": [[-2.0, 0.0], [2.0, 0.0]], "thickness": 0.8} | more]})))
+        for more in ({}, {"surface_velocity": [1.0, 0.0]})
+    )
+    changed = np.asarray(changed_pixels(still, moving))
+    assert changed.any()
+    assert (changed == changed[:, ::-1]).mean() > 0.99
+
+
 def test_surfaces_far_away_are_not_drawn() -> None:
     scene = from_document({"wall": [{"points": [[1e9, 0.0], [1e9, 1.0]], "surface_speed": 1.0}]})
     assert CAMERA is not None

@@ -28,7 +28,7 @@ REASONS = {
 }
 """Why it does not model a demand that other engines of balls model"""
 
-CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY}
+CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY, Demand.SURFACE_VELOCITY}
 """Demands that the engine models"""
 
 STEPS = ("integrator", "detection", "response", "impact", "broad_phase", "joints", "stretch")

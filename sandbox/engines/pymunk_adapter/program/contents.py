@@ -15,7 +15,7 @@ from sandbox.engines.pymunk_adapter.program.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BACKING
+from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.shapes import geometry_of
 
@@ -45,7 +45,7 @@ class PairRule:
 
 
 class Surfaces:
-    """Elasticity and friction of shapes, and the pairs that need a callback."""
+    """Elasticity, friction and surface velocity of shapes, and the pairs that need a callback."""
 
     def __init__(self, setup: Setup) -> None:
         matrix = contact_matrix(setup)
@@ -67,11 +67,19 @@ class Surfaces:
         ]
         """pairs that need a callback"""
         typed = {surface for pair in special for surface in pair}
+        velocities = [each.velocity for each in table.surfaces]
+        self.has_velocities = any(map(any, velocities))
+        """whether shapes have surface velocities"""
         self._values = [
-            (elasticity[k], friction[k], *((k + 1 if k in typed else 0,) if special else ()))
+            (
+                elasticity[k],
+                friction[k],
+                *((velocities[k],) if self.has_velocities else ()),
+                *((k + 1 if k in typed else 0,) if special else ()),
+            )
             for k in range(len(elasticity))
         ]
-        self._names: dict[tuple[float, ...], str] = {}
+        self._names: dict[tuple[float | Point, ...], str] = {}
         self._users: dict[str, dict[str, None]] = {}
 
     def name(self, surface: int, user: str) -> str:
@@ -79,6 +87,12 @@ class Surfaces:
         name = self._names.setdefault(self._values[surface], f"MATERIAL_{len(self._names) + 1}")
         self._users.setdefault(name, {})[user] = None
         return name
+
+    @property
+    def attributes(self) -> list[str]:
+        """Attributes of a shape that a constant sets."""
+        velocity = ["surface_velocity"] if self.has_velocities else []
+        return ["elasticity", "friction", *velocity, *(["collision_type"] if self.rules else [])]
 
     @property
     def constants(self) -> list[str]:

@@ -168,10 +168,10 @@ def _constants(contents: Contents) -> Iterator[str]:
     """Yield materials and filters. Blocks have been made before, so that only used ones are defined."""
     materials, filters = contents.surfaces.constants, contents.filters.constants
     if materials:
-        columns = "elasticity, friction and collision type" if contents.surfaces.rules else "elasticity and friction"
+        *columns, last = (attribute.replace("_", " ") for attribute in contents.surfaces.attributes)
         yield from comment(
-            f"Materials: {columns}. pymunk multiplies the values of two shapes, so these are factors: their products "
-            "are the coefficients of the pairs that can touch."
+            f"Materials: {', '.join(columns)} and {last}. pymunk multiplies elasticity and friction of two shapes, so "
+            "these are factors: their products are the coefficients of the pairs that can touch."
         )
         yield from materials
         yield ""
@@ -194,9 +194,7 @@ def _wrapped(numbers: Sequence[int]) -> Iterator[str]:
 
 def _helpers(contents: Contents) -> Iterator[str]:
     if contents.surfaces.constants:
-        columns = "shape.elasticity, shape.friction"
-        if contents.surfaces.rules:
-            columns += ", shape.collision_type"
+        columns = ", ".join(f"shape.{attribute}" for attribute in contents.surfaces.attributes)
         yield from (
             "",
             "def with_surface(shape, material, shape_filter):",
@@ -213,8 +211,8 @@ def _helpers(contents: Contents) -> Iterator[str]:
             '    """Set restitution, friction and slip speed (m/s) of a contact, before it is solved."""',
             "    arbiter.restitution, arbiter.friction, slip = coefficients",
             "    if slip:  # a moving surface: the speed at which two surfaces do not rub, along the contact",
-            "        normal = arbiter.normal",
-            "        arbiter.surface_velocity = (slip * normal.y, -slip * normal.x)",
+            "        normal, velocity = arbiter.normal, arbiter.surface_velocity",
+            "        arbiter.surface_velocity = (velocity.x + slip * normal.y, velocity.y - slip * normal.x)",
             "",
         )
     if len(contents.setup.links):
