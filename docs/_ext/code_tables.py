@@ -53,12 +53,14 @@ COMPANIONS: dict[str, dict[str, object]] = {
     "stiffness": {"response": "penalty"},
     "damping": {"response": "penalty"},
     "stretch": {"joints": "relaxation"},
+    "sleep_time": {"sleeping": True},
+    "idle_speed": {"sleeping": True},
 }
 """Choices that a key needs beside it."""
 
 VALUES: dict[str, object] = {
     "slop": 0.001, "bias": 0.01, "persistence": 1, "stiffness": 1e4, "damping": 0.5, "half_kick": True, "stretch": 0.1,
-    "continuous": True, "sleeping": True, "workers": 2,
+    "continuous": True, "sleeping": True, "sleep_time": 0.3, "idle_speed": 0.1, "workers": 2,
 }  # fmt: skip
 """A value of each key that is no word."""
 

@@ -105,6 +105,34 @@ def moving_surfaces() -> pymunk.Space:
     return space
 
 
+def sleeping() -> pymunk.Space:
+    """Return a space of piles and a chain that fall asleep, and are hit later."""
+    space, rng = space_with_walls(), random.Random(2)
+    space.sleep_time_threshold, space.idle_speed_threshold = 0.3, 20.0
+    for column in range(5):
+        for row in range(5 - column % 3):
+            body = pymunk.Body(5, pymunk.moment_for_box(5, (20, 20)))
+            body.position = 60 * column - 150, 12 + 20.5 * row
+            box = pymunk.Poly.create_box(body, (20, 20))
+            box.friction = 0.6
+            space.add(body, box)
+    previous = space.static_body
+    for k in range(6):
+        body = pymunk.Body(2, 100)
+        body.position = 150 + 21 * k, 30
+        circle = pymunk.Circle(body, 9)
+        circle.friction = 0.7
+        space.add(body, circle)
+        if k:
+            space.add(pymunk.PinJoint(previous, body))
+        previous = body
+    for height in (900, 1500, 2500):
+        body = pymunk.Body(4, 300)
+        body.position = rng.uniform(-100, 200), height
+        space.add(body, pymunk.Circle(body, 12))
+    return space
+
+
 def joints() -> pymunk.Space:
     """Return a space with a chain, and with one joint of each kind that a scene has."""
     space = pymunk.Space()
@@ -230,14 +258,14 @@ def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, lis
     return captured, differences
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, limited_joints, kinematic])
 def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     captured, differences = compare(make())
     assert not captured.omitted
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, limited_joints, kinematic])
 def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     space.damping = 0.9
@@ -247,7 +275,7 @@ def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[]
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, limited_joints, kinematic])
 def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     scene = from_pymunk(space, dt=DT, title="captured")
@@ -402,7 +430,6 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
     [
         (lambda s, b, c: setattr(s, "damping", 1.5), "space.damping = 1.5"),
         (lambda s, b, c: setattr(s, "damping", 0.0), "space.damping = 0"),
-        (lambda s, b, c: setattr(s, "sleep_time_threshold", 0.5), "sleeping"),
         (lambda s, b, c: s.on_collision(1, 2, begin=lambda *_: None), "1 collision callbacks"),
         (lambda s, b, c: setattr(b, "velocity_func", _velocity_function), "velocity or position function of body-1"),
         (lambda s, b, c: b.apply_force_at_local_point((1, 0)), "force on body-1"),

@@ -317,3 +317,41 @@ def test_settings_of_the_recording_are_those_of_the_space() -> None:
     settings = captured.recording.settings
     assert (settings.slop, settings.iterations, settings.dt) == (space.collision_slop, 17, DT)
     assert ENGINES["pymunk"].missing(captured.recording.scene, settings) == ()
+
+
+class Sleeper:
+    """A game whose bodies fall asleep, and are woken in every way that a recording has."""
+
+    def __init__(self, calls: bool) -> None:
+        self.space, self.calls = space_with_walls(), calls
+        self.space.sleep_time_threshold, self.space.idle_speed_threshold = 0.3, 30.0
+        self.row = [disc(self.space, 25 * k - 200, 14) for k in range(8)]
+
+    def update(self, k: int) -> None:
+        if k == 60:
+            self.row[3].velocity = 0, 200
+        if k == 100:
+            self.row[0].apply_impulse_at_local_point((10, 500))
+        if k == 130:
+            disc(self.space, 100, 300)
+        if k == 140:
+            self.space.gravity = 0, -800
+        if 160 <= k < 180:
+            self.row[5].apply_force_at_local_point((500, 0))
+        if k == 190 and self.calls:
+            self.row[7].activate()
+
+
+@pytest.mark.parametrize("calls", [False, True])
+def test_replay_of_a_game_whose_bodies_fall_asleep(calls: bool) -> None:
+    game = Sleeper(calls)
+    captured = play(game)  # type: ignore[arg-type]
+    slept = [body.is_sleeping for body in game.row]
+    assert any(slept) and not all(slept)
+    assert captured.omitted == (("bodies that the game wakes or puts to sleep by a call",) if calls else ())
+    assert pymunk.Body.activate.__qualname__ == "Body.activate"  # replaced only within the block
+    if not calls:
+        ends = end_of(captured.recording)
+        for body, name in captured.spaces[0].names.items():
+            if body.body_type == pymunk.Body.DYNAMIC:
+                assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name

@@ -22,7 +22,16 @@ from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import shipped
-from tests.engines.test_capture import balls, joints, kinematic, limited_joints, mixed, pyramid
+from tests.engines.test_capture import (
+    balls,
+    joints,
+    kinematic,
+    limited_joints,
+    mixed,
+    moving_surfaces,
+    pyramid,
+    sleeping,
+)
 from tests.strategies import OUTLINES, numbers, pairs
 
 SUBSTEPS = 300
@@ -409,7 +418,7 @@ def _joints(draw: st.DrawFn, names: list[str]) -> dict[str, Any]:
     return {"kind": kind, **draw(joint)}
 
 
-@pytest.mark.parametrize("make", [balls, pyramid, mixed, joints, limited_joints, kinematic])
+@pytest.mark.parametrize("make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, limited_joints, kinematic])
 def test_space_scene_program_space_round_trip(make: Callable[[], pymunk.Space]) -> None:
     """A captured space, its scene as a program, and the space that the program makes: the same bits, and scene."""
     space = make()

@@ -201,6 +201,14 @@ def test_code_gives_a_space_the_recommended_values(substeps: int, half_kick: boo
     assert body.velocity.y == pytest.approx(-10.0 * (1.0 / FPS + (0.5 * h if half_kick else 0.0)), rel=1e-12)
 
 
+def test_code_sets_the_sleep_of_a_space() -> None:
+    asked = Settings(dt=1.0 / FPS, sleeping=True, idle_speed=0.2)
+    code = game_code("pymunk", ENGINES["pymunk"].resolve(scene_of(BULLET), asked), FPS, 50.0, is_slop_stated=False)
+    space = pymunk.Space()
+    exec("\n".join(code.lines), {"space": space})
+    assert (space.sleep_time_threshold, space.idle_speed_threshold) == (0.5, 0.2)
+
+
 def test_defaults_of_pymunk_are_those_of_a_new_space() -> None:
     space = pymunk.Space()
     for name, value in SPACE_DEFAULTS.items():

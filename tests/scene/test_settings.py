@@ -31,7 +31,7 @@ def test_settings_left_to_the_engine_are_none() -> None:
     unset = {key for key, value in Settings().model_dump().items() if value is None}
     choices = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
     contacts = {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
-    assert unset == choices | contacts | {"continuous", "sleeping", "workers"}
+    assert unset == choices | contacts | {"continuous", "sleeping", "sleep_time", "idle_speed", "workers"}
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])

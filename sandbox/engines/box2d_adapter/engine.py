@@ -37,6 +37,8 @@ ABSENT = {
     "damping": "it has no penalty springs",
     "stretch": "it has no joints = 'relaxation'",
     "broad_phase": "it always uses its own tree",
+    "sleep_time": "bodies of Box2D fall asleep after 0.5 s",
+    "idle_speed": "bodies of Box2D are idle below 0.05 of its length units in a second",
 }
 """Settings that Box2D does not have, with the reason"""
 

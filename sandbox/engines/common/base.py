@@ -271,12 +271,19 @@ BIAS = (1.0 - 0.1) ** 60
 """pymunk's default: a tenth of an overlap is corrected in 1/60 s."""
 
 
-BOX2D_SETTINGS = "continuous", "sleeping", "workers"
+BOX2D_SETTINGS = "continuous", "workers"
+SLEEP_SETTINGS = "sleeping", "sleep_time", "idle_speed"
 
 
 def box2d_settings_in(settings: Settings) -> list[str]:
     """Return why the settings of Box2D that are stated are not supported, for the other engines."""
     return [f"{key} applies to box2d only; remove it" for key in BOX2D_SETTINGS if getattr(settings, key) is not None]
+
+
+def library_settings_in(settings: Settings) -> list[str]:
+    """Return why the settings of Box2D and pymunk that are stated are not supported, for the hand-written engines."""
+    stated = [key for key in SLEEP_SETTINGS if getattr(settings, key) is not None]
+    return box2d_settings_in(settings) + [f"{key} is not supported; no body falls asleep; remove it" for key in stated]
 
 
 def slop_of(start: Scene | Setup) -> float:

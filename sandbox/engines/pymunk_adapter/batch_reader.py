@@ -12,12 +12,13 @@ import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 from pymunk.batch import Buffer
 
-from sandbox.arrays import FloatArray
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart
 from sandbox.engines.pymunk_adapter.reader import (
     LIST,
     SECOND_FLAGS,
     STATE,
+    STATE_BY_ID,
     STATE_WIDTH,
     TOUCH_FLAGS,
     VECTORS,
@@ -25,6 +26,9 @@ from sandbox.engines.pymunk_adapter.reader import (
     WORD,
     listing_into,
 )
+
+OrderOf = Callable[[bytes], IntArray | None]
+"""Returns the rows of a list of bodies, given by its ids, in the order of the reader; None if they are in it."""
 
 MAX_ROWS = 4096
 """Largest number of lists of bodies in a batch."""
@@ -58,14 +62,20 @@ class Batch(NamedTuple):
 class BatchReader:
     """Makes many substeps of a space, and lists its bodies and contacts."""
 
-    def __init__(self, space: pymunk.Space) -> None:
-        self._space = space
+    def __init__(self, space: pymunk.Space, order_of: OrderOf | None = None) -> None:
+        """Create a reader.
+
+        Args:
+            space: the space.
+            order_of: `SpaceReader.order_of` if bodies may fall asleep, else None.
+        """
+        self._space, self._order_of = space, order_of
         # A buffer leaks its first memory, and its memory moves when it grows: there is one of each kind, and that of
         # the bodies is owned by numpy and never grows.
         self._bodies, self._arbiters = Buffer(), Buffer()
         self._states: FloatArray = np.empty(0)
         self._body_list, self._contact_list = listing_into(self._bodies), listing_into(self._arbiters)
-        self._body_list.fields = STATE.value
+        self._body_list.fields = (STATE if order_of is None else STATE_BY_ID).value
 
     def max_rows(self, bodies: int) -> int:
         """Return how many lists of a number of bodies fit into a batch, at least 1."""
@@ -125,6 +135,8 @@ class BatchReader:
                         self._space.step(h)
                     if lists_substeps or k == substeps - 1:
                         each_body(space, LIST_BODY, body_list)
+                        if self._order_of is not None:
+                            self._put_in_order(rows[row], self._order_of)
                         row += 1
                     if lists_contacts:
                         each_contact(space, LIST, contact_list)
@@ -146,6 +158,14 @@ class BatchReader:
                 warm_starts,
             )
         return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], contacts, is_checked)
+
+    def _put_in_order(self, row: FloatArray, order_of: OrderOf) -> None:
+        """Bring the last list of bodies, (6·R,), into the order of the reader, and drop its ids."""
+        ids = self._bodies._int_arr
+        order = order_of(ffi.buffer(ids.arr, ids.num * WORD)[:])
+        if order is not None:
+            row[:] = row.reshape(-1, STATE_WIDTH)[order].reshape(-1)
+        ids.num = 0
 
     def _prepare(self, rows: int, width: int) -> FloatArray:
         """Return memory for lists of bodies, (rows, width), into which they will be written."""

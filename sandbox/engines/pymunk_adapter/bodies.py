@@ -145,7 +145,7 @@ class PymunkBodies:
         self.present: BoolArray = np.ones(len(self.bodies), dtype=np.bool_)
         self.ended = False
         self._fresh = True
-        self.h = settings.h
+        self.h, self._settings = settings.h, settings
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
         self.velocity[~self.bodies.fixed] += self.ahead
         self.roll = self.bodies.roll.copy()
@@ -266,8 +266,9 @@ class PymunkBodies:
         state = self.position, self.velocity, self.angle, self.angular_velocity
         self.particles.rebuild_arrays(*state, bodies)
         self.particles.join(indices[is_particle & ~bodies.fixed[indices]])
-        # In the space, a body that nothing can turn gets no moment. A particle keeps it, for torques of actions.
-        moment = np.where(matrix.turnable, bodies.moment, math.inf)
+        # In the space, a body that nothing can turn gets no moment, unless its rotation could keep it awake. A particle
+        # keeps it, for torques of actions.
+        moment = np.where(matrix.turnable | bool(self._settings.sleeping), bodies.moment, math.inf)
         in_space = indices[~is_particle]
         position, velocity, angle, spin = (array[in_space] for array in state)
         self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])
@@ -277,10 +278,10 @@ class PymunkBodies:
     def _driven(self) -> BoolArray:
         """(N,) bodies that only the space can move: kinematic ones, and those with thrusts or drives.
 
-        All bodies if they attract each other, or on a surface.
+        All bodies if they attract each other or can fall asleep, or on a surface.
         """
         space_bodies, scene = self.space_bodies, self.scene
-        if space_bodies.field.between_bodies or self.tabletop is not None:
+        if space_bodies.field.between_bodies or self.tabletop is not None or self._settings.sleeping:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not (scene.thrusts or scene.drives):
             return self.bodies.kinematic
@@ -295,7 +296,7 @@ class PymunkBodies:
             ActionError: the settings or the engine do not support the change.
         """
         scene = setup.scene
-        if faults := combination_faults(scene, self._half_kick > 0.0, bool(self.bodies.kinematic.any())):
+        if faults := combination_faults(scene, self._settings, bool(self.bodies.kinematic.any())):
             raise ActionError(faults[0])
         bodies, matrix = self.bodies, self._contact_matrix
         same_bodies = spawned is None and has_same_bodies(scene, self.scene)
@@ -332,7 +333,7 @@ class PymunkBodies:
         bodies = self.bodies.joined_by(single, name)
         if self.tabletop is not None and (reason := next(unsupported_by_steppers(self.setup, bodies), None)):
             raise ActionError(reason)
-        if faults := combination_faults(scene, self._half_kick > 0.0, bool(bodies.kinematic.any())):
+        if faults := combination_faults(scene, self._settings, bool(bodies.kinematic.any())):
             raise ActionError(f"pymunk: {faults[0]}")
         matrix = derive_contacts(self.setup, bodies)
         self.refresh()

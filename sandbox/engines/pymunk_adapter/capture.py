@@ -18,12 +18,13 @@ from typing import Any, TypeAlias
 import pymunk
 
 from sandbox.engines.common.base import BIAS
-from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
+from sandbox.engines.pymunk_adapter.engine import PERSISTENCE, SLEEP_TIME
 from sandbox.engines.pymunk_adapter.shape_filters import MAX_CATEGORIES, FilterKind, SceneFilters
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_SPEED
+from sandbox.scene.description.world import MAX_SLEEP_TIME
 from sandbox.scene.editing.elements import unique_name
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
@@ -93,6 +94,7 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
         document["solver"]["bias"] = float(space.collision_bias)
     if space.collision_persistence != PERSISTENCE:
         document["solver"]["persistence"] = int(space.collision_persistence)
+    document["solver"] |= sleep_settings_of(space)
     capture.note_space()
     document |= capture.elements()
     try:
@@ -109,6 +111,18 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
 def damping_of(space: pymunk.Space) -> KeyValues:
     """Return the damping of a space as a key of `[world]`; empty if it has none, or one that a scene cannot have."""
     return {"damping": float(space.damping)} if 0.0 < space.damping < 1.0 else {}
+
+
+def sleep_settings_of(space: pymunk.Space) -> KeyValues:
+    """Return the sleep settings of a space as keys of `[solver]`; empty if no body falls asleep."""
+    if space.sleep_time_threshold > MAX_SLEEP_TIME:
+        return {}
+    values: KeyValues = {"sleeping": True}
+    if space.sleep_time_threshold != SLEEP_TIME:
+        values["sleep_time"] = max(float(space.sleep_time_threshold), 0.0)
+    if space.idle_speed_threshold:
+        values["idle_speed"] = float(space.idle_speed_threshold)
+    return values
 
 
 class CaptureWarning(UserWarning):
@@ -194,8 +208,6 @@ class SpaceElements:
         space = self.space
         if not damping_of(space) and space.damping != 1.0:
             self.omitted.append(f"space.damping = {space.damping:g}; `world.damping` is above 0 and at most 1")
-        if math.isfinite(space.sleep_time_threshold):
-            self.omitted.append("sleeping of bodies (space.sleep_time_threshold)")
         if space.current_time_step:
             self.inexact.append(
                 "the space has been stepped: impulses of its contacts, kept for warm starting, are not captured"
@@ -216,13 +228,21 @@ class SpaceElements:
         for shape in self._shapes[:fixed_count]:
             table, values = self._collider(shape)
             tables.setdefault(table, []).append(values)
-        all_balls = True
-        for body, shapes in self._bodies_in_order(self._shapes[fixed_count:]):
+        all_balls, in_order = True, list(self._bodies_in_order(self._shapes[fixed_count:]))
+        if sleep_settings_of(self.space):
+            self._note_order([body for body, _ in in_order])
+        for body, shapes in in_order:
             table, values = self._body(body, shapes, can_be_ball=all_balls)
             all_balls = table == "ball"
             tables.setdefault(table, []).append(values)
         joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
         return tables | ({"joint": joints} if joints else {})
+
+    def _note_order(self, bodies: Sequence[pymunk.Body]) -> None:
+        """Note if bodies are in another order than in the space: those that wake together have contacts in it."""
+        moving = [body for body in bodies if body.body_type != pymunk.Body.STATIC]
+        if moving != [body for body in self.space.bodies if body in set(moving)]:
+            self.inexact.append("bodies were added in another order than their shapes, in which they wake here")
 
     def _leading_static_count(self) -> int:
         """Return how many of the first shapes become walls and posts: segments, then circles, at rest at the origin.
@@ -355,7 +375,7 @@ class SpaceElements:
         if self._notes_forces and is_dynamic and (any(body.force) or body.torque):
             self.omitted.append(f"the force on {name} that was applied for the next step only")
         if body.is_sleeping:
-            self.omitted.append(f"{name} sleeps")
+            self.omitted.append(f"{name} sleeps; in the scene it starts awake")
         if math.hypot(*body.velocity) > MAX_SPEED:
             raise CaptureError(f"{name} is faster than {MAX_SPEED:g} m/s")
 

@@ -47,8 +47,10 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     space.collision_slop = settings.slop
     space.collision_bias = settings.bias
     space.collision_persistence = settings.persistence
-    space.sleep_time_threshold = math.inf  # a sleeping pile would be another model
-    space.idle_speed_threshold = 0.0
+    space.sleep_time_threshold, space.idle_speed_threshold = math.inf, 0.0
+    if settings.sleeping:
+        assert settings.sleep_time is not None and settings.idle_speed is not None
+        space.sleep_time_threshold, space.idle_speed_threshold = settings.sleep_time, settings.idle_speed
     return space
 
 
@@ -203,12 +205,15 @@ class SurfaceSetter:
             self.one_way_walls.rebuild(surfaces, touching)
 
     def set_surface(self, shape: pymunk.Shape, surface: int) -> None:
-        """Set the surface of a shape."""
-        shape.elasticity = self._elasticity[surface]
-        shape.friction = self._friction[surface]
-        if self._has_velocity:
+        """Set the surface of a shape. Values that it has already are not set, which would wake its body."""
+        if shape.elasticity != self._elasticity[surface]:
+            shape.elasticity = self._elasticity[surface]
+        if shape.friction != self._friction[surface]:
+            shape.friction = self._friction[surface]
+        if self._has_velocity and shape.surface_velocity != self._velocity[surface]:
             shape.surface_velocity = self._velocity[surface]
-        shape.collision_type = surface + 1  # 0 is pymunk's default for shapes without a type
+        if shape.collision_type != surface + 1:
+            shape.collision_type = surface + 1  # 0 is pymunk's default for shapes without a type
 
 
 def _pairs(matrix: BoolArray) -> list[tuple[int, int]]:

@@ -254,12 +254,14 @@ class PymunkEnergyLedger:
         self._population = population
         self._breaks = np.full(len(population.setup.links), np.inf)
         self._potential: tuple[tuple[Scene, Bodies], Potential] | None = None
+        self._was_asleep: BoolArray | None = None  # at the start of the substep
         population.space_bodies.field.applied = {}
         population.space_bodies.contact_reader.points()  # from now on warm-start impulses are recorded
 
     def opening(self) -> EnergyState | None:
         """Return the state at the start of a substep; None if only gravity acts on all moving bodies."""
         p = self._population
+        self._was_asleep = p.space_bodies.asleep
         return None if p.particles.has_only_gravity and not len(p.space_bodies) else self._state()
 
     def _state(self) -> EnergyState:
@@ -282,6 +284,10 @@ class PymunkEnergyLedger:
         included[p.space_bodies.drives.indices] = False  # accounted separately below
         kinematic = np.flatnonzero(p.bodies.kinematic & p.present)
         included[kinematic] = False  # likewise
+        drifts, asleep = included, p.space_bodies.asleep
+        if self._was_asleep is not None and asleep is not None:
+            # Bodies fall asleep and wake between the change of positions and that of velocities.
+            drifts, included = included & ~self._was_asleep, included & ~asleep
         end = self._state()
         now = before.interpolated(end, fraction)
         if now is not end:
@@ -296,9 +302,13 @@ class PymunkEnergyLedger:
         applied.angular[~self._can_turn()] = 0.0
         joint_impulses = springs(p.space_bodies.joints, end.position, end.angle, p.h) if joints else ((), ())
         by_stiffness, by_damping = (tuple(each.scaled(fraction) for each in impulses) for impulses in joint_impulses)
+        if asleep is not None:
+            by_stiffness, by_damping = (
+                tuple(each.without(asleep) for each in impulses) for impulses in (by_stiffness, by_damping)
+            )
         points = p.space_bodies.contact_reader.points().scaled(fraction)
 
-        self._move(before, now, included, fraction, applied, (velocity, spin))
+        self._move(before, now, drifts, fraction, applied, (velocity, spin))
         for each in by_stiffness:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
         account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1]) + applied.angular_drag @ spin[:-1]))
@@ -326,7 +336,7 @@ class PymunkEnergyLedger:
             driven = kinematic_work(kinematic, (before, now), means, other_impulses, joint_sums, p.bodies, gravity)
             account.add(Cause.DRIVES, driven)
         if joint_sums is not None:
-            self._joints(joint_sums, end, fraction, velocity, spin)
+            self._joints(joint_sums, end, fraction, velocity, spin, asleep)
 
     def joints_broken(self, indices: IntArray) -> None:
         """Account the stored energy of joints, by their indices, that have broken."""
@@ -354,7 +364,7 @@ class PymunkEnergyLedger:
         self,
         before: EnergyState,
         now: EnergyState,
-        included: BoolArray,
+        drifts: BoolArray,
         fraction: float,
         applied: AppliedImpulses,
         mean: tuple[FloatArray, FloatArray],
@@ -365,10 +375,10 @@ class PymunkEnergyLedger:
         """
         p = self._population
         h = p.h * fraction
-        drift = np.where(included[:, None], before.position + before.velocity * h, now.position)
-        drift_angle = np.where(included, before.angle + before.spin * h, now.angle)
-        weight = np.where(included, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
-        drift_work = float(np.sum(weight * np.where(included[:, None], drift - before.position, 0.0)))
+        drift = np.where(drifts[:, None], before.position + before.velocity * h, now.position)
+        drift_angle = np.where(drifts, before.angle + before.spin * h, now.angle)
+        weight = np.where(drifts, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
+        drift_work = float(np.sum(weight * np.where(drifts[:, None], drift - before.position, 0.0)))
         correction_work = float(np.sum(weight * (now.position - drift)))
         start, middle, end = self._stored_energy(before, EnergyState(drift, drift_angle, *now[2:]), now).tolist()
         impulse_work = float(np.sum(applied.weight * mean[0][:-1]))
@@ -408,12 +418,20 @@ class PymunkEnergyLedger:
         return ImpulseSums(np.vstack((linear, np.zeros((1, 2)))), np.append(angular, 0.0), np.union1d(rigid.a, rigid.b))
 
     def _joints(
-        self, joint_sums: ImpulseSums, end: EnergyState, fraction: float, velocity: FloatArray, spin: FloatArray
+        self,
+        joint_sums: ImpulseSums,
+        end: EnergyState,
+        fraction: float,
+        velocity: FloatArray,
+        spin: FloatArray,
+        asleep: BoolArray | None,
     ) -> None:
         """Account the work of joints, with motors as drives."""
         by_motors: JointImpulses = motors(
             self._population.space_bodies.joints, end.position, end.angle, joint_sums
         ).scaled(fraction)
+        if asleep is not None:
+            by_motors = by_motors.without(asleep)
         joint_sums.subtract(by_motors)
         self.account.add(Cause.DRIVES, by_motors.work(velocity, spin))
         self.account.add(Cause.JOINTS, joint_sums.work(velocity, spin))

@@ -43,6 +43,8 @@ SPACE_ATTRIBUTES = {
     "slop": "collision_slop",
     "bias": "collision_bias",
     "persistence": "collision_persistence",
+    "sleep_time": "sleep_time_threshold",
+    "idle_speed": "idle_speed_threshold",
 }
 """Attribute of `pymunk.Space` for each setting"""
 
@@ -51,6 +53,8 @@ SPACE_DEFAULTS = {
     "collision_slop": 0.1,
     "collision_bias": (1.0 - 0.1) ** 60,
     "collision_persistence": 3,
+    "sleep_time_threshold": math.inf,
+    "idle_speed_threshold": 0.0,
 }
 """Values of these attributes in a new space (pymunk 7.3.1)"""
 
@@ -60,8 +64,20 @@ def is_space_default(attribute: str, value: float) -> bool:
     return math.isclose(value, SPACE_DEFAULTS[attribute], rel_tol=1e-5)
 
 
+def space_attributes(settings: Settings) -> dict[str, float]:
+    """Return the values of the attributes of a `pymunk.Space` for resolved settings, by attribute.
+
+    Attributes of sleep are left out if no body falls asleep, which is pymunk's default.
+    """
+    values = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
+    return {name: value for name, value in values.items() if value is not None}
+
+
 FILTER_BITS = 30
 """Bits of pymunk's collision filters that bodies and static colliders may use; zones use the other two."""
+
+SLEEP_TIME = 0.5
+"""s, default of `sleep_time`, as in Box2D; pymunk's own default is that no body falls asleep"""
 
 PERSISTENCE = 3
 """pymunk's default, substeps"""
@@ -104,13 +120,19 @@ class PymunkEngine:
             missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
         if settings.stretch is not None:
             missing.append("stretch applies to joints = 'relaxation', which it does not have")
-        missing += combination_faults(scene, settings.half_kick, bool(setup.bodies.kinematic.any()))
+        if not settings.sleeping:
+            missing += [
+                f"{key} applies to sleeping = true only"
+                for key in ("sleep_time", "idle_speed")
+                if getattr(settings, key) is not None
+            ]
+        missing += combination_faults(scene, settings, bool(setup.bodies.kinematic.any()))
         if on_floor(setup):
             missing += unsupported_by_steppers(setup)
         return (*missing, *overload(setup, settings), *size_faults(setup))
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
-        """Return the settings with defaults for slop, bias, persistence and the values that describe pymunk."""
+        """Return the settings with defaults for slop, bias, persistence, sleeping, and values that describe pymunk."""
         setup = Setup.of(start)
         defaults: dict[str, object] = {
             "slop": slop_of(setup),
@@ -120,6 +142,8 @@ class PymunkEngine:
         }
         if len(setup.links):
             defaults["joints"] = "impulses"
+        if settings.sleeping:
+            defaults |= {"sleep_time": SLEEP_TIME, "idle_speed": 0.0}
         return settings.replace(**{k: v for k, v in defaults.items() if getattr(settings, k) is None})
 
     def start(self, start: Scene | Setup, settings: Settings | None = None) -> "PymunkSimulation":

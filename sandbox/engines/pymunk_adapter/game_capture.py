@@ -8,8 +8,8 @@ What actions cannot state is a remark and never left out silently, as in `captur
 """
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Set
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping, Set
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -64,6 +64,7 @@ class SpaceForm:
                 space.collision_bias,
                 space.collision_persistence,
                 space.sleep_time_threshold,
+                space.idle_speed_threshold,
                 len(getattr(space, "_handlers", ())),
             ),
             {
@@ -154,6 +155,10 @@ class SpaceCapture:
         self._states = {body: MotionState.of(body) for body in self._names}
         self._form = SpaceForm.of(self.space, self._names)
 
+    def omit(self, remark: str) -> None:
+        """Note something that the recording lacks."""
+        self._omitted[remark] = None
+
     @property
     def time(self) -> float:
         """Time of the next step, s."""
@@ -242,6 +247,11 @@ class GameCapture:
         found.before_step(dt)
         return found
 
+    def note_sleep(self, body: pymunk.Body) -> None:
+        """Note a call by which the game wakes a body or puts it to sleep."""
+        if body.space in self._captures:
+            self._captures[body.space].omit("bodies that the game wakes or puts to sleep by a call")
+
     @property
     def spaces(self) -> list[SpaceCapture]:
         """Captures of all spaces, in the order of their first steps."""
@@ -301,8 +311,29 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
         step(space, dt)
         found.after_step()
 
-    pymunk.Space.step = watched  # type: ignore[method-assign, assignment]
-    try:
+    with ExitStack() as stack:
+        stack.enter_context(_replaced(pymunk.Space, "step", watched))
+        for name in ("activate", "sleep", "sleep_with_group"):
+            stack.enter_context(_replaced(pymunk.Body, name, _noted(game, getattr(pymunk.Body, name))))
         yield game
+
+
+def _noted(game: GameCapture, method: Callable[..., None]) -> Callable[..., None]:
+    """Return a method of bodies that is noted when the game calls it."""
+
+    def noted(body: pymunk.Body, *arguments: Any) -> None:
+        method(body, *arguments)
+        game.note_sleep(body)
+
+    return noted
+
+
+@contextmanager
+def _replaced(owner: type, name: str, function: Callable[..., None]) -> Iterator[None]:
+    """Replace a method of a class within a `with` block."""
+    before = getattr(owner, name)
+    setattr(owner, name, function)
+    try:
+        yield
     finally:
-        pymunk.Space.step = step  # type: ignore[method-assign]
+        setattr(owner, name, before)

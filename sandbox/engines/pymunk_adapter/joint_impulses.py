@@ -30,6 +30,12 @@ class JointImpulses(NamedTuple):
         """Return fractions of them, one for all or (K,)."""
         return self._replace(impulse=(self.impulse.T * fraction).T, angular_impulse=self.angular_impulse * fraction)
 
+    def without(self, asleep: BoolArray) -> Self:
+        """Return those without a body that is asleep, (N,): pymunk does not apply the others."""
+        is_applied = ~np.append(asleep, False)  # the world is the last
+        kept = is_applied[self.a] & is_applied[self.b]
+        return type(self)(*(column[kept] for column in self))
+
     def separating_velocity(self, velocity: FloatArray, spin: FloatArray) -> FloatArray:
         """Return the velocities of the second anchors relative to the first, (K, 2) m/s.
 

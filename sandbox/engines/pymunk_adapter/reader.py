@@ -50,6 +50,8 @@ class IdTable:
 
 STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 STATE_WIDTH = 6  # x, y, angle, vx, vy, ω, in the order of pymunk's flags
+STATE_BY_ID = STATE | BodyFields.BODY_ID
+"""Fields of bodies that may fall asleep, which changes the order in which Munk2D lists them."""
 
 TOUCH = (
     ArbiterFields.BODY_A_ID
@@ -85,13 +87,19 @@ the call itself."""
 class SpaceReader:
     """Reads bodies and arbiters of one space.
 
-    pymunk lists bodies in its own order, which changes when a body is removed, so rows are identified by body id. The
+    pymunk lists bodies in its own order, which changes when a body is removed, so rows are identified by body id. A
+    body that falls asleep or wakes changes the order too: with `can_sleep`, each list is brought into the order in
+    which ids were read. The
     memory of a buffer moves when it grows, and each new buffer leaks. Hence there is one buffer of each kind, and only
     copies of its contents are returned.
     """
 
-    def __init__(self, space: pymunk.Space) -> None:
-        self._space = space
+    def __init__(self, space: pymunk.Space, can_sleep: bool = False) -> None:
+        self._space, self._can_sleep = space, can_sleep
+        self._fields = STATE_BY_ID if can_sleep else STATE
+        self._ids: IntArray = np.empty(0, np.int64)  # of all bodies, in the order of rows
+        self._rank = self._ids  # rank of each of these ids
+        self._reordered: tuple[bytes, IntArray] = b"", self._ids  # ids of a list in another order, and its sorted rows
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
         self._listing = listing_into(self._arbiters)
         self.keep_last = False
@@ -127,8 +135,10 @@ class SpaceReader:
         if self._is_order_stale:
             self._read_order()
         self._bodies.clear()
-        get_space_bodies(self._space, STATE, self._bodies)
+        get_space_bodies(self._space, self._fields, self._bodies)
         table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
+        if self._can_sleep and (order := self.order_of(bytes(self._bodies.int_buf()))) is not None:
+            table = table[order]
         return self._indices, table[: len(self._rows)] if self._moving_come_first else table[self._rows]
 
     def indices(self, ids: IntArray) -> IntArray:
@@ -139,11 +149,25 @@ class SpaceReader:
         """Record that bodies were added or removed, which changes the order of rows."""
         self._is_order_stale = True
 
+    def order_of(self, id_words: bytes) -> IntArray | None:
+        """Return the rows of a list of all bodies in the order of `state`; None if they are in that order.
+
+        Args:
+            id_words: ids of the list.
+        """
+        if id_words == self._ids.tobytes():
+            return None
+        if id_words != self._reordered[0]:
+            ids = np.frombuffer(id_words, np.int64)
+            self._reordered = id_words, np.argsort(ids)[self._rank]
+        return self._reordered[1]
+
     def _read_order(self) -> None:
         """Read the order of the rows by their ids. It holds until bodies are added or removed."""
         self._bodies.clear()
         get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
-        ids = np.frombuffer(self._bodies.int_buf(), np.int64)
+        self._ids = ids = np.frombuffer(self._bodies.int_buf(), np.int64).copy()
+        self._rank = np.argsort(np.argsort(ids))
         self._rows = np.flatnonzero(np.isin(ids, self._moving))
         self._indices = self._index_of.indices(ids[self._rows])
         self._moving_come_first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last

@@ -1,20 +1,24 @@
 """What pymunk requires of a scene: which parts it combines, and the size of its space. Nothing here imports pymunk."""
 
+from collections.abc import Iterator
+
+from sandbox.engines.tabletop.requirements import on_floor
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
 
 
-def combination_faults(scene: Scene, half_kick: bool, has_kinematic: bool) -> list[str]:
+def combination_faults(scene: Scene, settings: Settings, has_kinematic: bool) -> list[str]:
     """Return the parts and settings of a scene that pymunk does not support together.
 
     Args:
         scene: the scene.
-        half_kick: whether the setting `half_kick` is on.
+        settings: of the run.
         has_kinematic: whether a body is kinematic, of the scene or added by an action.
     """
-    world, found = scene.world, []
+    world, half_kick, found = scene.world, settings.half_kick, []
     if half_kick and world.has_drag:
         found.append("half_kick does not support drag")
     if half_kick and world.has_damping:
@@ -33,7 +37,26 @@ def combination_faults(scene: Scene, half_kick: bool, has_kinematic: bool) -> li
     ):
         if together:
             found.append(f"it does not model {first} and {second} together")
+    if settings.sleeping:
+        found += [f"sleeping does not support {each}" for each in _never_asleep(scene, settings)]
     return found
+
+
+def _never_asleep(scene: Scene, settings: Settings) -> Iterator[str]:
+    """Yield the parts and settings that act on bodies in each substep, so that none could fall asleep."""
+    for name, has in (
+        ("half_kick", settings.half_kick),
+        ("drag", scene.world.has_drag),
+        ("attraction", scene.attractions),
+        ("thrusts", scene.thrusts),
+        ("drives", scene.drives),
+        ("zones", scene.zones),
+        ("one-way walls", any(wall.one_way for wall in scene.walls)),
+        ("joints that can break", any(joint.strength is not None for joint in scene.joints)),
+        ("a [surface]", on_floor(scene)),
+    ):
+        if has:
+            yield name
 
 
 def size_faults(setup: Setup) -> list[str]:

@@ -52,7 +52,8 @@ class SpaceBodies(SpaceBodyTable):
         self._setup, self._scene, self._settings, self._skin = setup, scene, settings, skin
         self._h, self._dragged = settings.h, scene.world.has_drag
         super().__init__(new_space(scene, settings))
-        self._reader, self._batch_reader = SpaceReader(self._space), BatchReader(self._space)
+        self._reader = SpaceReader(self._space, bool(settings.sleeping))
+        self._batch_reader = BatchReader(self._space, self._reader.order_of if settings.sleeping else None)
         self._surface_setter = SurfaceSetter(self._space, settings.h)
         self._static_shapes = StaticShapes(self._space, self._surface_setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
@@ -224,6 +225,15 @@ class SpaceBodies(SpaceBodyTable):
             self.joints.add(links, lambda index: self._members[index].body, self._settings.bias)
 
     @property
+    def asleep(self) -> BoolArray | None:
+        """(N,) bodies that are asleep; None if none can fall asleep."""
+        if not self._settings.sleeping:
+            return None
+        asleep = np.zeros(len(self._can_touch), np.bool_)
+        asleep[[n for n, member in self._members.items() if member.moves and member.body.is_sleeping]] = True
+        return asleep
+
+    @property
     def solved_joint_count(self) -> int:
         """Number of joints that pymunk solves."""
         return self.joints.count if self._moving else 0
@@ -259,7 +269,9 @@ class SpaceBodies(SpaceBodyTable):
         self._scene, self._needs_check = scene, None
         self._dragged = scene.world.has_drag
         self.field.fractions.clear()
-        self._space.gravity, self._space.damping = gravity_of(scene), scene.world.damping
+        if self._space.gravity != gravity_of(scene):  # to set it wakes bodies
+            self._space.gravity = gravity_of(scene)
+        self._space.damping = scene.world.damping
         if self.drives.driven_bodies:
             self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
 

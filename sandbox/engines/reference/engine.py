@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
+from sandbox.engines.common.base import BIAS, library_settings_in, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
@@ -119,7 +119,7 @@ class ReferenceEngine:
         wanted = demands(setup)
         if on_floor(setup):
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
-        missing = unmodelled(setup, self.capabilities) + box2d_settings_in(settings)
+        missing = unmodelled(setup, self.capabilities) + library_settings_in(settings)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
         if wanted & {Demand.DRIVES, Demand.KINEMATIC}:
@@ -228,7 +228,7 @@ class ReferenceEngine:
 
 def _tabletop_faults(setup: Setup, settings: Settings) -> list[str]:
     """Return the demands and settings of a scene with a surface that are not supported."""
-    missing = unmodelled(setup, TABLETOP) + box2d_settings_in(settings)
+    missing = unmodelled(setup, TABLETOP) + library_settings_in(settings)
     missing += unsupported_by_steppers(setup)
     for key, method in TABLETOP_METHODS.items():
         if getattr(settings, key) not in (None, method):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS, scale_for
-from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, is_space_default
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default, space_attributes
 from sandbox.formatting import format_quantity
 from sandbox.scene.description.world import Settings
 
@@ -39,10 +39,9 @@ def game_code(engine: str, settings: Settings, fps: float, zoom: float, is_slop_
 
 def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bool) -> GameCode:
     """Return lines for a `pymunk.Space` named `space`; only attributes that differ from pymunk's defaults are set."""
-    values = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
     lines = [
         f"space.{name} = {float(f'{value:.12g}') if isinstance(value, float) else value!r}"
-        for name, value in values.items()
+        for name, value in space_attributes(settings).items()
         if not is_space_default(name, value)
     ]
     lines.append(f"dt = 1 / {fps:.17g}")

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Iterator
-from typing import cast
 
 import numpy as np
 
 from sandbox.engines.box2d_adapter.engine import Box2DEngine
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, MAX_TURN, scale_for
-from sandbox.engines.pymunk_adapter.engine import SPACE_ATTRIBUTES, SPACE_DEFAULTS, PymunkEngine, is_space_default
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, PymunkEngine, is_space_default, space_attributes
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
@@ -154,10 +153,9 @@ def _pymunk(scene: Scene, engine: str | None) -> Iterator[Diagnostic]:
     assert slop is not None
     if engine is None and slop <= LARGE_SLOP * half:
         return
-    values: Details = {name: getattr(settings, key) for key, name in SPACE_ATTRIBUTES.items()}
-    texts = []
+    values, texts = space_attributes(settings), []
     for name, value in values.items():
-        is_default = is_space_default(name, cast(float, value))
+        is_default = is_space_default(name, value)
         texts.append(f"space.{name} = {value:.3g}")
         texts[-1] += "" if is_default else f" (pymunk's default: {SPACE_DEFAULTS[name]:.3g})"
     message = (

@@ -176,6 +176,9 @@ def pymunk_lines(settings: Settings) -> list[str]:
         f"space.collision_bias = {settings.bias!r}",
         f"space.collision_persistence = {settings.persistence}",
     ]
+    if settings.sleeping:
+        lines.append(f"space.sleep_time_threshold = {settings.sleep_time!r}")
+        lines.append(f"space.idle_speed_threshold = {settings.idle_speed!r}")
     if settings.half_kick:
         half = f"{settings.dt!r} / {2 * settings.substeps}"
         lines.append(f"body.velocity += space.gravity * {half}  # every dynamic body, once before the first step")

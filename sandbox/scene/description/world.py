@@ -64,6 +64,8 @@ MAX_SLOP = 1e9
 """m"""
 MAX_STIFFNESS = 1e30
 """N/m"""
+MAX_SLEEP_TIME = 1e6
+"""s"""
 
 
 class Settings(Part):
@@ -109,7 +111,11 @@ class Settings(Part):
     continuous: bool | None = None
     """Stop bodies at static colliders that they would pass within a step; box2d only, which does so by default."""
     sleeping: bool | None = None
-    """Stop computing groups of bodies that have come to rest; box2d only, default: false."""
+    """Stop computing groups of bodies that have come to rest; pymunk and box2d, default: false."""
+    sleep_time: Annotated[float, Field(ge=0, le=MAX_SLEEP_TIME)] | None = None
+    """Time for which a group of bodies has to be idle before it falls asleep, s; pymunk only, default: 0.5."""
+    idle_speed: Annotated[float, Field(ge=0, le=1e6)] | None = None
+    """Speed below which a body is idle, m/s; pymunk only, default: 0, for the speed that gravity adds in a substep."""
     workers: Annotated[int, Field(ge=1, le=64)] | None = None
     """Number of threads of a step; box2d only."""
     record_every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1

@@ -233,6 +233,8 @@ class ContactFreeTimer:
 
     def allows_checkpoint(self, simulation: SwitchableSimulation, frame: Frame) -> bool:
         """Return whether a simulation restored from the present state would continue in the same way."""
+        if simulation.settings.sleeping:  # a state does not hold how long bodies have been idle
+            return False
         if self._substeps < max(MIN_CONTACT_FREE, 2 * (simulation.settings.persistence or 1)):
             return False
         # A state does not hold when a roll began: a continuation from there differs by rounding errors.

@@ -127,6 +127,15 @@ def test_pymunk_lines_configure_a_space_as_the_engine_does() -> None:
     assert pymunk_lines(resolved.replace(substeps=1, half_kick=False))[-1] == "space.step(0.02)"
 
 
+def test_pymunk_lines_set_the_sleep_of_a_space() -> None:
+    scene = scene_of(DROP)
+    resolved = ENGINES["pymunk"].resolve(scene, scene.solver.replace(sleeping=True, sleep_time=0.25))
+    ours, own = new_space(scene, resolved), pymunk.Space()
+    exec("\n".join(pymunk_lines(resolved)), {"space": own})
+    for name in ("sleep_time_threshold", "idle_speed_threshold"):
+        assert getattr(own, name) == getattr(ours, name)
+
+
 def test_point_without_finite_error_is_not_recommended() -> None:
     useless = [point_of(1.0, None), point_of(1.0, math.nan), point_of(1.0, math.inf)]
     assert not any(point.is_usable for point in useless)

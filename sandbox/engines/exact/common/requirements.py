@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.base import box2d_settings_in
+from sandbox.engines.common.base import library_settings_in
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.resource_limits import MEMORY, PAIRS
@@ -150,7 +150,7 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     """Return each demand and setting of a scene that the engine does not support."""
-    missing = unmodelled(setup, CAPABILITIES) + box2d_settings_in(settings)
+    missing = unmodelled(setup, CAPABILITIES) + library_settings_in(settings)
     wanted = demands(setup)
     missing += [f"{demand}: {reason}" for demand, reason in REASONS.items() if demand in wanted]
     for key in STEPS + OVERLAP + SPRINGS:

@@ -17,6 +17,7 @@ from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.shapes import geometry_of
 
 
@@ -136,14 +137,14 @@ class Filters:
 class Contents:
     """Blocks of a scene. The names of surfaces and filters are collected while blocks are made."""
 
-    def __init__(self, setup: Setup) -> None:
-        self.setup = setup
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        self.setup, self.has_sleep = setup, bool(settings.sleeping)
         self.surfaces, self.filters = Surfaces(setup), Filters()
         self._matrix = contact_matrix(setup)
         bodies = setup.bodies
         self._thrusts = _thrusts_by_body(setup)
         pushed = np.asarray([name in self._thrusts for name in bodies.names], np.bool_)
-        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic)
+        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic | self.has_sleep)
         self._has_shapes: BoolArray = np.asarray(self._is_in_space & (self._matrix.touches | bodies.fixed))
         self.hidden: IntArray = np.flatnonzero(~self._has_shapes)
         """bodies whose shapes are outside the space, because nothing can touch them"""
@@ -210,7 +211,7 @@ class Contents:
         else:
             new = "body = pymunk.Body({mass}, {moment})"
             moment = float(bodies.moment[index])
-            is_turnable = self._matrix.turnable[index]
+            is_turnable = self._matrix.turnable[index] or self.has_sleep
             values |= {
                 "mass": literal(float(bodies.mass[index])),
                 "moment": literal(moment if is_turnable else math.inf),

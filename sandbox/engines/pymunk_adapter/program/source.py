@@ -58,7 +58,7 @@ def program_text(
     found = obstacles(setup, settings)
     if found:
         raise ProgramError(found)
-    contents, loops = Contents(setup), Loops()
+    contents, loops = Contents(setup, settings), Loops()
     static = loops.write(list(contents.colliders()))
     bodies = loops.write(list(contents.bodies()))
     joints = loops.write(list(contents.joints()))
@@ -122,6 +122,11 @@ def _settings(setup: Setup, settings: Settings, step_reason: str, warnings: Sequ
     reason = "pymunk's default" if settings.persistence == PERSISTENCE else "as the scene states"
     yield from comment(f"Steps for which the impulses of a separated contact are kept for a warm start: {reason}.")
     yield f"COLLISION_PERSISTENCE = {settings.persistence}"
+    if settings.sleeping:
+        text = "Bodies that touch each other fall asleep if all are slower than the idle speed for so long, s and m/s"
+        yield from comment(f"{text}. An idle speed of 0 stands for the speed that gravity adds in a step.")
+        yield f"SLEEP_TIME_THRESHOLD = {literal(settings.sleep_time)}"
+        yield f"IDLE_SPEED_THRESHOLD = {literal(settings.idle_speed)}"
     if scene.world.bounds is not None:
         yield from comment("Bodies whose centre leaves this box, m, are removed after a frame.")
         yield f"BOUNDS = {literal(scene.world.bounds)}"
@@ -244,8 +249,10 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
         "    space.collision_slop = COLLISION_SLOP",
         "    space.collision_bias = COLLISION_BIAS",
         "    space.collision_persistence = COLLISION_PERSISTENCE",
-        "    bodies = {}",
     )
+    if contents.has_sleep:
+        yield "    space.sleep_time_threshold, space.idle_speed_threshold = SLEEP_TIME_THRESHOLD, IDLE_SPEED_THRESHOLD"
+    yield "    bodies = {}"
     if contents.surfaces.rules:
         yield from _indented(["", *comment("Pairs of materials whose coefficients are no products of factors.")])
         for rule in contents.surfaces.rules:
