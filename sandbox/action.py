@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from sandbox.echo import MAX_NAMED, short_repr, shorten
-from sandbox.scene.description.base import MAX_SPEED, AngularVelocity, BodySpec, Name, Part, Point, Velocity
+from sandbox.scene.description.base import MAX_SPEED, Angle, AngularVelocity, BodySpec, Name, Part, Point, Velocity
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Course
@@ -78,7 +78,7 @@ class Force(Timed):
 
 
 class Move(Timed):
-    """Set the position of a body, and its velocity and angular velocity if they are given.
+    """Set the position of a body, and its angle, velocity and angular velocity if they are given.
 
     A fixed body can be moved but cannot have a velocity. A kinematic body keeps the velocities from then on. A body
     held by a drive cannot be moved.
@@ -89,6 +89,8 @@ class Move(Timed):
     """name of the body"""
     position: Point
     """new position of the centre of mass, m"""
+    angle: Angle | None = None
+    """new angle, rad; default: unchanged"""
     velocity: Velocity | None = None
     """new velocity, m/s; default: unchanged"""
     angular_velocity: AngularVelocity | None = None

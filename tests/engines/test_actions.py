@@ -8,7 +8,7 @@ import pytest
 
 from sandbox.action import Action, ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.contract import Simulation
-from sandbox.engines.registry import start
+from sandbox.engines.registry import ENGINES, start
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
@@ -174,6 +174,31 @@ def test_moved_body_continues_from_its_new_position() -> None:
         simulation.apply(Move(time=0, body="a", position=(5.0, 7.0), velocity=(0.0, 2.0)))
         assert simulation.frame().velocity[0].tolist() == [0.0, 2.0]
         assert advance(simulation, 1).frame().position[0].tolist() == [5.0, 7.0 + 2.0 * 0.01]
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
+def test_body_that_is_turned_touches_by_its_new_shape(engine: str) -> None:
+    """A plank that is set upright stands with its centre at half its length; a fixed one that is turned is a ramp."""
+    box = {"name": "plank", "position": [0.0, 0.5], "size": [4.0, 1.0]}
+    ramp = {"name": "ramp", "position": [10.0, 0.0], "size": [4.0, 0.2], "fixed": True}
+    document = {"box": [box, ramp], "plane": [FLOOR], "world": {"gravity": [0, -9.81]}}
+    simulation = advance(start(from_document({**document, "ball": [ball("a", 10.0, 5.0)]}), engine), 3)
+    simulation.apply(Move(time=0, body="plank", position=(0.0, 2.0), angle=math.pi / 2, angular_velocity=0.0))
+    simulation.apply(Move(time=0, body="ramp", position=(10.0, 1.0), angle=0.5))
+    rows = [simulation.bodies.names.index(name) for name in ("plank", "ramp", "a")]
+    assert simulation.frame().angle[rows[:2]] == pytest.approx([math.pi / 2, 0.5], abs=1e-6)  # box2d has 32 bits
+    frame = advance(simulation, 100).frame()
+    assert frame.position[rows[0]] == pytest.approx([0.0, 2.0], abs=0.02)  # the slop is 0.01 of the half width
+    assert frame.angle[rows[:2]] == pytest.approx([math.pi / 2, 0.5], abs=1e-3)
+    assert frame.velocity[rows[2], 0] < -1.0  # down the ramp, which falls to the left
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_angle_of_a_free_body_is_set(engine: str) -> None:
+    simulation = advance(start(from_document({"ball": [ball("a", 0, 0, angular_velocity=2.0)]}), engine), 3)
+    simulation.apply(Move(time=0, body="a", position=(1.0, 0.0), angle=-40.0))
+    assert simulation.frame().angle[0] == pytest.approx(-40.0, rel=1e-6)  # box2d has 32 bits
+    assert advance(simulation, 5).frame().angle[0] == pytest.approx(-40.0 + 0.05 * 2.0, rel=1e-5)
 
 
 def test_body_moved_into_a_wall_is_pushed_out_and_stays_bounded() -> None:

@@ -270,7 +270,6 @@ def _first(space: pymunk.Space) -> pymunk.Body:
 
 
 CHANGES: dict[str, tuple[Callable[[pymunk.Space], object], str]] = {
-    "angle": (lambda s: setattr(_first(s), "angle", 1.0), "angles that the game sets"),
     "joint added": (lambda s: s.add(pymunk.PinJoint(s.static_body, _first(s))), "joints that the game adds"),
     "limit of a motor": (
         lambda s: setattr(next(iter(s.constraints)), "max_force", 9.0),
@@ -280,8 +279,9 @@ CHANGES: dict[str, tuple[Callable[[pymunk.Space], object], str]] = {
     "iterations": (lambda s: setattr(s, "iterations", 20), "settings and callbacks"),
     "callback": (lambda s: s.on_collision(1, 2, begin=lambda *_: None), "settings and callbacks"),
     "mass": (lambda s: setattr(_first(s), "mass", 9.0), "masses, moments and functions"),
-    "friction": (lambda s: setattr(next(iter(_first(s).shapes)), "friction", 0.9), "coefficients and filters"),
-    "filter": (lambda s: setattr(next(iter(_first(s).shapes)), "filter", pymunk.ShapeFilter(mask=1)), "and filters"),
+    "elasticity": (lambda s: setattr(next(iter(_first(s).shapes)), "elasticity", 1.5), "elasticities above 1"),
+    "filter": (lambda s: setattr(next(iter(_first(s).shapes)), "filter", pymunk.ShapeFilter(mask=1)), "filters of"),
+    "wall moved": (lambda s: setattr(s.static_body, "position", (1.0, 0.0)), "walls and posts that the game moves"),
     "shape added": (lambda s: s.add(pymunk.Circle(_first(s), 3)), "shapes that the game adds"),
     "wall added": (lambda s: s.add(pymunk.Segment(s.static_body, (0, 9), (9, 9), 1)), "shapes that the game adds"),
     "wall removed": (lambda s: s.remove(next(iter(s.shapes))), "shapes that the game adds to bodies or removes"),
@@ -317,6 +317,45 @@ def test_settings_of_the_recording_are_those_of_the_space() -> None:
     settings = captured.recording.settings
     assert (settings.slop, settings.iterations, settings.dt) == (space.collision_slop, 17, DT)
     assert ENGINES["pymunk"].missing(captured.recording.scene, settings) == ()
+
+
+class Tuner(Platformer):
+    """A game that turns bodies, and changes coefficients of discs, of parts of a body, and of a wall."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.plank = pymunk.Body(3, 700)
+        self.plank.position = 0, 150
+        self.space.add(self.plank, pymunk.Circle(self.plank, 8, (30, 0)), pymunk.Poly.create_box(self.plank, (60, 10)))
+        self.floor = next(iter(self.space.shapes))
+
+    def update(self, k: int) -> None:
+        super().update(k)
+        (shape,) = self.player.shapes
+        if k % 25 == 5:
+            self.plank.angle += 1.2
+            self.player.angle = 0.1 * k
+        if 30 <= k < 90:  # as a player who runs
+            shape.surface_velocity = (2 * k - 100, 0)
+        if k == 40:
+            shape.friction, self.floor.friction = 2.0, 0.3
+        if k in (70, 110):
+            for part in self.plank.shapes:
+                part.elasticity, part.friction = 0.005 * k * part.area / 600, 0.9
+        if k == 150:
+            self.floor.surface_velocity = 50, 0
+            for part in self.others[-1].shapes:
+                part.friction = 0.05
+
+
+def test_angles_and_coefficients_that_a_game_sets_are_replayed() -> None:
+    game = Tuner()
+    captured = play(game)
+    assert not captured.omitted and not captured.inexact
+    ends = end_of(captured.recording)
+    for body, name in captured.spaces[0].names.items():
+        if body.body_type == pymunk.Body.DYNAMIC:
+            assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
 
 
 class Sleeper:

@@ -78,6 +78,8 @@ class BodyState(NamedTuple):
 
     position: FloatArray
     """(N, 2) m"""
+    angle: FloatArray
+    """(N,) rad"""
     velocity: FloatArray
     """(N, 2) m/s"""
     spin: FloatArray
@@ -91,7 +93,7 @@ class BodyState(NamedTuple):
     def of(cls, store: BodyStore) -> "BodyState":
         """Copy the state of a body store."""
         position, velocity, spin = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
-        return cls(position, velocity, spin, store.layer.copy(), store.held_by_zone.copy())
+        return cls(position, store.angle.copy(), velocity, spin, store.layer.copy(), store.held_by_zone.copy())
 
 
 def far_away(scale: float) -> str:

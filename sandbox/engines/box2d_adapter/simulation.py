@@ -360,13 +360,14 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         if relayered:
             self._joints.renew(set(relayered))
             self._record_contacts()
-        for index in np.flatnonzero((now.position[:count] != before.position).any(axis=1)).tolist():
+        moved = (now.position[:count] != before.position).any(axis=1) | (now.angle[:count] != before.angle)
+        for index in np.flatnonzero(moved).tolist():
             world.set_pose(index)
         held = now.held[:count] != before.held
         for index in np.flatnonzero(held).tolist():
             world.set_mass(index)
-        moved = (now.velocity[:count] != before.velocity).any(axis=1) | (now.spin[:count] != before.spin)
-        for index in np.flatnonzero(moved | held).tolist():
+        pushed = (now.velocity[:count] != before.velocity).any(axis=1) | (now.spin[:count] != before.spin)
+        for index in np.flatnonzero(pushed | held).tolist():
             world.set_motion(index)
 
     def frame(self) -> Frame:

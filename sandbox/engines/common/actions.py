@@ -100,6 +100,9 @@ class ActionTarget(Protocol):
     def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
 
+    def turn_body(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad."""
+
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Check that the engine can place a body at a position.
 
@@ -418,6 +421,8 @@ def _move(action: Move, target: ActionTarget) -> None:
     collides = target.bodies.elements[target.bodies.element[index]].collides
     _check_place(action.position, float(target.bodies.radius[index]), collides, target)
     target.move_body(index, np.asarray(action.position))
+    if action.angle is not None:
+        target.turn_body(index, action.angle)
     if action.velocity is not None and not fixed:
         target.set_velocity(index, np.asarray(action.velocity))
     if action.angular_velocity is not None and not fixed:

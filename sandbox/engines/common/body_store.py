@@ -195,6 +195,10 @@ class BodyStore:
         """Set the position of a body, m."""
         self.position[index] = position
 
+    def turn_body(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad."""
+        self.angle[index] = angle
+
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Accept every position: bodies may start anywhere."""
 

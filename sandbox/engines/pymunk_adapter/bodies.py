@@ -467,6 +467,14 @@ class PymunkBodies:
         if self.zone_tracker is not None:
             self.zone_tracker.update_position(index)
 
+    def turn_body(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad."""
+        self.refresh()
+        self.angle[index] = angle
+        owner = self._holder(index)
+        if owner is not None:
+            owner.set_angle(index, angle)
+
     def _owner(self, index: int) -> Particles | SpaceBodies:
         """Return the part that holds a body; the space for a fixed body that nothing can touch."""
         return self.particles if self.particles.holds(index) else self.space_bodies

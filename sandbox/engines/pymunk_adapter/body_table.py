@@ -66,6 +66,14 @@ class SpaceBodyTable:
             self._space.reindex_shapes_for_body(body)
         self._state = None
 
+    def set_angle(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad; as `set_position`."""
+        body = self._members[index].body
+        body.angle = angle
+        if body.body_type == pymunk.Body.STATIC:
+            self._space.reindex_shapes_for_body(body)
+        self._state = None
+
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s."""
         self._members[index].body.velocity = float(velocity[0]), float(velocity[1])

@@ -26,7 +26,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_SPEED
 from sandbox.scene.description.world import MAX_SLEEP_TIME
 from sandbox.scene.editing.elements import unique_name
-from sandbox.scene.errors import SceneError
+from sandbox.scene.errors import SceneError, quoted
 from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
@@ -183,6 +183,8 @@ class SpaceElements:
         self._moving_groups = {each.filter.group for each in self._shapes if not FilterKind.of(each).is_static}
         self.names = self._unique_names(names)
         """name of each body"""
+        self.paths: dict[pymunk.Shape, str] = {}
+        """path of the table of each shape in the scene, such as `ball.body-1`; filled by `elements`"""
 
     def _is_sensor(self, shape: pymunk.Shape) -> bool:
         if shape.sensor:
@@ -227,16 +229,28 @@ class SpaceElements:
         fixed_count = self._leading_static_count()
         for shape in self._shapes[:fixed_count]:
             table, values = self._collider(shape)
-            tables.setdefault(table, []).append(values)
+            self.paths[shape] = f"{table}[{len(tables.setdefault(table, []))}]"
+            tables[table].append(values)
         all_balls, in_order = True, list(self._bodies_in_order(self._shapes[fixed_count:]))
         if sleep_settings_of(self.space):
             self._note_order([body for body, _ in in_order])
         for body, shapes in in_order:
             table, values = self._body(body, shapes, can_be_ball=all_balls)
             all_balls = table == "ball"
+            self.paths |= self._paths_of(table, body, shapes)
             tables.setdefault(table, []).append(values)
         joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
         return tables | ({"joint": joints} if joints else {})
+
+    def _paths_of(
+        self, table: str, body: pymunk.Body, shapes: Sequence[pymunk.Shape]
+    ) -> Iterator[tuple[pymunk.Shape, str]]:
+        """Yield the path of each shape of a body."""
+        path, counts = f"{table}.{quoted(self.names[body])}", dict.fromkeys(_PART_OF.values(), 0)
+        for shape in shapes:
+            kind = _PART_OF[type(shape)]
+            yield shape, path if table == "ball" else f"{path}.{kind}[{counts[kind]}]"
+            counts[kind] += 1
 
     def _note_order(self, bodies: Sequence[pymunk.Body]) -> None:
         """Note if bodies are in another order than in the space: those that wake together have contacts in it."""
@@ -384,9 +398,9 @@ class SpaceElements:
         elasticity = float(shape.elasticity)
         if elasticity > 1.0:
             self.omitted.append(f"an elasticity of {elasticity:g}, which adds energy; the scene has a restitution of 1")
-        values: KeyValues = {"restitution": min(elasticity, 1.0), "friction": float(shape.friction)}
-        if any(shape.surface_velocity):
-            values["surface_velocity"] = _point(shape.surface_velocity)
+        values = coefficients_of(shape)
+        if not any(shape.surface_velocity):
+            del values["surface_velocity"]
         colour = getattr(shape, "color", None)
         if colour is not None:
             values["colour"] = "#" + "".join(f"{min(max(int(each), 0), 255):02x}" for each in tuple(colour)[:3])
@@ -442,6 +456,15 @@ class SpaceElements:
     def _note_constraint(self, constraint: pymunk.Constraint, kind: str) -> None:
         if getattr(constraint, "_pre_solve_func", None) or getattr(constraint, "_post_solve_func", None):
             self.omitted.append(f"callbacks of a {kind}")
+
+
+def coefficients_of(shape: pymunk.Shape) -> KeyValues:
+    """Return the coefficients of a shape as keys of its table; a restitution is at most 1."""
+    return {
+        "restitution": min(float(shape.elasticity), 1.0),
+        "friction": float(shape.friction),
+        "surface_velocity": _point(shape.surface_velocity),
+    }
 
 
 def _smallest_radius(body: pymunk.Body) -> float:

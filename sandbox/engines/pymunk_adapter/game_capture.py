@@ -16,9 +16,16 @@ from typing import Any, NamedTuple
 import pymunk
 
 from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
-from sandbox.engines.pymunk_adapter.capture import CapturedSpace, SpaceElements, joint_values, scene_of
+from sandbox.engines.pymunk_adapter.capture import (
+    CapturedSpace,
+    SpaceElements,
+    coefficients_of,
+    joint_values,
+    scene_of,
+)
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.recording import Recording
+from sandbox.scene.errors import quoted
 
 MAX_ACTIONS = 1_000_000
 """Actions of a recording; a game that changes 1,000 bodies at 60 Hz makes as many in 17 s"""
@@ -51,7 +58,9 @@ class SpaceForm:
     bodies: Mapping[pymunk.Body, tuple[Any, ...]]
     """type, mass, moment and functions of the bodies that are in the space"""
     shapes: Mapping[pymunk.Shape, tuple[Any, ...]]
-    """body, coefficients, filter and more of each shape"""
+    """body, filter and kind of each shape"""
+    coefficients: Mapping[pymunk.Shape, dict[str, Any]]
+    """as `coefficients_of` each shape"""
     joints: Mapping[pymunk.Constraint, tuple[Any, ...]]
 
     @classmethod
@@ -72,10 +81,8 @@ class SpaceForm:
                 for body in bodies
                 if body.space is space
             },
-            {
-                each: (each.body, each.elasticity, each.friction, each.filter, each.surface_velocity, each.sensor)
-                for each in space.shapes
-            },
+            {each: (each.body, each.filter, each.sensor) for each in space.shapes},
+            {each: coefficients_of(each) for each in space.shapes},
             {joint: (joint_values(joint, space.collision_bias), joint.collide_bodies) for joint in space.constraints},
         )
 
@@ -92,7 +99,7 @@ class SpaceForm:
             yield "types, masses, moments and functions of bodies that the game changes"
         exchanged = {*self.shapes.items()} ^ {*before.shapes.items()}
         if any(shape in self.shapes and shape in before.shapes for shape, _ in exchanged):
-            yield "coefficients and filters of shapes that the game changes"
+            yield "filters of shapes that the game changes"
         single = [values for shape, values in exchanged if (shape in self.shapes) != (shape in before.shapes)]
         if any(values[0] not in explained for values in single):
             yield "shapes that the game adds to bodies or removes from them"
@@ -114,6 +121,7 @@ class SpaceCapture:
         self.space, self.dt, self.steps = space, dt, 0
         elements = SpaceElements(space, {}, notes_forces=False)
         captured = scene_of(elements, dt, 10.0, "")
+        self._paths = elements.paths
         self._scene, self._names, self._is_kinematic = captured.scene, elements.names, elements.is_kinematic
         self._omitted, self._inexact = dict.fromkeys(captured.omitted), dict.fromkeys(captured.inexact)
         self._actions: list[Action] = []
@@ -146,6 +154,7 @@ class SpaceCapture:
             form, known = SpaceForm.of(space, self._names), set(self._names)
             self._note_population()
             self._omitted |= dict.fromkeys(form.changes_since(self._form, known ^ set(self._names)))
+            self._note_coefficients(form)
             self._note_motion()
         self._note_forces()
 
@@ -181,6 +190,8 @@ class SpaceCapture:
         for body in added:
             table, values = elements.element_of(body)
             name = str(values["name"])
+            if table == "ball":  # the parts of an added body have no paths
+                self._paths |= dict.fromkeys(body.shapes, f"ball.{quoted(name)}")
             spawned: dict[str, Any] = {table: values}
             self._actions.append(Spawn.model_validate_json(json.dumps({"time": self.time, "kind": "spawn"} | spawned)))
             self._names[body], self._states[body] = name, MotionState.of(body)
@@ -188,23 +199,43 @@ class SpaceCapture:
         self._omitted |= dict.fromkeys(elements.omitted)
         self._inexact |= dict.fromkeys(elements.inexact)
 
+    def _note_coefficients(self, form: SpaceForm) -> None:
+        """Note coefficients of shapes that have changed since the last step."""
+        for shape, now in form.coefficients.items():
+            before = self._form.coefficients.get(shape, now)
+            if now == before:
+                continue
+            if shape.elasticity > 1.0:
+                self._omitted["elasticities above 1 that the game sets"] = None
+            if shape not in self._paths:
+                self._omitted["coefficients of shapes of bodies that the game adds and then changes"] = None
+                continue
+            self._actions += [
+                SetParameter(time=self.time, path=f"{self._paths[shape]}.{key}", value=value)
+                for key, value in now.items()
+                if value != before[key]
+            ]
+
     def _note_motion(self) -> None:
         """Note bodies whose motion is not that after the last step."""
         for body, name in self._names.items():
             before, now = self._states[body], MotionState.of(body)
             if before == now:
                 continue
-            if now.angle != before.angle:
-                self._omitted["angles that the game sets"] = None
+            if name not in self._scene_bodies:
+                self._omitted["walls and posts that the game moves"] = None
+                continue
             is_moving = body.body_type == pymunk.Body.DYNAMIC or self._is_kinematic(body)
             if not is_moving and now.velocity != before.velocity:
                 self._omitted[f"the velocity of {name}, which is not in the space"] = None
             x, y = body.local_to_world(body.center_of_gravity) if any(body.center_of_gravity) else now.position
+            angle = now.angle if now.angle != before.angle else None
             velocity = now.velocity if is_moving and now.velocity != before.velocity else None
             is_turned = is_moving and now.angular_velocity != before.angular_velocity
             spin = now.angular_velocity if is_turned else None
-            move = Move(time=self.time, body=name, position=(x, y), velocity=velocity, angular_velocity=spin)
-            self._actions.append(move)
+            self._actions.append(
+                Move(time=self.time, body=name, position=(x, y), angle=angle, velocity=velocity, angular_velocity=spin)
+            )
 
     def _note_forces(self) -> None:
         """Note forces that the game applies for the next step, where they differ from those of the last one."""

@@ -136,6 +136,10 @@ class Particles:
         """Set the position of a body, m."""
         self._position[index] = position
 
+    def set_angle(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad."""
+        self._angle[index] = angle
+
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s."""
         self._velocity[index] = velocity

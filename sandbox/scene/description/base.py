@@ -50,6 +50,9 @@ Vector = tuple[float, float]
 Velocity = Annotated[Vector, AfterValidator(_speed_in_range)]
 """A velocity, m/s."""
 
+Angle = Annotated[float, Field(ge=-1e12, le=1e12)]
+"""An angle, rad, counter-clockwise."""
+
 AngularVelocity = Annotated[float, Field(ge=-1e12, le=1e12)]
 Radius = Annotated[float, Field(ge=1e-9, le=1e9)]
 Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -124,7 +127,7 @@ class BodySource(Collider):
     """mass, kg; default 1 if neither mass nor density is given"""
     density: Density | None = None
     """density, kg/m²"""
-    angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    angle: Angle = 0.0
     """initial angle, rad, counter-clockwise"""
     angular_velocity: AngularVelocity = 0.0
     """initial angular velocity, rad/s"""

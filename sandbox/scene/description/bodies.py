@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sandbox.scene.description.base import BodySpec, Density, HasMaterial, Point, Radius
+from sandbox.scene.description.base import Angle, BodySpec, Density, HasMaterial, Point, Radius
 
 MAX_CORNERS = 1000
 """Largest number of corners of one outline; far more crash pymunk, and have no visible effect."""
@@ -13,7 +13,6 @@ MAX_PARTS = 1000
 """Largest number of parts of one body."""
 
 Length = Annotated[float, Field(ge=1e-9, le=1e9)]
-Angle = Annotated[float, Field(ge=-1e12, le=1e12)]
 Rounding = Annotated[float, Field(ge=0, le=1e9)]
 """Radius by which an outline is widened, which rounds its corners, m."""
 Outline = Annotated[tuple[Point, ...], Field(min_length=3, max_length=MAX_CORNERS)]
