@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
+import numpy as np
 import pymunk
 
 from sandbox.engines.common.base import BIAS
@@ -105,6 +106,11 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
     moves = ~setup.bodies.fixed & (setup.bodies.moment < UNTURNABLE)
     if (moves & ~contact_matrix(setup).turnable & ~contact_matrix(setup).free).any():
         capture.inexact.append("bodies that nothing can turn: the engine keeps their rotation free of rounding")
+    touches = contact_matrix(setup).touches
+    untouched = ~touches & ~setup.bodies.fixed & touches.any()
+    shaped = {capture.names[body] for body in capture.names if any(not shape.sensor for shape in body.shapes)}
+    for name in sorted(shaped & {setup.bodies.names[k] for k in np.flatnonzero(untouched).tolist()}):
+        capture.inexact.append(f"{name} can touch nothing, and the engine computes it without its shapes")
     return CapturedSpace(scene, tuple(dict.fromkeys(capture.omitted)), tuple(dict.fromkeys(capture.inexact)))
 
 
@@ -414,8 +420,6 @@ class SpaceElements:
         if any(each != filters[0] for each in filters):
             self.omitted.append(f"the different filters of the shapes of {name}")
         group, values = filters[0]
-        if values.get("collides") == "none" and not self.is_kinematic(_body_of(shapes[0])):
-            self.inexact.append(f"{name} collides with nothing, and the engine computes it outside of its space")
         return values | ({"group": f"group {group}"} if group else {})
 
     def _filter_of(self, shape: pymunk.Shape) -> KeyValues:
@@ -437,8 +441,8 @@ class SpaceElements:
             self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))
             return
         self._note_constraint(constraint, kind)
-        if isinstance(constraint, pymunk.PinJoint) and values["kind"] == "pivot":
-            self.omitted.append("the length 0 of a PinJoint; the scene has a pivot instead")
+        if isinstance(constraint, pymunk.PinJoint) and values["length"] != constraint.distance:
+            self.inexact.append(f"a PinJoint has the length {constraint.distance:g} m; the scene has 0 m")
         if ends[0] is None and "anchors" in values:  # a scene states the anchor of the body first
             values["anchors"].reverse()
         if ends[1] is None:
@@ -522,10 +526,9 @@ def _limits(constraint: pymunk.Constraint, default_bias: float) -> KeyValues:
 def _kind_values(constraint: pymunk.Constraint) -> KeyValues | None:
     """Return the kind of a joint and the values of its geometry; None if a scene has no such joint."""
     match constraint:
-        case pymunk.PinJoint() if constraint.distance < MIN_RADIUS:
-            return {"kind": "pivot"} | _anchors(constraint)
         case pymunk.PinJoint():
-            return {"kind": "rod", "length": float(constraint.distance)} | _anchors(constraint)
+            length = 0.0 if constraint.distance < MIN_RADIUS else float(constraint.distance)
+            return {"kind": "rod", "length": length} | _anchors(constraint)
         case pymunk.PivotJoint():
             return {"kind": "pivot"} | _anchors(constraint)
         case pymunk.SlideJoint():

@@ -129,6 +129,7 @@ class SpaceCapture:
         self._forces: dict[pymunk.Body, tuple[float, float, float]] = {}
         self._gravity, self._damping = tuple(space.gravity), space.damping
         self._scene_bodies = set(captured.scene.bodies.names)
+        self._unused: set[pymunk.Body] = set()  # bodies that nothing touches: they have sensors only
         self._form = SpaceForm.of(space, self._names)
 
     def before_step(self, dt: float) -> None:
@@ -182,12 +183,13 @@ class SpaceCapture:
                 self._actions.append(Remove(time=self.time, body=name))
             else:
                 self._omitted["walls and posts that the game removes"] = None
-        added = [body for body in present if body not in self._names]
+        added = [body for body in present if body not in self._names and body not in self._unused]
         if not added:
             return
         given = self._names | {body: f"added-{self.steps}-{k}" for k, body in enumerate(added, 1)}
         elements = SpaceElements(self.space, given, notes_forces=False)
-        for body in added:
+        self._unused |= set(added) - elements.names.keys()
+        for body in (body for body in added if body in elements.names):
             table, values = elements.element_of(body)
             name = str(values["name"])
             if table == "ball":  # the parts of an added body have no paths

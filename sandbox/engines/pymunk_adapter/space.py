@@ -148,7 +148,8 @@ class SpaceBodies(SpaceBodyTable):
                 self._moving += 1
         self._space.add(body)
         self._members[index] = SpaceBody(body, ())
-        if self._can_touch[index] or fixed:
+        # Each shape gets a number, which the order of contacts depends on: a body without any in a game has none here.
+        if self._can_touch[index] or (fixed and bodies.elements[bodies.element[index]].collides != "none"):
             self._add_shapes(index, bodies)
         if self._sensed[index]:
             self.zone_sensors.add(index, body)

@@ -122,6 +122,12 @@ class ReferenceEngine:
         missing = unmodelled(setup, self.capabilities) + library_settings_in(settings)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
+        rods = setup.links.of(LinkKind.ROD)
+        if settings.joints == "rattle" and len(points := np.flatnonzero(rods.figures[:, 0] == 0.0)):
+            name = rods.names[points[0]]
+            missing.append(
+                f"joints 'rattle' needs the direction of each rod, and {name!r} has the length 0; use a pivot"
+            )
         if wanted & {Demand.DRIVES, Demand.KINEMATIC}:
             missing += _drive_faults(setup, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:

@@ -62,7 +62,8 @@ class Rod(Anchored, ErrorCorrecting):
 
     kind: Literal["rod", "pin"]
     length: JointDistance | None = None
-    """length, m; default: the distance at the start"""
+    """length, m; default: the distance at the start. A rod of length 0 holds two points together along the line
+    between them only, as pymunk's `PinJoint` does; a pivot holds them in both directions"""
 
 
 class Pivot(ErrorCorrecting):

@@ -106,8 +106,8 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
                     "must have either `at`, a point in the world, or `anchors`, one point in the frame of each body",
                 )
         case Rod():
-            if joint.length is not None and joint.length < SHORTEST:
-                yield "length", f"must be at least {SHORTEST:g} m; use a pivot to hold two points together"
+            if joint.length is not None and 0.0 < joint.length < SHORTEST:
+                yield "length", f"must be at least {SHORTEST:g} m, or 0 to hold two points together"
         case Gear():
             if abs(joint.ratio) < MIN_RATIO:
                 yield "ratio", f"must be at least {MIN_RATIO:g} in magnitude"

@@ -36,7 +36,7 @@ PLAYERS = {
 }
 
 
-PARTS = [*(("random", 1 + 100 * k) for k in range(6)), ("clumsy", 1), ("skilled", 1), ("skilled", 101)]
+PARTS = [*(("random", 1 + 200 * k) for k in range(3)), ("clumsy", 1), ("skilled", 1), ("skilled", 101)]
 """long play: player, and seed of the first game"""
 
 

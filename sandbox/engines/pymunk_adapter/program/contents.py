@@ -145,7 +145,8 @@ class Contents:
         self._thrusts = _thrusts_by_body(setup)
         pushed = np.asarray([name in self._thrusts for name in bodies.names], np.bool_)
         self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic | self.has_sleep)
-        self._has_shapes: BoolArray = np.asarray(self._is_in_space & (self._matrix.touches | bodies.fixed))
+        collides = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element]
+        self._has_shapes: BoolArray = self._is_in_space & (self._matrix.touches | (bodies.fixed & collides))
         self.hidden: IntArray = np.flatnonzero(~self._has_shapes)
         """bodies whose shapes are outside the space, because nothing can touch them"""
 
