@@ -54,7 +54,7 @@ class ClusterExecutor:
                 "its --scheduler-file (.json)"
             )
         for name in logging.root.manager.loggerDict:
-            if name.startswith("distributed"):  # errors are reported once, by this class
+            if name.startswith(("distributed", "tornado")):  # errors are reported once, by this class
                 logging.getLogger(name).setLevel(logging.CRITICAL)
         where = {"scheduler_file": address} if is_file else {"address": address}
         try:

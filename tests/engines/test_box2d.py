@@ -275,7 +275,7 @@ def test_half_plane_reaches_as_far_as_bodies_go() -> None:
 
 
 @pytest.mark.parametrize("engine", [name for name in ENGINES if name != "box2d"])
-@pytest.mark.parametrize("setting", [{"continuous": True}, {"sleeping": False}, {"workers": 2}])
+@pytest.mark.parametrize("setting", [{"continuous": True}, {"workers": 2}])
 def test_other_engines_refuse_its_settings(engine: str, setting: dict[str, Any]) -> None:
     scene = from_document({"ball": [ball(0, 0)]})
     missing = ENGINES[engine].missing(scene, scene.solver.replace(**setting))

@@ -14,7 +14,7 @@ from sandbox.engines.box2d_adapter.requirements import MERGED
 from sandbox.engines.box2d_adapter.world import Box2DWorld
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.springs import anchors_in_world, spring_law
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 
 SPRINGS = LinkKind.SPRING, LinkKind.ROTARY_SPRING
 
@@ -30,17 +30,26 @@ class WorldJoints:
         self._joints: dict[int, Any] = {}  # by the index of the joint
         links = store.setup.links
         for k in store.linked().tolist():
-            if LinkKind(int(links.kind[k])) not in (*SPRINGS, *MERGED):
+            kind = LinkKind(int(links.kind[k]))
+            if kind not in MERGED and (kind not in SPRINGS or (links.a[k] != WORLD and not links.collide[k])):
                 self._joints[k] = world.create_joint(self._definition(links, k))
         self.has_springs = bool(np.isin(links.kind, SPRINGS).any())
         self.has_breakable = bool(np.isfinite(links.strength).any())
         """whether joints can break"""
 
     def _definition(self, links: JointArrays, k: int) -> Any:
-        """Return the definition of a joint that is neither a spring nor part of a pivot."""
+        """Return the definition of a joint that is not part of a pivot.
+
+        Springs are forces: theirs only excludes contacts of the two bodies.
+        """
         x, y, _ = links.figures[k].tolist()
         scale = self._world.scale
+        a, b = int(links.a[k]), int(links.b[k])
         match LinkKind(int(links.kind[k])):
+            case LinkKind.SPRING | LinkKind.ROTARY_SPRING:
+                joint = box2d.FilterJointDef()
+                joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
+                return joint
             case LinkKind.ROD:
                 joint = box2d.DistanceJointDef()
                 joint.length = x * scale
@@ -58,7 +67,6 @@ class WorldJoints:
                 joint.enable_limit, joint.lower_translation, joint.upper_translation = True, 0.0, length * scale
             case _:
                 joint = self._pivot(links, k)
-        a, b = int(links.a[k]), int(links.b[k])
         joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
         joint.local_anchor_a = tuple((links.anchor_a[k] * scale).tolist())
         joint.local_anchor_b = tuple((links.anchor_b[k] * scale).tolist())

@@ -189,6 +189,16 @@ class SpaceElements:
         self._moving_groups = {each.filter.group for each in self._shapes if not FilterKind.of(each).is_static}
         self.names = self._unique_names(names)
         """name of each body"""
+        self._origins: dict[pymunk.Body, None] = {}
+        """static bodies at the origin that are second bodies of joints: fixed bodies without shapes"""
+        self._solid_worlds = {
+            body
+            for constraint in space.constraints
+            if not constraint.collide_bodies
+            for body in (constraint.a, constraint.b)
+            if self._is_world(body) and body.shapes
+        }
+        """static bodies at the origin whose shapes are one body and not walls, because jointed bodies pass them"""
         self.paths: dict[pymunk.Shape, str] = {}
         """path of the table of each shape in the scene, such as `ball.body-1`; filled by `elements`"""
 
@@ -207,7 +217,7 @@ class SpaceElements:
             taken.add(found[body])
         for k, body in enumerate(self._bodies, 1):
             if body not in given:
-                found[body] = unique_name(f"body-{k}", taken)
+                found[body] = unique_name("world" if self._is_world(body) else f"body-{k}", taken)
                 taken.add(found[body])
         return found
 
@@ -246,6 +256,9 @@ class SpaceElements:
             self.paths |= self._paths_of(table, body, shapes)
             tables.setdefault(table, []).append(values)
         joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
+        for body in self._origins:
+            origin = {"name": self.names[body], "position": [0.0, 0.0], "radius": MIN_RADIUS, "fixed": True}
+            tables.setdefault("ball", []).append(origin | {"collides": "none"})
         return tables | ({"joint": joints} if joints else {})
 
     def _paths_of(
@@ -272,9 +285,8 @@ class SpaceElements:
         count, circles = 0, False
         for shape in self._shapes:
             is_circle = isinstance(shape, pymunk.Circle)
-            if not self._is_world(_body_of(shape)) or not (
-                is_circle or (isinstance(shape, pymunk.Segment) and not circles)
-            ):
+            is_wall_or_post = is_circle or (isinstance(shape, pymunk.Segment) and not circles)
+            if not self._is_world(_body_of(shape)) or _body_of(shape) in self._solid_worlds or not is_wall_or_post:
                 break
             circles, count = is_circle, count + 1
         return count
@@ -435,23 +447,20 @@ class SpaceElements:
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
         values = joint_values(constraint, self.space.collision_bias)
-        ends = [None if self._is_world(body) else self.names[body] for body in (a, b)]
-        is_carried = ends[1] is None and isinstance(constraint, pymunk.GrooveJoint)
-        if values is None or ends == [None, None] or is_carried:
-            self.omitted.append(f"a {kind}" + (" whose second body is the world" if is_carried else ""))
+        if values is None:
+            self.omitted.append(f"a {kind}")
             return
         self._note_constraint(constraint, kind)
         if isinstance(constraint, pymunk.PinJoint) and values["length"] != constraint.distance:
             self.inexact.append(f"a PinJoint has the length {constraint.distance:g} m; the scene has 0 m")
-        if ends[0] is None and "anchors" in values:  # a scene states the anchor of the body first
-            values["anchors"].reverse()
-        if ends[1] is None:
-            values = _turned(values)
-            self.inexact.append(f"the second body of a {kind} is the world, which the engine takes as the first one")
-        yield values | {
-            "between": [name for name in ends if name is not None],
-            "collide": bool(constraint.collide_bodies),
-        }
+        between = [self.names[body] for body in (a, b)]
+        if self._is_world(b) and b not in self._solid_worlds:
+            self._origins[b] = None
+        elif self._is_world(a) and a not in self._solid_worlds:  # the scene states the anchor of the body first
+            between = between[1:]
+            if "anchors" in values:
+                values["anchors"].reverse()
+        yield values | {"between": between, "collide": bool(constraint.collide_bodies)}
 
     def _is_world(self, body: pymunk.Body) -> bool:
         is_at_origin = not any(body.position) and not body.angle
@@ -561,20 +570,3 @@ def _point(vector: Sequence[float]) -> list[float]:
 
 def _anchors(constraint: Any) -> KeyValues:
     return {"anchors": [_point(constraint.anchor_a), _point(constraint.anchor_b)]}
-
-
-OPPOSITE_ANGLES = {"motor": ("rate",), "rotary_spring": ("rest_angle",), "ratchet": ("angle", "phase", "ratchet")}
-"""Keys of joints that change their sign if the bodies are exchanged, by kind"""
-
-
-def _turned(values: KeyValues) -> KeyValues:
-    """Return the values of a joint from its body to the world: angles are those of the body relative to the world."""
-    opposite = OPPOSITE_ANGLES.get(values["kind"], ())
-    changed = {key: -value + 0.0 if key in opposite else value for key, value in values.items()}
-    if values["kind"] == "rotary_limit":
-        changed |= {"least": -values["most"] + 0.0, "most": -values["least"] + 0.0}
-    if values["kind"] == "gear":  # the world has no angle, so that only the phase and the torque on the body remain
-        changed |= {"ratio": 1.0, "phase": -values["phase"] + 0.0}
-        if "max_force" in values:
-            changed["max_force"] = values["max_force"] / abs(values["ratio"])
-    return changed

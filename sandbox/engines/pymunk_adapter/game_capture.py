@@ -122,6 +122,9 @@ class SpaceCapture:
         elements = SpaceElements(space, {}, notes_forces=False)
         captured = scene_of(elements, dt, 10.0, "")
         self._paths = elements.paths
+        self._wall_bodies = {
+            shape.body for shape, path in elements.paths.items() if path.startswith(("wall[", "post["))
+        }
         self._scene, self._names, self._is_kinematic = captured.scene, elements.names, elements.is_kinematic
         self._omitted, self._inexact = dict.fromkeys(captured.omitted), dict.fromkeys(captured.inexact)
         self._actions: list[Action] = []
@@ -224,7 +227,7 @@ class SpaceCapture:
             before, now = self._states[body], MotionState.of(body)
             if before == now:
                 continue
-            if name not in self._scene_bodies:
+            if name not in self._scene_bodies or body in self._wall_bodies:
                 self._omitted["walls and posts that the game moves"] = None
                 continue
             is_moving = body.body_type == pymunk.Body.DYNAMIC or self._is_kinematic(body)
