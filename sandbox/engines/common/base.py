@@ -272,7 +272,8 @@ BIAS = (1.0 - 0.1) ** 60
 
 
 BOX2D_SETTINGS = "continuous", "workers"
-SLEEP_SETTINGS = "sleeping", "sleep_time", "idle_speed"
+SLEEP_SETTINGS = {"sleeping": "pymunk and box2d", "sleep_time": "pymunk", "idle_speed": "pymunk"}
+"""Settings of sleep, and the engines that have them"""
 
 
 def box2d_settings_in(settings: Settings) -> list[str]:
@@ -282,8 +283,11 @@ def box2d_settings_in(settings: Settings) -> list[str]:
 
 def library_settings_in(settings: Settings) -> list[str]:
     """Return why the settings of Box2D and pymunk that are stated are not supported, for the hand-written engines."""
-    stated = [key for key in SLEEP_SETTINGS if getattr(settings, key) is not None]
-    return box2d_settings_in(settings) + [f"{key} is not supported; no body falls asleep; remove it" for key in stated]
+    return box2d_settings_in(settings) + [
+        f"{key} applies to {engines} only; remove it"
+        for key, engines in SLEEP_SETTINGS.items()
+        if getattr(settings, key) is not None
+    ]
 
 
 def slop_of(start: Scene | Setup) -> float:

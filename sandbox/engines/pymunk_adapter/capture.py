@@ -13,13 +13,13 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 import pymunk
 
 from sandbox.engines.common.base import BIAS
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE, SLEEP_TIME
+from sandbox.engines.pymunk_adapter.joint_capture import MIN_RADIUS, KeyValues, joint_values, point_of
 from sandbox.engines.pymunk_adapter.shape_filters import MAX_CATEGORIES, FilterKind, SceneFilters
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
@@ -30,10 +30,6 @@ from sandbox.scene.editing.elements import unique_name
 from sandbox.scene.errors import SceneError, quoted
 from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import UNTURNABLE
-
-KeyValues: TypeAlias = dict[str, Any]
-MIN_RADIUS = 1e-9
-"""m, smallest radius of a capsule, and length of a rod"""
 
 
 class CaptureError(ValueError):
@@ -83,7 +79,7 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
     space = capture.space
     document: KeyValues = {
         "title": title,
-        "world": {"gravity": _point(space.gravity), "duration": duration} | damping_of(space),
+        "world": {"gravity": point_of(space.gravity), "duration": duration} | damping_of(space),
         "solver": {
             "dt": dt,
             "iterations": int(space.iterations),
@@ -297,9 +293,9 @@ class SpaceElements:
         if shape.filter.group and shape.filter.group in self._moving_groups:
             self.omitted.append("groups of static shapes")
         if isinstance(shape, pymunk.Circle):
-            return "post", {"position": _point(shape.offset), "radius": float(shape.radius)} | values
+            return "post", {"position": point_of(shape.offset), "radius": float(shape.radius)} | values
         assert isinstance(shape, pymunk.Segment)
-        points = [_point(shape.a), _point(shape.b)]
+        points = [point_of(shape.a), point_of(shape.b)]
         return "wall", {"points": points, "thickness": 2.0 * shape.radius} | values
 
     def _bodies_in_order(self, shapes: Sequence[pymunk.Shape]) -> Iterator[tuple[pymunk.Body, list[pymunk.Shape]]]:
@@ -342,7 +338,7 @@ class SpaceElements:
         centre = body.center_of_gravity
         if any(centre):
             self.inexact.append(f"{self.names[body]} has a centre of gravity that is not its origin")
-        values = self._state(body, shapes) | {"centre_of_mass": _point(centre)}
+        values = self._state(body, shapes) | {"centre_of_mass": point_of(centre)}
         kinds = [_PART_OF[type(shape)] for shape in shapes]
         if kinds != sorted(kinds, key=list(_PART_OF.values()).index):
             self.inexact.append(f"the shapes of {self.names[body]} are not in the order circles, segments, polygons")
@@ -358,22 +354,22 @@ class SpaceElements:
         values = self._surface(shape)
         match shape:
             case pymunk.Circle():
-                return {"radius": float(shape.radius), "position": _point(shape.offset)} | values
+                return {"radius": float(shape.radius), "position": point_of(shape.offset)} | values
             case pymunk.Segment():
                 smallest = _smallest_radius(body)
                 if shape.radius < smallest:
                     self.inexact.append(f"a segment of {self.names[body]} has no radius; the scene has {smallest:g} m")
-                ends = [_point(shape.a), _point(shape.b)]
+                ends = [point_of(shape.a), point_of(shape.b)]
                 return {"radius": max(float(shape.radius), smallest), "ends": ends} | values
             case pymunk.Poly():
                 rounding = {"radius": float(shape.radius)} if shape.radius else {}
-                return {"points": [_point(each) for each in shape.get_vertices()]} | rounding | values
+                return {"points": [point_of(each) for each in shape.get_vertices()]} | rounding | values
         raise CaptureError(f"{self.names[body]} has a shape of an unknown type: {type(shape).__name__}")
 
     def _state(self, body: pymunk.Body, shapes: Sequence[pymunk.Shape]) -> KeyValues:
         """Return name, motion, mass and filter of a body."""
         name, is_kinematic = self.names[body], self.is_kinematic(body)
-        values: KeyValues = {"name": name, "position": _point(body.position)}
+        values: KeyValues = {"name": name, "position": point_of(body.position)}
         if body.angle:
             values["angle"] = float(body.angle)
         if not (is_kinematic or body.body_type == pymunk.Body.DYNAMIC):
@@ -391,7 +387,7 @@ class SpaceElements:
                 values["fixed_rotation"] = True
             else:
                 values["moment"] = float(body.moment)
-        values["velocity"] = _point(body.velocity)
+        values["velocity"] = point_of(body.velocity)
         if body.angular_velocity:
             values["angular_velocity"] = float(body.angular_velocity)
         return values | self._filter(name, shapes)
@@ -476,7 +472,7 @@ def coefficients_of(shape: pymunk.Shape) -> KeyValues:
     return {
         "restitution": min(float(shape.elasticity), 1.0),
         "friction": float(shape.friction),
-        "surface_velocity": _point(shape.surface_velocity),
+        "surface_velocity": point_of(shape.surface_velocity),
     }
 
 
@@ -504,69 +500,3 @@ _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment
 def _body_of(shape: pymunk.Shape) -> pymunk.Body:
     assert shape.body is not None  # it is in a space
     return shape.body
-
-
-def joint_values(constraint: pymunk.Constraint, default_bias: float) -> KeyValues | None:
-    """Return the kind and the values of a joint; None if a scene has no such joint.
-
-    Args:
-        constraint: the joint.
-        default_bias: of the solver, which joints without their own `bias` have.
-    """
-    values = _kind_values(constraint)
-    return None if values is None else values | _limits(constraint, default_bias)
-
-
-def _limits(constraint: pymunk.Constraint, default_bias: float) -> KeyValues:
-    """Return the limits of a joint that differ from the defaults of a scene, as far as pymunk uses them."""
-    values: KeyValues = {}
-    if math.isfinite(constraint.max_force):
-        key = "max_torque" if isinstance(constraint, pymunk.SimpleMotor) else "max_force"
-        values[key] = float(constraint.max_force)
-    if isinstance(constraint, pymunk.SimpleMotor | pymunk.DampedSpring | pymunk.DampedRotarySpring):
-        return values  # they have no error to correct
-    if math.isfinite(constraint.max_bias):
-        values["max_bias"] = float(constraint.max_bias)
-    if constraint.error_bias != default_bias:
-        values["bias"] = float(constraint.error_bias)
-    return values
-
-
-def _kind_values(constraint: pymunk.Constraint) -> KeyValues | None:
-    """Return the kind of a joint and the values of its geometry; None if a scene has no such joint."""
-    match constraint:
-        case pymunk.PinJoint():
-            length = 0.0 if constraint.distance < MIN_RADIUS else float(constraint.distance)
-            return {"kind": "rod", "length": length} | _anchors(constraint)
-        case pymunk.PivotJoint():
-            return {"kind": "pivot"} | _anchors(constraint)
-        case pymunk.SlideJoint():
-            limits = {"least": float(constraint.min), "most": float(constraint.max)}
-            return {"kind": "slide"} | limits | _anchors(constraint)
-        case pymunk.GrooveJoint():
-            groove = [_point(constraint.groove_a), _point(constraint.groove_b)]
-            return {"kind": "groove", "groove": groove, "anchor": _point(constraint.anchor_b)}
-        case pymunk.DampedSpring():
-            values = {"rest_length": float(constraint.rest_length), "damping": float(constraint.damping)}
-            return {"kind": "spring", "stiffness": float(constraint.stiffness)} | values | _anchors(constraint)
-        case pymunk.DampedRotarySpring():
-            values = {"rest_angle": -float(constraint.rest_angle) + 0.0, "damping": float(constraint.damping)}
-            return {"kind": "rotary_spring", "stiffness": float(constraint.stiffness)} | values
-        case pymunk.RotaryLimitJoint():
-            return {"kind": "rotary_limit", "least": float(constraint.min), "most": float(constraint.max)}
-        case pymunk.GearJoint():
-            return {"kind": "gear", "ratio": float(constraint.ratio), "phase": float(constraint.phase)}
-        case pymunk.RatchetJoint():
-            clicks = {"ratchet": float(constraint.ratchet), "phase": float(constraint.phase)}
-            return {"kind": "ratchet", "angle": float(constraint.angle)} | clicks
-        case pymunk.SimpleMotor():
-            return {"kind": "motor", "rate": -float(constraint.rate) + 0.0}
-    return None
-
-
-def _point(vector: Sequence[float]) -> list[float]:
-    return [float(vector[0]), float(vector[1])]
-
-
-def _anchors(constraint: Any) -> KeyValues:
-    return {"anchors": [_point(constraint.anchor_a), _point(constraint.anchor_b)]}

@@ -20,10 +20,10 @@ from sandbox.engines.pymunk_adapter.capture import (
     CapturedSpace,
     SpaceElements,
     coefficients_of,
-    joint_values,
     scene_of,
 )
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
+from sandbox.engines.pymunk_adapter.joint_capture import joint_values
 from sandbox.recording import Recording
 from sandbox.scene.errors import quoted
 
