@@ -1,6 +1,10 @@
 """Recordings of games that use pymunk: replays end in the state of the game, bit for bit."""
 
+import json
+import os
 import random
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -394,3 +398,26 @@ def test_replay_of_a_game_whose_bodies_fall_asleep(calls: bool) -> None:
         for body, name in captured.spaces[0].names.items():
             if body.body_type == pymunk.Body.DYNAMIC:
                 assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
+
+
+RECORDED_EXAMPLES = (
+    *("arrows", "balls_and_lines", "basic_test", "bouncing_balls", "breakout", "collisions", "constraints"),
+    *("contact_with_friction", "flipper", "platformer", "playground", "point_query", "slide_and_pinjoint", "tank"),
+)
+"""Examples that pymunk ships, played with simulated clicks, drags and keys"""
+
+
+@pytest.mark.full  # child processes
+@pytest.mark.parametrize("name", RECORDED_EXAMPLES)
+def test_examples_of_pymunk_are_recorded_and_replayed(name: str, tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    command = [sys.executable, "-W", "ignore", "-m", "tests.engines.record_example", name, "150"]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+    )
+    assert "RESULT" in done.stdout, done.stderr[-2000:]
+    found = json.loads(done.stdout.split("RESULT")[1])
+    assert found["steps"] == 150
+    assert found["omitted"] or found["inexact"] or found["replayed"]
+    if name in ("bouncing_balls", "playground", "slide_and_pinjoint"):
+        assert found["actions"] and not found["omitted"] and not found["inexact"]

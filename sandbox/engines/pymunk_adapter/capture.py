@@ -31,6 +31,9 @@ from sandbox.scene.errors import SceneError, quoted
 from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
+NOT_TURNED = "bodies that nothing can turn: the engine keeps their rotation free of rounding"
+"""Remark on the motion of bodies without friction"""
+
 
 class CaptureError(ValueError):
     """A space that cannot be a scene; `str()` has all reasons, one a line."""
@@ -101,7 +104,7 @@ def scene_of(capture: "SpaceElements", dt: float, duration: float, title: str) -
     setup = Setup.of(scene)
     moves = ~setup.bodies.fixed & (setup.bodies.moment < UNTURNABLE)
     if (moves & ~contact_matrix(setup).turnable & ~contact_matrix(setup).free).any():
-        capture.inexact.append("bodies that nothing can turn: the engine keeps their rotation free of rounding")
+        capture.inexact.append(NOT_TURNED)
     touches = contact_matrix(setup).touches
     untouched = ~touches & ~setup.bodies.fixed & touches.any()
     shaped = {capture.names[body] for body in capture.names if any(not shape.sensor for shape in body.shapes)}

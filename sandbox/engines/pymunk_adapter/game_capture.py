@@ -17,6 +17,7 @@ import pymunk
 
 from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
 from sandbox.engines.pymunk_adapter.capture import (
+    NOT_TURNED,
     CapturedSpace,
     SpaceElements,
     coefficients_of,
@@ -195,6 +196,8 @@ class SpaceCapture:
         for body in (body for body in added if body in elements.names):
             table, values = elements.element_of(body)
             name = str(values["name"])
+            if table == "ball" and not values.get("friction") and not values.get("fixed_rotation"):
+                self._inexact[NOT_TURNED] = None
             if table == "ball":  # the parts of an added body have no paths
                 self._paths |= dict.fromkeys(body.shapes, f"ball.{quoted(name)}")
             spawned: dict[str, Any] = {table: values}
