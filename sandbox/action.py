@@ -145,7 +145,7 @@ class SetParameter(Timed):
 
     Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
     `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution`, `friction`, `surface_speed`
-    and `surface_velocity`.
+    and `surface_velocity`, and `rate` and `max_torque` of motors.
     """
 
     kind: Literal["set"] = "set"
@@ -294,13 +294,20 @@ _SETTABLE = (
 
 _SETTABLE_OF_SURFACES = ("restitution", "friction", "surface_speed", "surface_velocity")
 
-SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution, friction, surface_speed or surface_velocity"
+_SETTABLE_OF_MOTORS = ("rate", "max_torque")
+
+SETTABLE = (
+    f"{', '.join(_SETTABLE)}, any restitution, friction, surface_speed or surface_velocity, and rate and max_torque of "
+    "motors"
+)
 """Parameters of a running scene that can be changed, as text for messages."""
 
 
 def is_settable(path: str) -> bool:
     """Return whether a parameter of a running scene can be changed."""
-    return path in _SETTABLE or path.rpartition(".")[2] in _SETTABLE_OF_SURFACES
+    key = path.rpartition(".")[2]
+    is_of_motor = path.startswith(("joint.", "joint[")) and key in _SETTABLE_OF_MOTORS
+    return path in _SETTABLE or key in _SETTABLE_OF_SURFACES or is_of_motor
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:

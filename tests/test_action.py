@@ -145,10 +145,11 @@ def test_actions_are_sorted_by_time_stably() -> None:
         ("world.gravity", True), ("world.wind", True), ("world.linear_drag", True), ("world.quadratic_drag", True),
         ("material.rubber.friction", True), ("ball.cue.restitution", True), ("pair.0.restitution", True),
         ("world.seed", False), ("world.duration", False), ("solver.dt", False), ("ball.cue.mass", False), ("", False),
-        ("world", False), ("world.gravity.1", False), ("frictions", False),
+        ("world", False), ("world.gravity.1", False), ("frictions", False), ("joint[0].rate", True),
+        ("joint.engine.max_torque", True), ("joint.engine.strength", False), ("drive.engine.rate", False),
     ],
 )  # fmt: skip
-def test_only_air_gravity_and_surface_coefficients_are_settable(path: str, can: bool) -> None:
+def test_only_air_gravity_motors_and_surface_coefficients_are_settable(path: str, can: bool) -> None:
     assert is_settable(path) is can
 
 

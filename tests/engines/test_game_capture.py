@@ -275,11 +275,10 @@ def _first(space: pymunk.Space) -> pymunk.Body:
 
 CHANGES: dict[str, tuple[Callable[[pymunk.Space], object], str]] = {
     "joint added": (lambda s: s.add(pymunk.PinJoint(s.static_body, _first(s))), "joints that the game adds"),
-    "limit of a motor": (
-        lambda s: setattr(next(iter(s.constraints)), "max_force", 9.0),
+    "motor whose bodies collide": (
+        lambda s: setattr(next(iter(s.constraints)), "collide_bodies", False),
         "joints that the game changes",
     ),
-    "motor": (lambda s: setattr(next(iter(s.constraints)), "rate", 9.0), "joints that the game changes"),
     "iterations": (lambda s: setattr(s, "iterations", 20), "settings and callbacks"),
     "callback": (lambda s: s.on_collision(1, 2, begin=lambda *_: None), "settings and callbacks"),
     "mass": (lambda s: setattr(_first(s), "mass", 9.0), "masses, moments and functions"),
@@ -356,6 +355,50 @@ def test_angles_and_coefficients_that_a_game_sets_are_replayed() -> None:
     game = Tuner()
     captured = play(game)
     assert not captured.omitted and not captured.inexact
+    ends = end_of(captured.recording)
+    for body, name in captured.spaces[0].names.items():
+        if body.body_type == pymunk.Body.DYNAMIC:
+            assert ends[name] == [*body.position, *body.velocity, body.angle, body.angular_velocity], name
+
+
+class Car(Platformer):
+    """A game with a car, whose player sets the rates and torques of its motors."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.chassis = pymunk.Body(5, 2000)
+        self.chassis.position = 60, 60
+        self.space.add(self.chassis, pymunk.Poly.create_box(self.chassis, (60, 16)))
+        self.motors = []
+        for side in (-1, 1):
+            tyre = disc(self.space, 60 + 25 * side, 45, 11)
+            for shape in tyre.shapes:
+                shape.friction = 1.5
+            motor = pymunk.SimpleMotor(self.chassis, tyre, 0.0)
+            motor.max_force = 20_000
+            axle = pymunk.PivotJoint(self.chassis, tyre, tuple(tyre.position))
+            axle.collide_bodies = motor.collide_bodies = False
+            self.space.add(axle, motor)
+            self.motors.append(motor)
+
+    def update(self, k: int) -> None:
+        super().update(k)
+        if k % 20 == 7:
+            for motor in self.motors:
+                motor.rate = 8.0 if k % 40 == 7 else -5.0
+        if k == 90:
+            self.motors[0].max_force = float("inf")
+        if k == 150:
+            self.motors[0].max_force = 500.0
+
+
+def test_motors_that_a_game_sets_are_replayed() -> None:
+    game = Car()
+    captured = play(game)
+    assert not captured.omitted
+    assert {a.path for a in captured.recording.actions if a.kind == "set" and a.path.startswith("joint")} == {
+        "joint[1].rate", "joint[1].max_torque", "joint[3].rate",
+    }  # fmt: skip
     ends = end_of(captured.recording)
     for body, name in captured.spaces[0].names.items():
         if body.body_type == pymunk.Body.DYNAMIC:

@@ -102,6 +102,20 @@ class WorldJoints:
             if not replaced.isdisjoint((int(links.a[k]), int(links.b[k]))):
                 self._joints[k] = self._world.create_joint(self._definition(links, k))
 
+    def update_motors(self, before: JointArrays) -> None:
+        """Set the values of motors that differ from those of the joints before an action."""
+        links = self._store.setup.links
+        if links is before:
+            return
+        changed = (links.figures[:, 0] != before.figures[:, 0]) | (links.max_force != before.max_force)
+        for motor in np.flatnonzero(changed & (links.kind == LinkKind.MOTOR)).tolist():
+            between = (links.a == links.a[motor]) & (links.b == links.b[motor]) & (links.kind == LinkKind.PIVOT)
+            for k in np.flatnonzero(between).tolist():
+                if k in self._joints:
+                    definition, joint = self._definition(links, k), self._joints[k]
+                    joint.motor_speed, joint.max_motor_torque = definition.motor_speed, definition.max_motor_torque
+                    joint.wake_bodies()
+
     def forget(self) -> None:
         """Forget joints whose bodies were removed with them."""
         intact = set(self._store.linked().tolist())

@@ -317,6 +317,7 @@ class PymunkBodies:
         self.particles.world = scene.world
         self.particles.rebuild()
         self._rebuild(scene, matrix, same_bodies)
+        self.space_bodies.joints.update(setup.links)
         self._set_arrays()
 
     def is_in_pocket(self, index: int) -> bool:

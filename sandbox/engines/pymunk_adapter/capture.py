@@ -200,6 +200,8 @@ class SpaceElements:
         """static bodies at the origin whose shapes are one body and not walls, because jointed bodies pass them"""
         self.paths: dict[pymunk.Shape, str] = {}
         """path of the table of each shape in the scene, such as `ball.body-1`; filled by `elements`"""
+        self.joint_paths: dict[pymunk.Constraint, str] = {}
+        """likewise of each joint, such as `joint[0]`"""
 
     def _is_sensor(self, shape: pymunk.Shape) -> bool:
         if shape.sensor:
@@ -254,7 +256,12 @@ class SpaceElements:
             all_balls = table == "ball"
             self.paths |= self._paths_of(table, body, shapes)
             tables.setdefault(table, []).append(values)
-        joints = [joint for constraint in self.space.constraints for joint in self._joint(constraint)]
+        joints: list[KeyValues] = []
+        for constraint in self.space.constraints:
+            joint = self._joint(constraint)
+            if joint is not None:
+                self.joint_paths[constraint] = f"joint[{len(joints)}]"
+                joints.append(joint)
         for body in self._origins:
             origin = {"name": self.names[body], "position": [0.0, 0.0], "radius": MIN_RADIUS, "fixed": True}
             tables.setdefault("ball", []).append(origin | {"collides": "none"})
@@ -441,14 +448,14 @@ class SpaceElements:
 
     # Joints
 
-    def _joint(self, constraint: pymunk.Constraint) -> Iterator[KeyValues]:
-        """Yield the joint of a constraint; nothing if a scene has no such joint."""
+    def _joint(self, constraint: pymunk.Constraint) -> KeyValues | None:
+        """Return the joint of a constraint; None if a scene has no such joint."""
         a, b = constraint.a, constraint.b
         kind = type(constraint).__name__
         values = joint_values(constraint, self.space.collision_bias)
         if values is None:
             self.omitted.append(f"a {kind}")
-            return
+            return None
         self._note_constraint(constraint, kind)
         if isinstance(constraint, pymunk.PinJoint) and values["length"] != constraint.distance:
             self.inexact.append(f"a PinJoint has the length {constraint.distance:g} m; the scene has 0 m")
@@ -459,7 +466,7 @@ class SpaceElements:
             between = between[1:]
             if "anchors" in values:
                 values["anchors"].reverse()
-        yield values | {"between": between, "collide": bool(constraint.collide_bodies)}
+        return values | {"between": between, "collide": bool(constraint.collide_bodies)}
 
     def _is_world(self, body: pymunk.Body) -> bool:
         is_at_origin = not any(body.position) and not body.angle

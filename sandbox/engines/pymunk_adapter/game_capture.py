@@ -24,7 +24,7 @@ from sandbox.engines.pymunk_adapter.capture import (
     scene_of,
 )
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
-from sandbox.engines.pymunk_adapter.joint_capture import joint_values
+from sandbox.engines.pymunk_adapter.joint_capture import joint_values, motor_values
 from sandbox.recording import Recording
 from sandbox.scene.errors import quoted
 
@@ -63,6 +63,9 @@ class SpaceForm:
     coefficients: Mapping[pymunk.Shape, dict[str, Any]]
     """as `coefficients_of` each shape"""
     joints: Mapping[pymunk.Constraint, tuple[Any, ...]]
+    """values of each joint, without those of motors, and whether its bodies collide"""
+    motors: Mapping[pymunk.SimpleMotor, dict[str, Any]]
+    """values of motors, as keys of their tables"""
 
     @classmethod
     def of(cls, space: pymunk.Space, bodies: Collection[pymunk.Body]) -> "SpaceForm":
@@ -84,7 +87,14 @@ class SpaceForm:
             },
             {each: (each.body, each.filter, each.sensor) for each in space.shapes},
             {each: coefficients_of(each) for each in space.shapes},
-            {joint: (joint_values(joint, space.collision_bias), joint.collide_bodies) for joint in space.constraints},
+            {
+                joint: (
+                    None if isinstance(joint, pymunk.SimpleMotor) else joint_values(joint, space.collision_bias),
+                    joint.collide_bodies,
+                )
+                for joint in space.constraints
+            },
+            {joint: motor_values(joint) for joint in space.constraints if isinstance(joint, pymunk.SimpleMotor)},
         )
 
     def changes_since(self, before: "SpaceForm", explained: Set[pymunk.Body]) -> Iterator[str]:
@@ -107,7 +117,7 @@ class SpaceForm:
         if self.joints.keys() != before.joints.keys():
             yield "joints that the game adds or removes"
         if any(self.joints[joint] != before.joints[joint] for joint in self.joints.keys() & before.joints.keys()):
-            yield "joints that the game changes, as the rate of a motor"
+            yield "joints that the game changes, other than the rate and the largest torque of motors"
 
 
 class SpaceCapture:
@@ -122,7 +132,7 @@ class SpaceCapture:
         self.space, self.dt, self.steps = space, dt, 0
         elements = SpaceElements(space, {}, notes_forces=False)
         captured = scene_of(elements, dt, 10.0, "")
-        self._paths = elements.paths
+        self._paths, self._joint_paths = elements.paths, elements.joint_paths
         self._wall_bodies = {
             shape.body for shape, path in elements.paths.items() if path.startswith(("wall[", "post["))
         }
@@ -160,6 +170,7 @@ class SpaceCapture:
             self._note_population()
             self._omitted |= dict.fromkeys(form.changes_since(self._form, known ^ set(self._names)))
             self._note_coefficients(form)
+            self._note_motors(form)
             self._note_motion()
         self._note_forces()
 
@@ -220,6 +231,18 @@ class SpaceCapture:
                 continue
             self._actions += [
                 SetParameter(time=self.time, path=f"{self._paths[shape]}.{key}", value=value)
+                for key, value in now.items()
+                if value != before[key]
+            ]
+
+    def _note_motors(self, form: SpaceForm) -> None:
+        """Note rates and largest torques of motors that have changed since the last step."""
+        for motor, now in form.motors.items():
+            before = self._form.motors.get(motor, now)
+            if motor not in self._joint_paths:  # it was added later
+                continue
+            self._actions += [
+                SetParameter(time=self.time, path=f"{self._joint_paths[motor]}.{key}", value=value)
                 for key, value in now.items()
                 if value != before[key]
             ]

@@ -29,6 +29,12 @@ def joint_values(constraint: pymunk.Constraint, default_bias: float) -> KeyValue
     return None if values is None else values | _limits(constraint, default_bias)
 
 
+def motor_values(motor: pymunk.SimpleMotor) -> KeyValues:
+    """Return the values of a motor; None for an unlimited torque."""
+    max_torque = float(motor.max_force) if math.isfinite(motor.max_force) else None
+    return {"rate": -float(motor.rate) + 0.0, "max_torque": max_torque}
+
+
 def _limits(constraint: pymunk.Constraint, default_bias: float) -> KeyValues:
     """Return the limits of a joint that differ from the defaults of a scene, as far as pymunk uses them."""
     values: KeyValues = {}

@@ -180,6 +180,18 @@ class SpaceJoints:
             self._constraints[k] = constraint
         self._rebuild(links.counted())
 
+    def update(self, links: JointArrays) -> None:
+        """Set the values of motors to those of the scene's joints, of which only these differ from before."""
+        if self._links is None or links is self._links:
+            return
+        self._links = links
+        for k, constraint in self._constraints.items():
+            if isinstance(constraint, pymunk.SimpleMotor):
+                rate, max_force = -float(links.figures[k, 0]), float(links.max_force[k])
+                if (constraint.rate, constraint.max_force) != (rate, max_force):  # to set them wakes bodies
+                    constraint.rate, constraint.max_force = rate, max_force
+        self._rebuild(self._of_constraints())
+
     def remove(self, index: int) -> None:
         """Remove the joints of a body that leaves."""
         if self._links is None:
@@ -239,8 +251,12 @@ class SpaceJoints:
             return
         for k in indices:
             self._space.remove(self._constraints.pop(k))
+        self._rebuild(self._of_constraints())
+
+    def _of_constraints(self) -> JointArrays:
+        """Return the joints that have a constraint."""
         assert self._links is not None
-        self._rebuild(self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64)))
+        return self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64))
 
     def _rebuild(self, links: JointArrays) -> None:
         """Update the lists of present joints, and of those that can break."""

@@ -188,6 +188,7 @@ class WorldState:
             overlaps = self.pipeline.at_one_way_walls(self.x[0])
             self.walls.begin(overlaps, self.closing_speed(overlaps, self.x))
         if self.joints is not None:
+            self.joints.links = store.setup.links  # motors may have other values
             self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.linked())
         self.forces = forces_on(store, self.field, self.joints, self.x.shape[2])
 

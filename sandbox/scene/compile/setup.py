@@ -1,5 +1,6 @@
 """Setup: the compiled state from which an engine starts a scene, at its beginning or in the middle of a session."""
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Any, Self, Union
@@ -10,6 +11,8 @@ from sandbox.scene.compile.drives import initial_drive_states
 from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Passing, PlaneReach
+from sandbox.scene.description.joints import Motor
+from sandbox.scene.description.scene import default_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +80,26 @@ class Setup:
     def with_scene(self, scene: Scene) -> Self:
         """Return the same state with changed values of the scene.
 
-        Elements of the scene are replaced; those of bodies that were added since are kept. Bodies and joints are not
-        compiled again, because that would restore removed bodies and broken joints, and lay out ropes along the new
-        gravity.
+        Elements of the scene are replaced; those of bodies that were added since are kept. Motors that differ get their
+        new values. Bodies and other joints are not compiled again, because that would restore removed bodies and broken
+        joints, and lay out ropes along the new gravity.
 
         Args:
             scene: scene with as many elements as this one, such as from `change_value`.
         """
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        return replace(self, scene=scene, bodies=bodies)
+        return replace(self, scene=scene, bodies=bodies, links=self._links_of(scene))
+
+    def _links_of(self, scene: Scene) -> JointArrays:
+        """Return the joints with the values of the motors of a scene that differ from those of this one."""
+        if scene.joints is self.scene.joints:
+            return self.links
+        figures, max_force = self.links.figures.copy(), self.links.max_force.copy()
+        for index, (motor, before) in enumerate(zip(scene.joints, self.scene.joints, strict=True)):
+            name = motor.name or default_name("joint", index)
+            if motor != before and isinstance(motor, Motor) and name in self.links.names:
+                row = self.links.names.index(name)
+                figures[row, 0] = motor.rate
+                max_force[row] = math.inf if motor.max_torque is None else motor.max_torque
+        return replace(self.links, figures=figures, max_force=max_force)
