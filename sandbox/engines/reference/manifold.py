@@ -12,7 +12,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.geometry import nearest_fraction
-from sandbox.engines.common.kernel import bare_kernel, kernel
+from sandbox.engines.common.kernel import bare_kernel, inline_kernel, kernel
 from sandbox.engines.reference.broad_phase import FIRST, SECOND, pair_key
 
 Manifold = tuple[float, float, float]
@@ -286,7 +286,7 @@ def find_segment_contacts(
     return row
 
 
-@bare_kernel
+@inline_kernel
 def write_surfaces(out: Manifolds, row: int, tangential: FloatArray, first: int, second: int) -> None:
     """Write the surfaces of a contact whose normal has been written, and their coefficients, into row `row`.
 
