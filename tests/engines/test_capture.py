@@ -380,6 +380,20 @@ def test_joint_to_the_world_as_second_body_continues_to_the_same_bits(
     assert max(differences) == 0.0
 
 
+def test_joint_to_a_world_of_sensors_only() -> None:
+    space = pymunk.Space()
+    trigger = pymunk.Circle(space.static_body, 5)
+    trigger.sensor = True
+    body = pymunk.Body(2, 100)
+    body.position = 20, 0
+    pivot = pymunk.PinJoint(body, space.static_body)
+    pivot.collide_bodies = False
+    space.add(trigger, body, pymunk.Circle(body, 3), pivot)
+    captured, differences = compare(space, 60)
+    assert all("sensor" in each for each in captured.omitted)
+    assert max(differences) == 0.0
+
+
 @pytest.mark.parametrize("collide", [True, False])
 def test_body_joined_to_the_world_passes_its_walls_only_without_collide_bodies(collide: bool) -> None:
     space = space_with_walls()

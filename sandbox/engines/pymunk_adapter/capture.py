@@ -190,12 +190,13 @@ class SpaceElements:
         """name of each body"""
         self._origins: dict[pymunk.Body, None] = {}
         """static bodies at the origin that are second bodies of joints: fixed bodies without shapes"""
+        shaped = {shape.body for shape in self._shapes}
         self._solid_worlds = {
             body
             for constraint in space.constraints
             if not constraint.collide_bodies
             for body in (constraint.a, constraint.b)
-            if self._is_world(body) and body.shapes
+            if body in shaped and self._is_world(body)
         }
         """static bodies at the origin whose shapes are one body and not walls, because jointed bodies pass them"""
         self.paths: dict[pymunk.Shape, str] = {}

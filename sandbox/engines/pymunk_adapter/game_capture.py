@@ -383,8 +383,8 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
 def _noted(game: GameCapture, method: Callable[..., None]) -> Callable[..., None]:
     """Return a method of bodies that is noted when the game calls it."""
 
-    def noted(body: pymunk.Body, *arguments: Any) -> None:
-        method(body, *arguments)
+    def noted(body: pymunk.Body, *arguments: Any, **more: Any) -> None:
+        method(body, *arguments, **more)
         game.note_sleep(body)
 
     return noted
