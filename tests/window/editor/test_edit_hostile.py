@@ -792,7 +792,7 @@ def test_leaving_while_a_field_is_edited_applies_it(open_on: Callable[..., App],
     window = open_on(path)
     type_key(window, pygame.K_a, CTRL)
     window.run_frame(0.02)
-    box = view_of(window).panel.box_of("selection:ball", "radius")
+    box = view_of(window).panel.box_of("selection:ball", "mass")
     assert box is not None
     pygame.event.post(press(*box.center))
     pygame.event.post(release(*box.center))
@@ -802,7 +802,7 @@ def test_leaving_while_a_field_is_edited_applies_it(open_on: Callable[..., App],
     assert window.editing is None
     view = window.app_state.view
     assert view is not None
-    assert view.scene.balls[0].radius == 0.25
+    assert view.scene.balls[0].mass == 0.25
 
 
 @pytest.mark.parametrize("tool", [tool.name for tool in TOOLS])
