@@ -23,7 +23,6 @@ from sandbox.engines.pymunk_adapter.capture import (
     coefficients_of,
     scene_of,
 )
-from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.engines.pymunk_adapter.joint_capture import joint_values, motor_values
 from sandbox.recording import Recording
 from sandbox.scene.errors import quoted
@@ -280,9 +279,13 @@ class SpaceCapture:
                 self._actions.append(action)
 
     def recording(self) -> Recording:
-        """Return the recording so far."""
-        settings = PymunkEngine().resolve(self._scene, self._scene.solver)
-        return Recording(self._scene, "pymunk", settings, tuple(self._actions), max(self.time, self.dt))
+        """Return the recording so far.
+
+        Its settings are those that the scene states: others, such as pymunk's persistence, are left to the engine, so
+        that other engines can replay it too.
+        """
+        duration = max(self.time, self.dt)
+        return Recording(self._scene, "pymunk", self._scene.solver, tuple(self._actions), duration)
 
     @property
     def names(self) -> dict[pymunk.Body, str]:
