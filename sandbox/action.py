@@ -297,8 +297,7 @@ _SETTABLE_OF_SURFACES = ("restitution", "friction", "surface_speed", "surface_ve
 _SETTABLE_OF_MOTORS = ("rate", "max_torque")
 
 SETTABLE = (
-    f"{', '.join(_SETTABLE)}, any restitution, friction, surface_speed or surface_velocity, and rate and max_torque of "
-    "motors"
+    f"{', '.join(_SETTABLE)}, any {', '.join(_SETTABLE_OF_SURFACES)}, and {' and '.join(_SETTABLE_OF_MOTORS)} of motors"
 )
 """Parameters of a running scene that can be changed, as text for messages."""
 

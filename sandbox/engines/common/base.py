@@ -271,22 +271,22 @@ BIAS = (1.0 - 0.1) ** 60
 """pymunk's default: a tenth of an overlap is corrected in 1/60 s."""
 
 
-BOX2D_SETTINGS = "continuous", "workers"
-SLEEP_SETTINGS = {"sleeping": "pymunk and box2d", "sleep_time": "pymunk", "idle_speed": "pymunk"}
-"""Settings of sleep, and the engines that have them"""
+LIBRARY_SETTINGS = {
+    "continuous": ("box2d",),
+    "workers": ("box2d",),
+    "sleeping": ("pymunk", "box2d"),
+    "sleep_time": ("pymunk",),
+    "idle_speed": ("pymunk",),
+}
+"""Settings of libraries, and the engines that have them"""
 
 
-def box2d_settings_in(settings: Settings) -> list[str]:
-    """Return why the settings of Box2D that are stated are not supported, for the other engines."""
-    return [f"{key} applies to box2d only; remove it" for key in BOX2D_SETTINGS if getattr(settings, key) is not None]
-
-
-def library_settings_in(settings: Settings) -> list[str]:
-    """Return why the settings of Box2D and pymunk that are stated are not supported, for the hand-written engines."""
-    return box2d_settings_in(settings) + [
-        f"{key} applies to {engines} only; remove it"
-        for key, engines in SLEEP_SETTINGS.items()
-        if getattr(settings, key) is not None
+def library_settings_in(settings: Settings, engine: str) -> list[str]:
+    """Return why settings of libraries that are stated are not supported by an engine, given by its name."""
+    return [
+        f"{key} applies to {' and '.join(engines)} only; remove it"
+        for key, engines in LIBRARY_SETTINGS.items()
+        if engine not in engines and getattr(settings, key) is not None
     ]
 
 

@@ -62,14 +62,16 @@ class SpaceBodyTable:
         """
         body = self._members[index].body
         body.position = float(position[0]), float(position[1])
-        if body.body_type == pymunk.Body.STATIC:
-            self._space.reindex_shapes_for_body(body)
-        self._state = None
+        self._update_pose(body)
 
     def set_angle(self, index: int, angle: float) -> None:
-        """Set the angle of a body, rad; as `set_position`."""
+        """Set the angle of a body, rad; see `set_position`."""
         body = self._members[index].body
         body.angle = angle
+        self._update_pose(body)
+
+    def _update_pose(self, body: pymunk.Body) -> None:
+        """Update the tree of static shapes and the state after a body was placed."""
         if body.body_type == pymunk.Body.STATIC:
             self._space.reindex_shapes_for_body(body)
         self._state = None

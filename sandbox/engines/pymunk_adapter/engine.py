@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
+from sandbox.engines.common.base import BIAS, library_settings_in, slop_of
 from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.workload import overload
 from sandbox.engines.pymunk_adapter.requirements import combination_faults, size_faults
@@ -113,7 +113,7 @@ class PymunkEngine:
             for key in ("stiffness", "damping")
             if getattr(settings, key) is not None
         ]
-        missing += box2d_settings_in(settings)
+        missing += library_settings_in(settings, self.name)
         if settings.broad_phase is not None:
             missing.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
         if settings.joints not in (None, "impulses"):

@@ -193,6 +193,7 @@ class SpaceCapture:
         present = [body for body in self.space.bodies if body.shapes or body in self._names]
         for body in self._form.bodies.keys() - {*self.space.bodies, self.space.static_body}:
             name = self._names.pop(body)
+            self._paths = {shape: path for shape, path in self._paths.items() if shape.body is not body}
             if name in self._scene_bodies:
                 self._actions.append(Remove(time=self.time, body=name))
             else:
@@ -227,24 +228,22 @@ class SpaceCapture:
                 self._omitted["elasticities above 1 that the game sets"] = None
             if shape not in self._paths:
                 self._omitted["coefficients of shapes of bodies that the game adds and then changes"] = None
-                continue
-            self._actions += [
-                SetParameter(time=self.time, path=f"{self._paths[shape]}.{key}", value=value)
-                for key, value in now.items()
-                if value != before[key]
-            ]
+            else:
+                self._set_changed(self._paths[shape], before, now)
 
     def _note_motors(self, form: SpaceForm) -> None:
         """Note rates and largest torques of motors that have changed since the last step."""
         for motor, now in form.motors.items():
-            before = self._form.motors.get(motor, now)
-            if motor not in self._joint_paths:  # it was added later
-                continue
-            self._actions += [
-                SetParameter(time=self.time, path=f"{self._joint_paths[motor]}.{key}", value=value)
-                for key, value in now.items()
-                if value != before[key]
-            ]
+            if motor in self._joint_paths:  # others were added later
+                self._set_changed(self._joint_paths[motor], self._form.motors.get(motor, now), now)
+
+    def _set_changed(self, path: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> None:
+        """Set the values of a table, given by its path, that differ from earlier ones."""
+        self._actions += [
+            SetParameter(time=self.time, path=f"{path}.{key}", value=value)
+            for key, value in now.items()
+            if value != before[key]
+        ]
 
     def _note_motion(self) -> None:
         """Note bodies whose motion is not that after the last step."""

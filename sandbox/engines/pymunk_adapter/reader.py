@@ -89,9 +89,10 @@ class SpaceReader:
 
     pymunk lists bodies in its own order, which changes when a body is removed, so rows are identified by body id. A
     body that falls asleep or wakes changes the order too: with `can_sleep`, each list is brought into the order in
-    which ids were read. The
-    memory of a buffer moves when it grows, and each new buffer leaks. Hence there is one buffer of each kind, and only
-    copies of its contents are returned.
+    which ids were read.
+
+    The memory of a buffer moves when it grows, and each new buffer leaks. Hence there is one buffer of each kind, and
+    only copies of its contents are returned.
     """
 
     def __init__(self, space: pymunk.Space, can_sleep: bool = False) -> None:

@@ -38,12 +38,12 @@ def combination_faults(scene: Scene, settings: Settings, has_kinematic: bool) ->
         if together:
             found.append(f"it does not model {first} and {second} together")
     if settings.sleeping:
-        found += [f"sleeping does not support {each}" for each in _never_asleep(scene, settings)]
+        found += [f"sleeping does not support {each}" for each in _unsupported_by_sleep(scene, settings)]
     return found
 
 
-def _never_asleep(scene: Scene, settings: Settings) -> Iterator[str]:
-    """Yield the parts and settings that act on bodies in each substep, so that none could fall asleep."""
+def _unsupported_by_sleep(scene: Scene, settings: Settings) -> Iterator[str]:
+    """Yield the parts and settings that need every body, awake or not, in each substep."""
     for name, has in (
         ("half_kick", settings.half_kick),
         ("drag", scene.world.has_drag),

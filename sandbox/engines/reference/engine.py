@@ -119,7 +119,7 @@ class ReferenceEngine:
         wanted = demands(setup)
         if on_floor(setup):
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
-        missing = unmodelled(setup, self.capabilities) + library_settings_in(settings)
+        missing = unmodelled(setup, self.capabilities) + library_settings_in(settings, "reference")
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
         rods = setup.links.of(LinkKind.ROD)
@@ -234,7 +234,7 @@ class ReferenceEngine:
 
 def _tabletop_faults(setup: Setup, settings: Settings) -> list[str]:
     """Return the demands and settings of a scene with a surface that are not supported."""
-    missing = unmodelled(setup, TABLETOP) + library_settings_in(settings)
+    missing = unmodelled(setup, TABLETOP) + library_settings_in(settings, "reference")
     missing += unsupported_by_steppers(setup)
     for key, method in TABLETOP_METHODS.items():
         if getattr(settings, key) not in (None, method):

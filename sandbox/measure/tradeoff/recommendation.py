@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
+from sandbox.engines.pymunk_adapter.engine import space_attributes
 from sandbox.formatting import format_quantity
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import Objective
@@ -170,15 +171,7 @@ def pymunk_lines(settings: Settings) -> list[str]:
 
     They do not include what the engine does to bodies and shapes, such as drag and moments of inertia.
     """
-    lines = [
-        f"space.iterations = {settings.iterations}",
-        f"space.collision_slop = {settings.slop!r}",
-        f"space.collision_bias = {settings.bias!r}",
-        f"space.collision_persistence = {settings.persistence}",
-    ]
-    if settings.sleeping:
-        lines.append(f"space.sleep_time_threshold = {settings.sleep_time!r}")
-        lines.append(f"space.idle_speed_threshold = {settings.idle_speed!r}")
+    lines = [f"space.{name} = {value!r}" for name, value in space_attributes(settings).items()]
     if settings.half_kick:
         half = f"{settings.dt!r} / {2 * settings.substeps}"
         lines.append(f"body.velocity += space.gravity * {half}  # every dynamic body, once before the first step")

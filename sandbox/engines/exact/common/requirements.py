@@ -150,7 +150,7 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     """Return each demand and setting of a scene that the engine does not support."""
-    missing = unmodelled(setup, CAPABILITIES) + library_settings_in(settings)
+    missing = unmodelled(setup, CAPABILITIES) + library_settings_in(settings, "exact")
     wanted = demands(setup)
     missing += [f"{demand}: {reason}" for demand, reason in REASONS.items() if demand in wanted]
     for key in STEPS + OVERLAP + SPRINGS:
