@@ -1,17 +1,42 @@
-"""Settings of all tests: number of examples of property tests; a skip on CI is a failure."""
+"""Settings of all tests: examples of property tests, time budgets, shards of the nightly tests, no skips on CI."""
 
 import os
 from collections.abc import Iterator
+from hashlib import blake2b
 
 import pytest
 from hypothesis import settings
 
 ON_CI = bool(os.environ.get("CI"))
 
-# No deadline: no test asserts on time. CI draws three times as many examples, and the same ones in every run, so that a
-# failure is due to the change under test; other runs draw new examples.
-settings.register_profile("sandbox", deadline=None, max_examples=60 if ON_CI else 20, derandomize=ON_CI)
+# No deadline: no test asserts on time. CI draws the same examples in every run, so that a failure is due to the change
+# under test. `.ci/nightly` draws many new ones, and prints how to repeat a failure.
+settings.register_profile("sandbox", deadline=None, max_examples=20, derandomize=ON_CI)
+settings.register_profile("nightly", deadline=None, max_examples=300, print_blob=True)
 settings.load_profile("sandbox")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--shard", metavar="K/N", help="run the K-th of N parts of the tests, K from 1 to N")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Enforce the time budgets of tests on CI only: elsewhere compilation, or a slow machine, is no failure."""
+    if not ON_CI and (plugin := config.pluginmanager.get_plugin("fail-slow")):
+        config.pluginmanager.unregister(plugin)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep the tests of a shard. The digest of a test's name decides, so that other tests do not move it."""
+    if shard := config.getoption("--shard"):
+        part, count = map(int, shard.split("/"))
+        parts: list[list[pytest.Item]] = [[], []]
+        for item in items:
+            digest = blake2b(item.nodeid.encode(), digest_size=8).digest()
+            parts[int.from_bytes(digest) % count == part - 1].append(item)
+        others, items[:] = parts
+        config.hook.pytest_deselected(items=others)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -13,6 +13,7 @@ import json
 import statistics
 import sys
 from datetime import UTC, datetime
+from typing import Any
 
 from sandbox.provenance import machine, versions
 from tools.benchmarks.row import Bench
@@ -20,7 +21,7 @@ from tools.benchmarks.suite import BENCHES
 from tools.benchmarks.workloads import Timed
 
 
-def measure(bench: Bench, repeats: int) -> dict[str, object]:
+def measure(bench: Bench, repeats: int) -> dict[str, Any]:
     """Check that both sides compute the same, time them in turns and return the row.
 
     The first side alternates, and the garbage collector runs between the timings, not during them.
@@ -103,7 +104,7 @@ def main() -> int:
     return 0
 
 
-def format_row(row: dict[str, object]) -> str:
+def format_row(row: dict[str, Any]) -> str:
     """Return a row as two lines of text."""
     verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
     rate = str(row["unit"]).endswith("/s")

@@ -48,7 +48,7 @@ def pile_space(scene: Scene) -> tuple[pymunk.Space, list[pymunk.Body]]:
     radius, mass = float(scene.bodies.radius[0]), float(scene.bodies.mass[0])
     (pair,) = scene.pairs
     # pymunk multiplies the coefficients of two shapes
-    friction, restitution = pair.friction**0.5, pair.restitution**0.5
+    friction, restitution = (pair.friction or 0.0) ** 0.5, (pair.restitution or 0.0) ** 0.5
     space = pymunk.Space()
     space.gravity = scene.world.gravity
     space.iterations = scene.solver.iterations
@@ -68,9 +68,9 @@ def pile_space(scene: Scene) -> tuple[pymunk.Space, list[pymunk.Body]]:
         x, y = x - 1e3 * across, y - 1e3 * up
         a, b = (x - 1e4 * up, y - 1e4 * across), (x + 1e4 * up, y + 1e4 * across)
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
-        shape = pymunk.Segment(body, a, b, 1e3)
-        shape.elasticity, shape.friction = restitution, friction
-        space.add(body, shape)
+        side = pymunk.Segment(body, a, b, 1e3)
+        side.elasticity, side.friction = restitution, friction
+        space.add(body, side)
         bodies.append(body)
     return space, bodies
 
@@ -285,7 +285,7 @@ def contacts_per_second(count: int) -> Callable[[], float]:
 def bounce_truth(scene: Scene) -> FloatArray:
     """Return the height of a ball dropped from 5 cm, restitution 0.8, at the frames of a scene, m."""
     frames = round(scene.world.duration / scene.solver.dt)
-    height, _ = bounces(scene.solver.dt * np.arange(1, frames + 1), 0.05, 0.0, 9.81, 0.8)
+    height, _ = bounces(scene.solver.dt * np.arange(1, frames + 1, dtype=np.float64), 0.05, 0.0, 9.81, 0.8)
     return height
 
 

@@ -92,7 +92,8 @@ def loop_ends(scene: Scene) -> FloatArray:
 
 def run_ends(scene: Scene) -> FloatArray:
     """Run balls with `sandbox.run`, and return their last positions, (N, 2) m."""
-    return run(scene, audit=False).position[-1]
+    ends: FloatArray = run(scene, audit=False).position[-1]
+    return ends
 
 
 def same_ends(milliseconds: int) -> None:
@@ -146,7 +147,8 @@ def pooled_runs(scene: Scene, engine: str, runs: int) -> Timed:
 def end_on(engine: str, scene: Scene) -> FloatArray:
     """Run a scene, recording its ends only, and return the last positions, (N, 2) m."""
     steps = round(scene.world.duration / scene.solver.dt)
-    return run(scene, engine, audit=False, record_every=steps).position[-1]
+    ends: FloatArray = run(scene, engine, audit=False, record_every=steps).position[-1]
+    return ends
 
 
 def shot_run(shots: int) -> Timed:

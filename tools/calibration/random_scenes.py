@@ -450,8 +450,8 @@ def double_pendulum(random: Random) -> Document:
     first = [math.sin(first_angle), -math.cos(first_angle)]
     second = [first[0] + math.sin(second_angle), first[1] - math.cos(second_angle)]
     balls = [
-        ball(*first, 0.1, name="a", collides="none"),
-        ball(*second, 0.1, name="b", mass=log(random, 0.1, 50), collides="none"),
+        ball(first[0], first[1], 0.1, name="a", collides="none"),
+        ball(second[0], second[1], 0.1, name="b", mass=log(random, 0.1, 50), collides="none"),
     ]
     rods = [{"kind": "rod", "between": ["a"], "anchors": [[0, 0], [0, 0]]}, {"kind": "rod", "between": ["a", "b"]}]
     return {"world": world(3.0), "ball": balls, "joint": rods}
@@ -472,7 +472,7 @@ def _chain(random: Random, count: int, load: float) -> Document:
         ball(0, -0.2 * (k + 1), 0.05, name=f"n{k}", collides="none", mass=load if k == count - 1 else 1.0)
         for k in range(count)
     ]
-    rods = [{"kind": "rod", "between": [f"n{k - 1}", f"n{k}"] if k else ["n0"]} for k in range(count)]
+    rods: list[Document] = [{"kind": "rod", "between": [f"n{k - 1}", f"n{k}"] if k else ["n0"]} for k in range(count)]
     rods[0]["anchors"] = [[0, 0], [0, 0]]
     return {
         "world": world(2.0),
@@ -522,8 +522,8 @@ def ragdoll(random: Random) -> Document:
 
 @kind
 def ball_on_ramp(random: Random) -> Document:
-    ramp = {"name": "ramp", "points": [[0, log(random, 0.5, 8)], [6, 0], [12, 0]], "thickness": 0.1, "friction": 0.5}
-    top = ramp["points"][0][1]
+    top = log(random, 0.5, 8)
+    ramp = {"name": "ramp", "points": [[0, top], [6, 0], [12, 0]], "thickness": 0.1, "friction": 0.5}
     return {"world": world(3.0), "wall": [ramp], "ball": [ball(0.5, top + 0.4, log(random, 0.05, 0.25), friction=0.5)]}
 
 

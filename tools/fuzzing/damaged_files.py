@@ -352,7 +352,12 @@ def _base() -> Path:
     """Make a folder with one valid file of each kind for this process; it is copied for each case."""
     folder = Path(tempfile.mkdtemp(prefix="valid-"))
     owner = os.getpid()
-    atexit.register(lambda: os.getpid() == owner and shutil.rmtree(folder, ignore_errors=True))
+
+    def remove() -> None:
+        if os.getpid() == owner:  # and not a process forked from this one
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
     (folder / "drop.toml").write_text(SCENE, encoding="utf-8")
     (folder / "game.toml").write_text(GAME, encoding="utf-8")
     (folder / "script.txt").write_text(SCRIPT, encoding="utf-8")

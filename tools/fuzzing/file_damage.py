@@ -31,7 +31,7 @@ def _index(content: bytes | bytearray, at: float) -> int:
     return min(int(at * len(content)), max(len(content) - 1, 0))
 
 
-def flip(content: bytearray, damage: Damage) -> bytes:
+def flip(content: bytearray, damage: Damage) -> bytearray:
     """Flip a bit at each of several positions."""
     for at in damage["at"] if content else ():
         bit = at * len(content) * 8
@@ -39,7 +39,7 @@ def flip(content: bytearray, damage: Damage) -> bytes:
     return content
 
 
-def zero(content: bytearray, damage: Damage) -> bytes:
+def zero(content: bytearray, damage: Damage) -> bytearray:
     """Overwrite a block with zeros."""
     start = _index(content, damage["at"])
     block = content[start : start + damage["length"]]
@@ -47,28 +47,28 @@ def zero(content: bytearray, damage: Damage) -> bytes:
     return content
 
 
-def overwrite(content: bytearray, damage: Damage) -> bytes:
+def overwrite(content: bytearray, damage: Damage) -> bytearray:
     """Overwrite a block with other bytes."""
     start, block = _index(content, damage["at"]), bytes.fromhex(damage["hex"])
     content[start : start + len(block)] = block
     return content
 
 
-def insert(content: bytearray, damage: Damage) -> bytes:
+def insert(content: bytearray, damage: Damage) -> bytearray:
     """Insert bytes."""
     start = int(damage["at"] * len(content))
     content[start:start] = bytes.fromhex(damage["hex"]) * damage.get("times", 1)
     return content
 
 
-def cut(content: bytearray, damage: Damage) -> bytes:
+def cut(content: bytearray, damage: Damage) -> bytearray:
     """Cut a block out; the length may reach beyond the end, which truncates the file."""
     start = _index(content, damage["at"])
     del content[start : start + damage["length"]]
     return content
 
 
-def double(content: bytearray, damage: Damage) -> bytes:
+def double(content: bytearray, damage: Damage) -> bytearray:
     """Repeat a block in place."""
     start = _index(content, damage["at"])
     block = content[start : start + damage["length"]]
@@ -86,7 +86,7 @@ def recode(content: bytearray, damage: Damage) -> bytes:
     return bytes(content).decode("utf-8", "replace").encode(damage["to"])
 
 
-BYTES: dict[str, Callable[[bytearray, Damage], bytes]] = {
+BYTES: dict[str, Callable[[bytearray, Damage], bytes | bytearray]] = {
     each.__name__: each for each in (flip, zero, overwrite, insert, cut, double, crlf, recode)
 }
 
@@ -96,7 +96,7 @@ BYTES: dict[str, Callable[[bytearray, Damage], bytes]] = {
 def raw_json(damage: Damage) -> str:
     """Return the raw JSON text of a value."""
     times = damage.get("times", 1)
-    return damage.get("before", "") * times + damage.get("raw", "") + damage.get("after", "") * times
+    return str(damage.get("before", "") * times + damage.get("raw", "") + damage.get("after", "") * times)
 
 
 def damage_json(text: str, damage: Damage) -> str:
@@ -146,7 +146,7 @@ def header(content: bytes, damage: Damage) -> bytes:
     found = _array(content)
     shape, descr = damage.get("shape", str(found.shape)), damage.get("descr", repr(found.dtype.str))
     text = f"{{'descr': {descr}, 'fortran_order': {damage.get('fortran', False)}, 'shape': {shape}, }}\n".encode()
-    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text) % 65536) + text + found.tobytes()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text) % 65536) + text + bytes(found.tobytes())
 
 
 def cast(content: bytes, damage: Damage) -> bytes:

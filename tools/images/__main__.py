@@ -9,7 +9,6 @@ are made, which takes some minutes.
 
 import argparse
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
@@ -95,4 +94,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

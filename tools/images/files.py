@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pygame
@@ -27,8 +28,9 @@ def reduce_colours(image: Image.Image, colours: int) -> Image.Image:
     found = image.getcolors(colours)
     if found is not None:
         return image.quantize(len(found), Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    commonest = sorted(image.getcolors(image.width * image.height), reverse=True)[: colours // 8]
-    kept = [part for _, colour in commonest for part in colour]
+    counted: list[Any] = image.getcolors(image.width * image.height) or []
+    commonest = sorted(counted, reverse=True)[: colours // 8]
+    kept: list[int] = [part for _, colour in commonest for part in colour]
     rest = (colours - len(commonest)) // 2
     for method in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE):
         kept += (image.quantize(rest, method).getpalette() or [])[: 3 * rest]

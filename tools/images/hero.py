@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pygame
@@ -86,7 +86,7 @@ def make(path: Path) -> None:
 
 def _runs() -> list[Run]:
     """Run the scene on each engine."""
-    variants = (
+    variants: tuple[tuple[str, str, tuple[int, int, int], dict[str, Any]], ...] = (
         ("pymunk", "dt 1/60 s", ORANGE, {}),
         ("reference", "RK4, bisection, dt 1/60 s", SKY, {"integrator": "rk4", "detection": "bisect"}),
         ("exact", "event by event, no time step: the truth", GREEN, {}),

@@ -140,7 +140,8 @@ class Rules:
             return np.array(fixed["position"])
         a, b = np.array(fixed["points"])
         fraction = np.clip(((point - a) @ (b - a)) / ((b - a) @ (b - a)), 0.0, 1.0)
-        return a + fraction * (b - a)
+        nearest: Array = a + fraction * (b - a)
+        return nearest
 
 
 class Verdict(NamedTuple):

@@ -1,0 +1,34 @@
+"""Sample scenes: twelve shipped scenes that together demand all that shipped scenes demand of an engine.
+
+A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
+`tests/laws/test_samples.py` asserts what they cover.
+"""
+
+from typing import Any
+
+import pytest
+
+from sandbox.scene.files.shipped_scenes import shipped
+
+SAMPLE_SCENES = (
+    "benchmark/incline",
+    "benchmark/kepler",
+    "billiards/9-ball",
+    "games/conveyor",
+    "games/curling",
+    "games/landing",
+    "games/rube_goldberg",
+    "joints/atwood",
+    "joints/cloth",
+    "joints/slider_crank",
+    "particles/sparks",
+    "pinball/full",
+)
+
+
+def each_shipped_scene() -> list[Any]:
+    """Return the names of all shipped scenes as parameters of a test; all but the sample scenes are nightly."""
+    return [
+        pytest.param(scene.name, marks=[] if scene.name in SAMPLE_SCENES else [pytest.mark.nightly])
+        for scene in shipped()
+    ]

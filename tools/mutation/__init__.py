@@ -1,0 +1,1 @@
+"""Mutation testing: small changes of the core that tests should notice, and which tests notice them."""

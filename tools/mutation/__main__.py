@@ -1,0 +1,175 @@
+"""Measures how many mutants of the core the tests detect: `python -m tools.mutation --help`.
+
+First record which tests execute what, then test mutants:
+
+    MUTATION_CONTEXTS=folder pytest -m "not nightly" -p tools.mutation.contexts
+    python -m tools.mutation folder --out mutants.jsonl
+
+For each mutant the tests that execute its line run, the cheapest first, until one fails. `--survivors-of FILE` tests
+only the mutants that survived there: so a larger suite, of another checkout given by `--root`, sees only those that a
+smaller one did not detect.
+"""
+
+import argparse
+import json
+import os
+import queue
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from tools.mutation.contexts import Context, read_contexts
+from tools.mutation.mutants import MODULES, Mutant, draw_mutants
+
+IGNORED = shutil.ignore_patterns(".git", ".venv", "build", "kernels-*", ".hypothesis", ".mypy_cache", "*_cache")
+
+UNCOMPILED = ("tests/engines/reference/", "tests/engines/exact/")
+"""Tests that pass without compilation too: they need not wait until all kernels are compiled for a mutant."""
+
+MAX_UNCOMPILED_COST = 0.5
+"""s, of a compiled test that runs without compilation: uncompiled it may take a hundred times as long"""
+
+LIMIT = 1200.0
+"""s, of all tests of a mutant, after which it counts as detected: an endless loop"""
+
+
+class Checkout:
+    """A copy of a repository in which one mutant after another is tested."""
+
+    def __init__(self, root: Path, folder: Path) -> None:
+        """Copy a repository, with the times of its files: compiled kernels stay valid by them."""
+        self.root, self.folder = root, folder
+        shutil.copytree(root, folder, ignore=IGNORED, symlinks=True)
+
+    def run(self, tests: list[str], limit: float, **environment: str) -> tuple[str, str]:
+        """Run tests until one fails; return "passed", "failed" or "timeout", and the first that failed."""
+        chosen = self.folder / "mutation_tests.txt"
+        chosen.write_text("\n".join(tests), encoding="utf-8")
+        command = [sys.executable, "-m", "pytest", "-p", "tools.mutation.selection", "-q", "-x", "-n", "0", "-m", ""]
+        command += ["-p", "no:cacheprovider", "-p", "no:fail-slow", *sorted({test.split("::")[0] for test in tests})]
+        path = {"PYTHONPATH": str(self.folder), "MUTATION_TESTS": str(chosen), "CI": "true"}
+        with subprocess.Popen(
+            command,
+            cwd=self.folder,
+            env=os.environ | path | environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        ) as process:
+            try:
+                output, _ = process.communicate(timeout=limit)
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.communicate()
+                return "timeout", ""
+        failed = re.search(r"^(?:FAILED|ERROR) (.*?)(?: - |$)", output, re.MULTILINE)
+        if process.returncode not in (0, 5):
+            return "failed", failed[1] if failed else output[-300:]
+        return "passed", ""
+
+    def keep_kernels(self) -> None:
+        """Let compiled kernels stay valid although a module of plain Python beside them has changed."""
+        script = "from sandbox.engines.common.kernel import cache_folder; print(cache_folder())"
+        old = max(self.folder.rglob("kernels-*"), key=lambda each: each.stat().st_mtime, default=None)
+        found = subprocess.run(
+            [sys.executable, "-c", script], cwd=self.folder, capture_output=True, text=True, check=True
+        ).stdout
+        new = Path(found.strip())
+        if old is not None and old != new:
+            shutil.rmtree(new)
+            old.rename(new)
+
+    def test(self, mutant: Mutant, contexts: dict[str, Context]) -> dict[str, Any]:
+        """Return the fate of a mutant."""
+        file = self.folder / mutant.path
+        file.write_text(mutant.source, encoding="utf-8")
+        tests = sorted(
+            (test for test, context in contexts.items() if context.executes(mutant)), key=lambda t: contexts[t].seconds
+        )
+        start = time.monotonic()
+        try:
+            fate, killer = "passed", ""
+            cheap = [t for t in tests if t.startswith(UNCOMPILED) and contexts[t].seconds < MAX_UNCOMPILED_COST]
+            if "/engines/" in mutant.path and cheap:
+                fate, killer = self.run(cheap, 150.0, NUMBA_DISABLE_JIT="1")
+                if "Timeout" in killer or fate == "timeout":
+                    fate = "passed"
+            if mutant.kernel is None:
+                self.keep_kernels()
+            if fate == "passed" and tests:
+                fate, killer = self.run(tests, LIMIT)
+        finally:
+            shutil.copy2(self.root / mutant.path, file)
+            if mutant.kernel is None:
+                self.keep_kernels()
+        return {
+            "mutant": mutant.name,
+            "detected": fate != "passed",
+            "by": killer or fate,
+            "tests": len(tests),
+            "seconds": round(time.monotonic() - start, 1),
+        }
+
+
+def main() -> None:
+    """Test mutants and print how many were detected."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
+    parser.add_argument("contexts", type=Path, nargs="+", help="folders of records of the tests")
+    parser.add_argument("--root", type=Path, default=Path(), help="checkout with the tests and modules")
+    parser.add_argument(
+        "--out", type=Path, required=True, help="file for results, one line a mutant; continued if there"
+    )
+    parser.add_argument("--survivors-of", type=Path, help="test only the mutants that survived in this file")
+    parser.add_argument("--count", type=int, default=15, help="mutants of each module")
+    parser.add_argument("--modules", nargs="*", default=MODULES, help="mutated modules")
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
+    contexts: dict[str, Context] = {}
+    for folder in given.contexts:
+        contexts |= read_contexts(folder)
+    mutants = [mutant for path in given.modules for mutant in draw_mutants(given.root, path, given.count)]
+    if given.survivors_of:
+        survived = {row["mutant"] for row in _rows(given.survivors_of) if not row["detected"]}
+        mutants = [mutant for mutant in mutants if mutant.name in survived]
+    done = {row["mutant"] for row in _rows(given.out)}
+    left: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
+    for mutant in mutants:
+        if mutant.name not in done:
+            left.put(mutant)
+
+    def work(folder: Path) -> None:
+        checkout = Checkout(given.root.resolve(), folder)
+        while True:
+            try:
+                mutant = left.get_nowait()
+            except queue.Empty:
+                return
+            row = checkout.test(mutant, contexts)
+            print("detected" if row["detected"] else "SURVIVED", row["mutant"], row["by"], sep="  ", flush=True)
+            with given.out.open("a", encoding="utf-8") as out:
+                out.write(json.dumps(row) + "\n")
+
+    with tempfile.TemporaryDirectory() as work_folder:
+        threads = [threading.Thread(target=work, args=(Path(work_folder) / str(k),)) for k in range(given.workers)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    rows = _rows(given.out)
+    print(f"{sum(row['detected'] for row in rows)} of {len(rows)} mutants detected")
+
+
+def _rows(file: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text("utf-8").splitlines()] if file.exists() else []
+
+
+if __name__ == "__main__":
+    main()
