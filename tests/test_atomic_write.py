@@ -70,7 +70,6 @@ def test_temporary_file_of_a_zombie_is_stale_but_not_of_a_stopped_process(tmp_pa
 def with_part(path: Path, part: str, value: str) -> Path:
     """Return a temporary path with another host, process or start."""
     match = TEMPORARY.fullmatch(path.name)
-    assert match is not None
     start, end = match.span(part)
     return path.with_name(path.name[:start] + value + path.name[end:])
 
@@ -93,9 +92,7 @@ def test_temporary_file_of_another_host_is_stale_after_a_day(tmp_path: Path) -> 
     assert names(tmp_path) == {fresh.name}
 
 
-def test_stale_file_removed_by_another_process_does_not_stop_the_cleanup(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_stale_file_removed_by_another_process_does_not_stop_the_cleanup(tmp_path, monkeypatch):
     for _ in range(3):
         old = with_part(temporary_path(tmp_path), "host", "0" * 8)
         old.write_text("")

@@ -22,27 +22,13 @@ from sandbox.formatting import (
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [
-        (0.0, "m", "0 m"),
-        (1.2345e-9, "m", "1.23 nm"),
-        (4.56e-5, "m", "45.6 µm"),
-        (0.00123, "m", "1.23 mm"),
-        (0.9999e-3, "m", "1.00 mm"),
-        (999.9e-6, "m", "1.00 mm"),
-        (999.4e-6, "m", "999 µm"),
-        (3.0, "m", "3.00 m"),
-        (1000.0, "m", "1.00 km"),
-        (0.01, "s", "10.0 ms"),
-        (-0.165, "J", "−165 mJ"),
-        (-9.81, "m/s²", "−9.81 m/s²"),
-        (0.5, "m/s²", "0.500 m/s²"),
-        (0.8, "", "0.800"),
-        (1e-20, "m", "1.00e-20 m"),
-        (1e17, "J", "1.00e17 J"),
-        (math.nan, "m", "? m"),
-        (math.inf, "J", "∞ J"),
-        (-math.inf, "J", "−∞ J"),
+        (0.0, "m", "0 m"), (1.2345e-9, "m", "1.23 nm"), (4.56e-5, "m", "45.6 µm"), (0.00123, "m", "1.23 mm"),
+        (0.9999e-3, "m", "1.00 mm"), (999.9e-6, "m", "1.00 mm"), (999.4e-6, "m", "999 µm"), (3.0, "m", "3.00 m"),
+        (1000.0, "m", "1.00 km"), (0.01, "s", "10.0 ms"), (-0.165, "J", "−165 mJ"), (-9.81, "m/s²", "−9.81 m/s²"),
+        (0.5, "m/s²", "0.500 m/s²"), (0.8, "", "0.800"), (1e-20, "m", "1.00e-20 m"), (1e17, "J", "1.00e17 J"),
+        (math.nan, "m", "? m"), (math.inf, "J", "∞ J"), (-math.inf, "J", "−∞ J"),
     ],
-)
+)  # fmt: skip
 def test_si_text_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
     assert format_si(value, unit) == text
 
@@ -50,15 +36,10 @@ def test_si_text_has_three_digits_and_a_prefix(value: float, unit: str, text: st
 @pytest.mark.parametrize(
     ("metres", "text"),
     [
-        (1.0, "1 m"),
-        (0.2, "200 mm"),
-        (0.005, "5 mm"),
-        (2e-6, "2 µm"),
-        (500.0, "500 m"),
-        (5000.0, "5 km"),
+        (1.0, "1 m"), (0.2, "200 mm"), (0.005, "5 mm"), (2e-6, "2 µm"), (500.0, "500 m"), (5000.0, "5 km"),
         (2e13, "2e13 m"),
     ],
-)
+)  # fmt: skip
 def test_si_text_with_one_digit_has_no_trailing_zeros(metres: float, text: str) -> None:
     assert format_si(metres, "m", digits=1) == text
 
@@ -97,22 +78,11 @@ def test_time_has_enough_decimals_to_show_each_step(time: float, step: float, te
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (None, "–"),
-        (math.nan, "–"),
-        (math.inf, "∞"),
-        (-math.inf, "−∞"),
-        (0.0, "0"),
-        (0.00123456, "0.00123"),
-        (0.000999, "9.99×10⁻⁴"),
-        (1e-4, "10⁻⁴"),
-        (-1e-7, "−10⁻⁷"),
-        (999.6, "1,000"),
-        (98765.0, "98,800"),
-        (1.5e7, "1.5×10⁷"),
-        (-2.5, "−2.5"),
-        (100.0, "100"),
+        (None, "–"), (math.nan, "–"), (math.inf, "∞"), (-math.inf, "−∞"), (0.0, "0"), (0.00123456, "0.00123"),
+        (0.000999, "9.99×10⁻⁴"), (1e-4, "10⁻⁴"), (-1e-7, "−10⁻⁷"), (999.6, "1,000"), (98765.0, "98,800"),
+        (1.5e7, "1.5×10⁷"), (-2.5, "−2.5"), (100.0, "100"),
     ],
-)
+)  # fmt: skip
 def test_numbers_far_from_one_are_shown_with_powers_of_ten(value: float | None, text: str) -> None:
     assert format_number(value) == text
 
@@ -138,16 +108,10 @@ def test_signed_numbers_have_a_typographic_minus(value: float, digits: int, text
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
     [
-        (0.00031, "m", "310 µm"),
-        (0.005, "m", "5 mm"),
-        (0.9999, "m", "1 m"),
-        (0.0009999, "m", "1 mm"),
-        (5e-10, "m", "5e-10 m"),
-        (0.0, "m", "0 m"),
-        (1234.5, "m", "1.23e+03 m"),
-        (0.5, "px", "0.5 px"),
+        (0.00031, "m", "310 µm"), (0.005, "m", "5 mm"), (0.9999, "m", "1 m"), (0.0009999, "m", "1 mm"),
+        (5e-10, "m", "5e-10 m"), (0.0, "m", "0 m"), (1234.5, "m", "1.23e+03 m"), (0.5, "px", "0.5 px"),
         (0.01, "", "0.01"),
     ],
-)
+)  # fmt: skip
 def test_quantity_is_formatted_with_a_suitable_unit_prefix(value: float, unit: str, text: str) -> None:
     assert format_quantity(value, unit) == text

@@ -52,9 +52,7 @@ def test_imports_of_modules_form_no_cycle() -> None:
     graphlib.TopologicalSorter(inside).prepare()  # a CycleError names the modules
 
 
-TOLERATED_FOLDER_IMPORTS = {
-    ("sandbox", "games", "window"),
-}
+TOLERATED_FOLDER_IMPORTS = {("sandbox", "games", "window")}
 """Imports that are omitted from the graph: package, and the importing and the imported member."""
 
 
@@ -89,20 +87,14 @@ def test_import_cycle_of_folders_is_detected() -> None:
 
 
 IMPORT_STRINGS = {
-    "sandbox": "names of the public interface",
-    "sandbox.cli.json_schemas": "results of commands",
-    "sandbox.cli.main": "commands",
-    "sandbox.game_names": "specs of games",
-    "sandbox.games.artillery": "parts of the game",
-    "sandbox.games.billiards": "parts of the game",
-    "sandbox.games.curling": "parts of the game",
-    "sandbox.games.landing": "parts of the game",
-    "sandbox.games.pinball": "parts of the game",
-    "sandbox.gym": "entry points of environments",
+    "sandbox": "names of the public interface", "sandbox.cli.json_schemas": "results of commands",
+    "sandbox.cli.main": "commands", "sandbox.game_names": "specs of games",
+    "sandbox.games.artillery": "parts of the game", "sandbox.games.billiards": "parts of the game",
+    "sandbox.games.curling": "parts of the game", "sandbox.games.landing": "parts of the game",
+    "sandbox.games.pinball": "parts of the game", "sandbox.gym": "entry points of environments",
     "sandbox.html_repr": "HTML of values in a notebook",
-    "sandbox.measure.extremes.isolation": "module that a subprocess runs",
-    "sandbox.notebook": "pages by type",
-}
+    "sandbox.measure.extremes.isolation": "module that a subprocess runs", "sandbox.notebook": "pages by type",
+}  # fmt: skip
 """Modules that contain names of modules of the package as strings, and what for."""
 
 

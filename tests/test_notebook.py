@@ -9,30 +9,19 @@ import pytest
 
 import sandbox
 from sandbox.notebook import FIT_HEIGHT, MAX_CHARACTERS, html_of
+from tests.toml_text import toml
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 HOSTILE = '</iframe><script>alert("1")</script>'
-TEXT = f"""
-title = '{HOSTILE}'
-about = "\\"' onload='alert(2)'"
-[world]
-gravity = [0, -10]
-duration = 0.3
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[wall]]
-points = [[2, 0], [2, 3]]
-[[post]]
-position = [-2, 1]
-radius = 0.1
-[[ball]]
-name = '<b>bold</b>'
-position = [0, 0.7]
-radius = 0.5
-restitution = 0.5
-"""
+TEXT = (
+    toml(title=HOSTILE, about="\"' onload='alert(2)'")
+    + toml("world", gravity=[0, -10], duration=0.3)
+    + toml("plane", point=[0, 0], normal=[0, 1])
+    + toml("wall", points=[[2, 0], [2, 3]])
+    + toml("post", position=[-2, 1], radius=0.1)
+    + toml("ball", name="<b>bold</b>", position=[0, 0.7], radius=0.5, restitution=0.5)
+)
 
 
 def document_in(text: str) -> str:
@@ -185,7 +174,7 @@ def test_odds_are_displayed_and_represented() -> None:
     assert lines[0].startswith("<Odds '9-ball', shot 'break' at 'cue': 50 strokes, seed ")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_tradeoff_is_displayed_and_represented(scene: sandbox.Scene) -> None:
     found = sandbox.tradeoff(scene, ["pymunk"], effort=1.0)
     assert "Error against cost" in document_in(found._repr_html_())

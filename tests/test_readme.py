@@ -11,11 +11,7 @@ from sandbox.scene.files.load import loads
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
-CHANGES = (
-    ("duration", "duraton"),
-    ("radius = 0.5", "radius = -0.5"),
-    ("restitution = 0.8", 'material = "rubbr"'),
-)
+CHANGES = (("duration", "duraton"), ("radius = 0.5", "radius = -0.5"), ("restitution = 0.8", 'material = "rubbr"'))
 """Changes named in the text that make a faulty file of the first scene."""
 
 

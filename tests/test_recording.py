@@ -10,9 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sandbox.action import Action, Impulse
+from sandbox.action import Impulse
 from sandbox.recording import Recording
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
@@ -47,9 +46,7 @@ def test_recording_round_trips_through_json() -> None:
 
 
 @given(strategies.scenes(), actions(), st.floats(0, 1e9), st.none() | st.text(max_size=9))
-def test_any_recording_round_trips_through_json(
-    scene: Scene, applied: tuple[Action, ...], duration: float, state_hash: str | None
-) -> None:
+def test_any_recording_round_trips_through_json(scene, applied, duration, state_hash):
     recording = Recording(scene, "reference", scene.solver, applied, duration, state_hash)
     text = recording.to_json()
     assert Recording.from_json(text) == recording

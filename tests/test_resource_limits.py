@@ -1,7 +1,6 @@
 """Resource limits: their environment variables, their messages, and the table in the documentation."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -48,7 +47,6 @@ def test_wrong_value_of_a_variable_exits_with_status_2(monkeypatch: pytest.Monke
 def test_value_that_a_message_recommends_is_sufficient(limit, monkeypatch: pytest.MonkeyPatch) -> None:
     for needed in (limit.default + 1, 3.7 * limit.default, 123_456_789_012_345):
         message = limit.refusal("it takes", needed)
-        assert message is not None
         value = message.split(f"{limit.variable}=")[1].split()[0]
         with monkeypatch.context() as patch:
             patch.setenv(limit.variable, value)
@@ -88,9 +86,7 @@ def test_file_size_limit_allows_50_000_balls_with_all_keys() -> None:
         ("reference", "SANDBOX_MAX_PAIRS", {"attraction": [{"toward": [0, 9], "strength": 1}]}),
     ],
 )
-def test_engine_names_the_limit_that_a_scene_exceeds(
-    engine: str, variable: str, more: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_engine_names_the_limit_that_a_scene_exceeds(engine, variable, more, monkeypatch):
     grid = {"origin": [0, 0], "columns": 4, "spacing": [3, 3], "radius": 1}
     scene = from_document({"grid": [grid], **more})
     assert ENGINES[engine].missing(scene, scene.solver) == ()

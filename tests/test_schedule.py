@@ -58,14 +58,8 @@ def test_step_longer_than_the_remaining_time_is_cut() -> None:
 steps = st.sampled_from([0.1, 0.01, 1 / 60, 1 / 3, 0.007, 0.25])
 
 
-@given(
-    duration=st.floats(0.01, 50.0),
-    dt=steps,
-    changes=st.lists(st.tuples(st.floats(0.0, 60.0), steps), max_size=6),
-)
-def test_stretches_fill_the_duration_and_begin_at_the_changes(
-    duration: float, dt: float, changes: list[tuple[float, float]]
-) -> None:
+@given(duration=st.floats(0.01, 50.0), dt=steps, changes=st.lists(st.tuples(st.floats(0.0, 60.0), steps), max_size=6))
+def test_stretches_fill_the_duration_and_begin_at_the_changes(duration, dt, changes):
     changes.sort(key=lambda each: each[0])
     stretches = schedule(duration, dt, [change(time, dt=other) for time, other in changes])
     whole = sum(each.steps * each.dt for each in stretches)

@@ -86,25 +86,12 @@ def test_nan_infinities_and_subnormals_round_trip(tmp_path: Path) -> None:
     assert equal(Trajectory.load(before.save(tmp_path / "run.npz")), before)
 
 
-def test_stored_arrays_have_the_names_of_the_attributes(tmp_path: Path) -> None:
-    with np.load(trajectory().save(str(tmp_path / "run.npz")), allow_pickle=False) as stored:
-        assert set(stored.files) == {*ARRAYS, "info"}
-        assert stored["position"].shape == (4, 3, 2)
-
-
 def test_file_is_saved_under_the_given_name(tmp_path: Path) -> None:
     for name in ("run", "run.tmp", "a b.é.npz", ".hidden"):
         path = trajectory().save(tmp_path / name)
         assert path.name == name
         assert path.exists()
     assert len(list(tmp_path.iterdir())) == 4
-
-
-def test_saving_again_replaces_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "run.npz"
-    trajectory(4).save(path)
-    trajectory(9).save(path)
-    assert len(Trajectory.load(path).time) == 9
 
 
 class Interrupted(BaseException):
@@ -139,48 +126,12 @@ def test_failed_rename_leaves_no_temporary_file(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
 
 
-def test_saving_into_a_missing_folder_raises(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        trajectory().save(tmp_path / "none" / "run.npz")
-
-
-@pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"PK\x03\x04", b"title = 'x'", b"\x93NUMPY\x01\x00"])
-def test_file_that_is_not_an_archive_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "run.npz"
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match="is not a stored run"):
-        Trajectory.load(path)
-
-
-def test_archive_of_other_arrays_is_refused(tmp_path: Path) -> None:
-    np.savez(tmp_path / "run.npz", time=np.zeros(3))
-    with pytest.raises(ValueError, match="it has no angle"):
-        Trajectory.load(tmp_path / "run.npz")
-    np.save(tmp_path / "one.npy", np.zeros(3))
-    with pytest.raises(ValueError, match="is not a stored run"):
-        Trajectory.load(tmp_path / "one.npy")
-
-
-def test_arrays_of_objects_are_refused_without_unpickling(tmp_path: Path) -> None:
-    arrays = {key: np.zeros(1) for key in ARRAYS} | {"info": np.asarray("{}"), "time": np.array([{}], dtype=object)}
-    np.savez(tmp_path / "run.npz", allow_pickle=True, **arrays)
-    with pytest.raises(ValueError, match="is not a stored run"):
-        Trajectory.load(tmp_path / "run.npz")
-
-
-def test_info_that_is_not_json_is_refused(tmp_path: Path) -> None:
-    arrays: dict[str, Any] = {key: np.zeros(1) for key in ARRAYS}
-    np.savez(tmp_path / "run.npz", **arrays, info=np.asarray("{"))
-    with pytest.raises(ValueError, match="is not a stored run"):
-        Trajectory.load(tmp_path / "run.npz")
-
-
 def test_missing_file_raises_file_not_found(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         Trajectory.load(tmp_path / "none.npz")
 
 
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.randoms(use_true_random=False), st.integers(0, 1))
 def test_damaged_file_is_refused_or_read(tmp_path: Path, chance: random.Random, cut: int) -> None:
     path = trajectory().save(tmp_path / "run.npz")

@@ -15,8 +15,9 @@ from sandbox.games.landing.rules import LANDED, LOST, OUTSIDE_PAD, TIPPED_OVER
 from sandbox.gym import CompiledOnlyError, SandboxEnv, SandboxVectorEnv, make_vector_env
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
+from tests.toml_text import toml
 
-pytestmark = pytest.mark.full  # many episodes one after the other
+pytestmark = pytest.mark.fail_slow(30)  # many episodes one after the other
 
 COUNT = 12
 
@@ -94,50 +95,19 @@ def test_episodes_are_those_of_single_environments(
     assert reasons <= ends.keys()
 
 
-PLAIN = """
-title = "Plain"
-[play]
-game = "landing"
-[world]
-gravity = [0.0, -1.62]
-duration = {duration}
-[solver]
-dt = 0.01
-[[plane]]
-name = "pad"
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-friction = 1.0
-[[box]]
-name = "ship"
-position = [0.0, {height}]
-velocity = [0.0, 0.0]
-size = [1.0, 4.0]
-mass = 2.0
-friction = 1.0
-[[thrust]]
-name = "engine"
-body = "ship"
-force = [0.0, {force}]
-key = "up"
-[[thrust]]
-name = "left"
-body = "ship"
-force = [-0.5, 0.0]
-point = [0.0, 1.6]
-key = "left"
-[[thrust]]
-name = "right"
-body = "ship"
-force = [0.5, 0.0]
-point = [0.0, 1.6]
-key = "right"
-{more}
-"""
-
-
 def plain(duration: float = 30.0, height: float = 2.3, force: float = 5.0, more: str = "") -> Scene:
-    return loads(PLAIN.format(duration=duration, height=height, force=force, more=more))
+    ship = {"position": [0.0, height], "velocity": [0.0, 0.0], "size": [1.0, 4.0], "mass": 2.0, "friction": 1.0}
+    return loads(
+        toml("play", game="landing")
+        + toml("world", gravity=[0.0, -1.62], duration=duration)
+        + toml("solver", dt=0.01)
+        + toml("plane", name="pad", point=[0.0, 0.0], normal=[0.0, 1.0], friction=1.0)
+        + toml("box", name="ship", **ship)
+        + toml("thrust", name="engine", body="ship", force=[0.0, force], key="up")
+        + toml("thrust", name="left", body="ship", force=[-0.5, 0.0], point=[0.0, 1.6], key="left")
+        + toml("thrust", name="right", body="ship", force=[0.5, 0.0], point=[0.0, 1.6], key="right")
+        + more
+    )
 
 
 def test_tall_ship_that_tips_over_ends_alike() -> None:

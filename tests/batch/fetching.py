@@ -9,10 +9,7 @@ DEFAULT = RunOptions()
 
 
 def run_or_fetch(
-    job: Job,
-    store: Store | None = None,
-    options: RunOptions = DEFAULT,
-    progress: Callable[[float], None] | None = None,
+    job: Job, store: Store | None = None, options: RunOptions = DEFAULT, progress: Callable[[float], None] | None = None
 ) -> RunRecord:
     """Return the stored run of a job, or run the job and store the run."""
     found = None if store is None else fetch(job, store, options)

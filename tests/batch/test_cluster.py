@@ -21,7 +21,7 @@ from tests.batch.test_resume import SCENE, assert_equal_stores, stored
 from tests.cli.calling import json_of
 from tests.environment import with_root_on_path
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 PRELOAD = """
 import os, signal, time

@@ -29,6 +29,7 @@ from sandbox.batch.executors import (
 )
 from sandbox.batch.job import CompletedRun, Job, RunOptions
 from sandbox.batch.process_pool import ProcessExecutor
+from sandbox.batch.store import StoreError
 from sandbox.batch.stored_run import StoredRun
 from sandbox.provenance import versions
 from sandbox.scene.errors import Fault, SceneError
@@ -75,7 +76,7 @@ def completed(future: "Future[tuple[JobOutcome, ...]]") -> list[CompletedRun]:
     return [each for each in outcomes if isinstance(each, CompletedRun)]
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_worker_processes_have_the_outcomes_of_this_process() -> None:
     submitted = jobs(6)
     here = completed(InProcessExecutor().submit(task_of(*submitted)))
@@ -93,7 +94,9 @@ def test_worker_processes_have_the_outcomes_of_this_process() -> None:
 def test_tasks_and_outcomes_can_be_pickled() -> None:
     (job,) = jobs(1)
     (outcome,) = run_task(task_of(job))
-    for value in (task_of(job), outcome, TaskLostError("a", (outcome,), knows_job=True), JobFailure("b")):
+    errors = (StoreError("a: b"), SceneError([Fault("a.toml", 3, "ball.a", "is none")]))
+    lost = TaskLostError("a", (outcome,), knows_job=True)
+    for value in (task_of(job), outcome, lost, JobFailure("b"), *errors):
         again = pickle.loads(pickle.dumps(value))
         assert vars(again) == vars(value) if isinstance(value, Exception) else again == value
 
@@ -129,9 +132,7 @@ def test_job_with_faults_is_a_failure_with_its_error(monkeypatch: pytest.MonkeyP
         (ZeroDivisionError("division"), "internal error: ZeroDivisionError in test_executors.py:"),
     ],
 )
-def test_job_that_raises_is_a_failure_with_the_reason(
-    error: Exception, reason: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_job_that_raises_is_a_failure_with_the_reason(error, reason, monkeypatch):
     def fail(job: Job, *_: object) -> Any:
         if job.label == "drop 1":
             raise error
@@ -156,7 +157,7 @@ def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytes
         executor.submit(task_of(*jobs(1))).result(60)
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_process_that_ends_at_its_start_raises_executor_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", end_at_once)
     with pool() as executor, pytest.raises(ExecutorError, match="ended with status 3"):
@@ -167,7 +168,7 @@ def end_at_once(_: object) -> NoReturn:
     os._exit(3)
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_fewer_workers_run_where_no_more_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
     start, started = SpawnProcess.start, list[SpawnProcess]()
 
@@ -186,7 +187,7 @@ def test_fewer_workers_run_where_no_more_can_be_started(monkeypatch: pytest.Monk
         assert executor.slots < 3
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_killed_worker_loses_the_job_that_it_ran(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, die_at_drop_1))
     with pool() as executor:
@@ -209,7 +210,7 @@ def die_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> Com
     return run(job, *more)
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_worker_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
     monkeypatch.setattr(executors, "COMPILING", 20.0)
@@ -226,7 +227,7 @@ def hang_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> Co
     return run(job, *more)
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_worker_killed_while_it_sends_an_outcome_does_not_block_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, large_run))
     with pool(2) as executor:
@@ -253,7 +254,7 @@ def send_half(pipe: Connection, data: Any, write: Callable[[int, Any], int] = os
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_shut_down_ends_workers_in_the_middle_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
     with pool() as executor:

@@ -23,9 +23,6 @@ from sandbox.trajectory import Trajectory
 from tests.environment import with_root_on_path
 from tests.interruptible import worker_processes
 
-pytestmark = pytest.mark.slow
-
-RUNS = 400
 SCENE = """
 title = "Sparks"
 world = { duration = 0.2, gravity = [0.0, -10.0] }
@@ -87,10 +84,14 @@ def scene(tmp_path: Path) -> str:
 
 
 @pytest.mark.timeout(600)
-def test_killed_driver_is_resumed_20_times_and_makes_exactly_the_missing_runs(scene: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("runs", "times"),
+    [pytest.param(60, 3, marks=pytest.mark.fail_slow(60)), pytest.param(400, 19, marks=pytest.mark.nightly)],
+)
+def test_killed_driver_is_resumed_and_makes_exactly_the_missing_runs(runs, times, scene, tmp_path):
     folder, rng = tmp_path / "runs", random.Random(4)
-    words = ("run", scene, "--seeds", str(RUNS), "--workers", "2", "--out", str(folder), "--quiet")
-    kills = sorted(rng.sample(range(1, RUNS - 5), 19))
+    words = ("run", scene, "--seeds", str(runs), "--workers", "2", "--out", str(folder), "--quiet")
+    kills = sorted(rng.sample(range(1, runs - 5), times))
     for k, count in enumerate((0, *kills)):  # the first one is killed while it starts
         log, before = tmp_path / f"log-{k}", stored(folder)
         with start(log, *words) as process:
@@ -106,14 +107,14 @@ def test_killed_driver_is_resumed_20_times_and_makes_exactly_the_missing_runs(sc
         repeated = set(seeds_of(log)) & {seed for _, seed, _ in before}
         assert not repeated
     before = stored(folder)
-    assert len(before) < RUNS
+    assert len(before) < runs
     with start(tmp_path / "last", *words) as process:
         _, err = process.communicate()
         assert (process.returncode, err) == (0, "")
     after = stored(folder)
     assert after[: len(before)] == before
-    assert sorted(seed for _, seed, _ in after) == list(range(1, RUNS + 1))
-    assert sorted(seeds_of(tmp_path / "last")) == sorted(set(range(1, RUNS + 1)) - {seed for _, seed, _ in before})
+    assert sorted(seed for _, seed, _ in after) == list(range(1, runs + 1))
+    assert sorted(seeds_of(tmp_path / "last")) == sorted(set(range(1, runs + 1)) - {seed for _, seed, _ in before})
     with Store(folder) as store:
         for row in store.rows():
             file = store.file(row)
@@ -123,6 +124,7 @@ def test_killed_driver_is_resumed_20_times_and_makes_exactly_the_missing_runs(sc
     assert {path.suffix for path in folder.iterdir()} == {".npz", ".sqlite"}  # no temporary file is left
 
 
+@pytest.mark.nightly
 def test_worker_killed_by_pid_loses_and_doubles_no_run(scene: str, tmp_path: Path) -> None:
     folder, log = tmp_path / "runs", tmp_path / "log"
     words = ("run", scene, "--seeds", "200", "--workers", "2", "--out", str(folder), "--quiet")
@@ -142,6 +144,7 @@ def test_worker_killed_by_pid_loses_and_doubles_no_run(scene: str, tmp_path: Pat
     assert len(seeds) <= 200 + killed  # only the runs that the killed workers were making are made again
 
 
+@pytest.mark.nightly
 def test_two_drivers_on_one_folder_store_each_run_once(scene: str, tmp_path: Path) -> None:
     folder = tmp_path / "runs"
     words = ("run", scene, "--seeds", "120", "--workers", "2", "--out", str(folder), "--quiet")
@@ -154,15 +157,12 @@ def test_two_drivers_on_one_folder_store_each_run_once(scene: str, tmp_path: Pat
         assert all(store.fault_of_file(row) is None for row in store.rows())
 
 
+@pytest.mark.nightly
 def test_runs_in_this_process_and_in_workers_are_equal_bit_for_bit(scene: str, tmp_path: Path) -> None:
     folders = [tmp_path / name for name in ("one", "two")]
     for folder, more in zip(folders, ([], ["--workers", "2"]), strict=True):
-        assert (
-            call(
-                ["run", scene, "--seeds", "20", "--engines", "pymunk,reference", "--out", str(folder), *more, "--quiet"]
-            )
-            == 0
-        )
+        words = ["run", scene, "--seeds", "20", "--engines", "pymunk,reference", "--out", str(folder), "--quiet"]
+        assert call([*words, *more]) == 0
     assert_equal_stores(*folders)
 
 
@@ -173,7 +173,6 @@ def assert_equal_stores(one: Path, other: Path) -> None:
         assert {row.id for row in rows} == {row.id for row in second.rows()}
         for row in rows:
             same = second.find(row.id)
-            assert same is not None
             files = first.file(row), second.file(same)
             assert files[0] is not None and files[1] is not None
             with np.load(files[0]) as a, np.load(files[1]) as b:
@@ -182,6 +181,7 @@ def assert_equal_stores(one: Path, other: Path) -> None:
             assert row.state_hash == same.state_hash is not None
 
 
+@pytest.mark.nightly
 def test_ten_thousand_runs_do_not_let_the_driver_grow(scene: str, tmp_path: Path) -> None:
     """Its resident memory after 10,000 runs is that after 1,000, plus what the index of the store takes."""
     script = f"""

@@ -100,10 +100,8 @@ def test_fault_of_a_study_has_its_line(text: str, line: int | None, path: str, m
     assert message in fault.message
 
 
-@pytest.mark.full
-def test_study_runs_as_the_command_that_it_states(
-    study: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.fail_slow(30)
+def test_study_runs_as_the_command_that_it_states(study, tmp_path, capfd):
     status, document, err = json_of(capfd, "run", study)
     assert status == 0
     assert len(document["runs"]) == 2 * 2 * 2  # nothing is random, so the seeds are one

@@ -78,6 +78,20 @@ def lines_of(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, l
     return status, out.splitlines(), _without_announcement(err)
 
 
+def document_from(capfd: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    """Call with `--json`; return the document of a command that succeeds without a message."""
+    status, document, err = json_of(capfd, *arguments)
+    assert (status, err) == (0, [])
+    return document
+
+
+def output_of(capfd: pytest.CaptureFixture[str], *arguments: str) -> list[str]:
+    """Call; return the lines of standard output of a command that succeeds without a message."""
+    status, out, err = lines_of(capfd, *arguments)
+    assert (status, err) == (0, [])
+    return out
+
+
 def _without_announcement(err: str) -> list[str]:
     """Return the lines of standard error without the announcement of a first compilation."""
     return [line for line in err.splitlines() if line != ANNOUNCEMENT]

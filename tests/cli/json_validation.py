@@ -3,18 +3,21 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from sandbox.cli.json_schemas import document_schema
+
 TYPES: Mapping[str, tuple[type, ...]] = {
-    "null": (type(None),),
-    "boolean": (bool,),
-    "integer": (int,),
-    "number": (int, float),
-    "string": (str,),
-    "array": (list,),
-    "object": (dict,),
-}
+    "null": (type(None),), "boolean": (bool,), "integer": (int,), "number": (int, float), "string": (str,),
+    "array": (list,), "object": (dict,),
+}  # fmt: skip
 OBJECT_KEYWORDS = frozenset(("properties", "required", "additionalProperties"))
 ARRAY_KEYWORDS = frozenset(("items", "prefixItems", "minItems", "maxItems"))
 KEYWORDS = frozenset(("$schema", "$defs", "$ref", "type", "enum", "anyOf")) | OBJECT_KEYWORDS | ARRAY_KEYWORDS
+
+
+def assert_valid_document(command: str, document: Mapping[str, Any]) -> None:
+    """Check that a document satisfies the published schema of its command."""
+    schema = document_schema(command)
+    assert list(violations(document, schema, schema)) == []
 
 
 def violations(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], path: str = "") -> Iterator[str]:

@@ -12,7 +12,7 @@ from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.files.shipped_scenes import shipped
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 SCENE = """
 [world]
@@ -91,7 +91,7 @@ def test_bash_offers_commands_options_engines_and_scenes() -> None:
     assert "session.json" in session
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.usefixtures("workspace")
 def test_bash_offers_files_and_keys_of_the_scene_on_the_line() -> None:
     files, hidden, runs, levels, tables, names, keys, solver, values = in_bash(

@@ -10,7 +10,7 @@ import pytest
 from sandbox.cli.main import call
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import load
-from tests.cli.calling import DROP, json_of, lines_of, write_scene
+from tests.cli.calling import DROP, json_of, lines_of, output_of, write_scene
 
 ZONE = '\n[[zone]]\nname = "hole"\nposition = [0.0, 0.0]\nradius = 0.1\nholds = true\n'
 
@@ -28,8 +28,7 @@ print(json.dumps({{name: [*body.position, *body.velocity] for name, body in bodi
 
 def test_program_of_a_scene_ends_in_the_state_of_a_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     name, target = write_scene(tmp_path), tmp_path / "game.py"
-    status, out, err = lines_of(capfd, "export", name, "--to", str(target), "--set", "solver.substeps=3")
-    assert (status, err) == (0, [])
+    out = output_of(capfd, "export", name, "--to", str(target), "--set", "solver.substeps=3")
     lines = len(target.read_text(encoding="utf-8").splitlines())
     assert out == [f"written: {target} ({lines} lines)"]
     trajectory = run(load(name, ["solver.substeps=3"]), "pymunk")
@@ -39,14 +38,6 @@ def test_program_of_a_scene_ends_in_the_state_of_a_run(tmp_path: Path, capfd: py
     )
     state = [*trajectory.position[-1, 0].tolist(), *trajectory.velocity[-1, 0].tolist()]
     assert json.loads(child.stdout) == {"a": state}
-
-
-def test_json_lists_the_program(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    target = tmp_path / "game.py"
-    status, document, err = json_of(capfd, "export", "bounce", "--to", str(target))
-    assert (status, err) == (0, [])
-    lines = len(target.read_text(encoding="utf-8").splitlines())
-    assert document == {"run": "bounce", "files": [{"path": str(target), "format": "py", "lines": lines}]}
 
 
 def test_warnings_of_check_are_comments(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -91,13 +82,7 @@ def test_existing_program_is_replaced_only_with_force(tmp_path: Path, capfd: pyt
         (("--to", "game.py", "--set", "solver.dtt=1"), ["drop.toml"]),
     ],
 )
-def test_faults_of_the_command_line(
-    options: tuple[str, ...],
-    at_fault: list[str],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_faults_of_the_command_line(options, at_fault, tmp_path, monkeypatch, capfd):
     write_scene(tmp_path)
     monkeypatch.chdir(tmp_path)
     status, out, err = lines_of(capfd, "export", "drop.toml", *options)
@@ -108,9 +93,7 @@ def test_faults_of_the_command_line(
 
 
 @pytest.mark.parametrize("source", ["nothing", "session.json", "."])
-def test_source_that_is_no_scene_is_a_fault(
-    source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_source_that_is_no_scene_is_a_fault(source, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     Path("session.json").write_text("{}", encoding="utf-8")
     status, _, err = lines_of(capfd, "export", source, "--to", "game.py")

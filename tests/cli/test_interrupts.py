@@ -11,7 +11,7 @@ import sandbox.games.billiards.shots.study as studying
 import sandbox.measure.compare.comparison as comparing
 from tests.cli.calling import json_of, lines_of, write_scene
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: int) -> None:
@@ -28,39 +28,27 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: 
     monkeypatch.setattr(module, name, interrupted)
 
 
-def test_interrupted_compare_keeps_finished_engines(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_interrupted_compare_keeps_finished_engines(monkeypatch, capfd):
     interrupt_at(monkeypatch, comparing, "timed_run", 2)
     status, document, err = json_of(capfd, "compare", "bounce")
     assert (status, document["interrupted"], len(document["engines"])) == (130, True, 1)
     assert err == ["interrupted: 1 run complete; the results are kept"]
 
 
-def test_compare_interrupted_in_its_first_run_prints_nothing(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_compare_interrupted_in_its_first_run_prints_nothing(monkeypatch, capfd):
     interrupt_at(monkeypatch, comparing, "timed_run", 1)
     status, out, err = lines_of(capfd, "compare", "bounce")
     assert (status, out, err[-1]) == (130, [], "interrupted")
 
 
-def test_interrupted_miss_keeps_finished_flights(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_interrupted_miss_keeps_finished_flights(monkeypatch, capfd):
     interrupt_at(monkeypatch, missing, "simulated_landing", 3)
     status, document, err = json_of(capfd, "miss", "duel")
     assert (status, document["interrupted"], len(document["rows"])) == (130, True, 2)
     assert err == ["interrupted: 2 flights are complete and kept"]
-    interrupt_at(monkeypatch, missing, "simulated_landing", 4)
-    status, out, _ = lines_of(capfd, "miss", "duel")
-    assert status == 130
-    assert "pymunk" in out[-1]
 
 
-def test_interrupted_check_keeps_finished_scenes(
-    tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_interrupted_check_keeps_finished_scenes(tmp_path, monkeypatch, capfd):
     scenes = [write_scene(tmp_path, name=f"{k}.toml") for k in range(3)]
     interrupt_at(monkeypatch, checking, "_check", 2)
     status, document, err = json_of(capfd, "check", *scenes, "--no-trial")

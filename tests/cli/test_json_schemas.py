@@ -1,19 +1,16 @@
-"""JSON Schemas of the commands' documents: the published ones are current, and outputs of commands satisfy them."""
+"""JSON Schemas of the commands' documents: the published ones are current."""
 
 import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 import pytest
 
-from sandbox.cli.json_schemas import DOCUMENTS, document_schema
-from sandbox.cli.main import call
+from sandbox.cli.json_schemas import DOCUMENTS
 from sandbox.jsonable import in_json, json_schema, to_json
-from tests.cli.calling import write_scene
 from tests.cli.json_validation import violations
 from tools.json_schemas import FOLDER, schema_text
 
@@ -104,58 +101,3 @@ def test_schema_of_a_dataclass_accepts_its_document_and_no_damaged_one() -> None
 def test_published_schema_is_the_generated_one(command: str) -> None:
     stored = (FOLDER / f"{command}.schema.json").read_text(encoding="utf-8")
     assert stored == schema_text(command), "python -m tools.json_schemas writes it"
-
-
-def assert_valid_document(command: str, document: Mapping[str, Any]) -> None:
-    """Check that a document satisfies the schema of its command."""
-    schema = document_schema(command)
-    assert list(violations(document, schema, schema)) == []
-
-
-@pytest.mark.parametrize("options", [(), ("--sweep", "solver.dt=0.02,0.01", "--why")])
-def test_comparison_satisfies_its_schema(
-    options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    call(["compare", write_scene(tmp_path), "--engines", "pymunk,exact", *options, "--json"])
-    assert_valid_document("compare", json.loads(capsys.readouterr().out))
-
-
-def test_tradeoff_satisfies_its_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    call(["tradeoff", write_scene(tmp_path), "--engine", "pymunk", "--points", "4", "--budget", "5", "--json"])
-    assert_valid_document("tradeoff", json.loads(capsys.readouterr().out))
-
-
-@pytest.mark.slow
-def test_shots_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
-    call(
-        ["shots", "9-ball", "--count", "20", "--sensitivity", "--horizon", "--window", "7:upper left pocket", "--json"]
-    )
-    assert_valid_document("shots", json.loads(capsys.readouterr().out))
-
-
-@pytest.mark.slow
-def test_extremes_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
-    call(["extremes", "--quick", "--axes", "speed", "--engines", "pymunk", "--json"])
-    assert_valid_document("extremes", json.loads(capsys.readouterr().out))
-
-
-@pytest.mark.full
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("bounce", "--engines", "pymunk,exact", "--ledger"),
-        ("newtons_cradle", "pendulum_5", "--engines", "exact,pymunk", "--set", "world.duration=0.2"),  # one is refused
-        ("pinball/classic", "--player", "random", "--seeds", "3", "--set", "world.duration=1"),
-        ("9-ball", "--engine", "exact"),
-    ],
-)
-def test_runs_satisfy_their_schema(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    call(["run", *arguments, "--json"])
-    assert_valid_document("run", json.loads(capsys.readouterr().out))
-
-
-def test_match_satisfies_its_schema(capsys: pytest.CaptureFixture[str]) -> None:
-    call(["match", "9-ball", "--turns", "4", "--json"])
-    document = json.loads(capsys.readouterr().out)
-    assert len(document["frames"]) == 1
-    assert_valid_document("match", document)

@@ -66,9 +66,7 @@ def test_error_of_the_game_keeps_what_was_played(game: Path, capfd: pytest.Captu
         (GAME.replace("pymunk.Body(1, 10)", "pymunk.Body(1e40, 10)"), "mass"),
     ],
 )
-def test_game_without_a_scene_writes_nothing(
-    game: Path, text: str, message: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_game_without_a_scene_writes_nothing(game, text, message, capfd):
     game.write_text(text)
     assert call(["record", str(game)]) == 2
     assert message in capfd.readouterr().err
@@ -87,7 +85,7 @@ def test_wrong_arguments(game: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["record", "--force", str(game)]) == 0
 
 
-@pytest.mark.full  # a child process
+@pytest.mark.fail_slow(30)  # a child process
 def test_interrupt_keeps_what_was_played(game: Path) -> None:
     handler = "import os, signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell may ignore it
     game.write_text(GAME + handler + "os.kill(os.getpid(), signal.SIGINT)\nspace.step(1)\n")

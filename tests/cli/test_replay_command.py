@@ -1,7 +1,5 @@
 """`sandbox replay`: the view of a stored run or a session, without a window."""
 
-from pathlib import Path
-
 import pytest
 
 from sandbox.action import Impulse
@@ -15,9 +13,9 @@ from sandbox.window.app_state import AppState
 from sandbox.window.playback import live as live_module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
-from tests.cli.calling import DROP, lines_of, write_scene
+from tests.cli.calling import DROP
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 SCENE = loads(DROP)
 KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
@@ -85,19 +83,6 @@ def test_restart_keeps_the_stored_ghost() -> None:
     assert again.diagnostics.has_ghost
     again.session.advance(20, None)
     assert [action.kind for action in again.session.actions] == ["impulse"]
-
-
-def test_message_names_the_right_command_for_a_scene_and_a_session(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    scene, session = write_scene(tmp_path), tmp_path / "s.json"
-    Recording(SCENE, "pymunk", SCENE.solver, (), 0.5).save(session)
-    status, out, err = lines_of(capfd, "replay", scene)
-    assert (status, out, len(err)) == (2, [], 1)
-    assert f"`sandbox play {scene}`" in err[0]
-    status, out, err = lines_of(capfd, "play", str(session))
-    assert (status, out, len(err)) == (2, [], 1)
-    assert f"`sandbox replay {session}`" in err[0]
 
 
 def test_rerun_and_replayed_session_have_the_same_hash() -> None:

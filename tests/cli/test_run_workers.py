@@ -14,29 +14,21 @@ from typing import Any, NoReturn
 import pytest
 
 from sandbox.batch import executors, process_pool
-from sandbox.batch.driver import ATTEMPTS
 from sandbox.batch.job import CompletedRun, Job, run_job
-from sandbox.batch.store import Store, StoreError
-from sandbox.scene.errors import Fault, SceneError
+from sandbox.batch.store import Store
 from sandbox.trajectory import Trajectory
 from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
 from tests.interruptible import interrupted, interruptible, worker_processes
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 TIMING_KEYS = ("seconds", "steps_per_second", "realtime_factor")
 """Keys of a row that depend on the machine."""
 
 
 def test_runs_with_workers_are_equal_to_runs_without(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    words = (
-        "run",
-        write_scene(tmp_path, DROP + SPARKS),
-        "--sweep",
-        "ball.a.position=[0,1],[0,2],[0,3]",
-        "--seeds",
-        "2",
-    )
+    sweep = ("--sweep", "ball.a.position=[0,1],[0,2],[0,3]", "--seeds", "2")
+    words = ("run", write_scene(tmp_path, DROP + SPARKS), *sweep)
     serial_runs = json_of(capfd, *words)[1]["runs"]
     status, document, _ = json_of(capfd, *words, "--workers", "3", "--out", str(tmp_path / "runs"))
     assert status == 0
@@ -50,13 +42,6 @@ def test_runs_with_workers_are_equal_to_runs_without(tmp_path: Path, capfd: pyte
         for run in document["runs"]:
             assert Path(run["path"]) == store.file(rows[run["id"]])
             assert Trajectory.load(run["path"]).info["state_hash"] == run["state_hash"]
-
-
-def test_stored_runs_are_not_repeated_by_workers(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    words = ("run", write_scene(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"), "--workers", "2")
-    json_of(capfd, *words, "--seeds", "2")
-    _, document, _ = json_of(capfd, *words, "--seeds", "4")
-    assert [run["repeated"] for run in document["runs"]] == [True, True, False, False]
 
 
 def test_interrupt_ends_workers_and_keeps_finished_runs(tmp_path: Path) -> None:
@@ -87,26 +72,9 @@ def die(job: Job, *_: object) -> NoReturn:
     raise AssertionError("still alive")
 
 
-def die_for_seed_2(job: Job, *args: Any) -> CompletedRun:
-    """Replacement of `run_job`: die only for seed 2."""
-    return die(job, *args) if job.scene.world.seed == 2 else run_job(job, *args)
-
-
 def die_once(job: Job, *args: Any) -> CompletedRun:
     """Replacement of `run_job`: die only at the first attempt."""
     return run_job(job, *args) if pid_file(Path(job.label).parent).exists() else die(job, *args)
-
-
-def fail_for_seed_2(job: Job, *args: Any) -> CompletedRun:
-    """Replacement of `run_job`: raise an unexpected error for seed 2."""
-    if job.scene.world.seed == 2:
-        raise ZeroDivisionError("here")
-    return run_job(job, *args)
-
-
-def run_out_of_memory(job: Job, *args: Any) -> CompletedRun:
-    """Replacement of `run_job`: raise MemoryError."""
-    raise MemoryError
 
 
 @pytest.fixture
@@ -125,76 +93,13 @@ def serve_with(function: Callable[..., CompletedRun], pipe: Any) -> None:
     process_pool.serve(pipe)
 
 
-def test_run_whose_worker_is_killed_is_repeated(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_job: Callable[[Callable[..., CompletedRun]], None]
-) -> None:
+def test_run_whose_worker_is_killed_is_repeated(tmp_path, capfd, replace_run_job):
     replace_run_job(die_once)
     words = ("run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
     status, document, err = json_of(capfd, *words)
     assert (status, err) == (0, [])
     assert [run["status"] for run in document["runs"]] == ["ok"] * 4
     assert pid_file(tmp_path).exists()
-
-
-@pytest.mark.slow
-def test_run_that_kills_every_worker_fails_and_the_others_complete(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_job: Callable[[Callable[..., CompletedRun]], None]
-) -> None:
-    replace_run_job(die_for_seed_2)
-    scene, folder = write_scene(tmp_path, DROP + SPARKS), tmp_path / "runs"
-    words = ("run", scene, "--seeds", "4", "--workers", "2", "--out", str(folder))
-    status, document, err = json_of(capfd, *words)
-    assert status == 1
-    assert [run["status"] for run in document["runs"]] == ["ok", "failed", "ok", "ok"]
-    assert len(pid_file(tmp_path).read_text().split()) == ATTEMPTS
-    assert "SIGSEGV" in err[0]
-    assert f"{ATTEMPTS} attempts" in err[0]
-    with Store(folder) as store:
-        assert sorted(row.status for row in store.rows()) == ["failed", "ok", "ok", "ok"]
-    # A failed run counts as not finished: the next call repeats it.
-    replace_run_job(run_job)
-    status, document, _ = json_of(capfd, *words)
-    assert status == 0
-    assert [run["repeated"] for run in document["runs"]] == [True, False, True, True]
-    with Store(folder) as store:
-        assert [row.status for row in store.rows()] == ["ok"] * 4
-
-
-@pytest.mark.parametrize(
-    ("function", "phrase"), [(fail_for_seed_2, "ZeroDivisionError"), (run_out_of_memory, "out of memory")]
-)
-def test_internal_error_in_a_worker_names_its_run_and_the_others_complete(
-    tmp_path: Path,
-    capfd: pytest.CaptureFixture[str],
-    replace_run_job: Callable[[Callable[..., CompletedRun]], None],
-    function: Callable[..., CompletedRun],
-    phrase: str,
-) -> None:
-    replace_run_job(function)
-    scene = write_scene(tmp_path, DROP + SPARKS)
-    status, document, err = json_of(capfd, "run", scene, "--seeds", "3", "--workers", "2")
-    assert status == 1
-    assert document["runs"][1]["status"] == "failed"
-    assert len(document["runs"]) == 3
-    messages = [line for line in err if phrase in line]
-    assert messages and all(line.startswith(f"{scene}: failed: ") for line in messages)
-
-
-@pytest.mark.slow
-def test_workers_that_cannot_start_end_the_command(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(process_pool, "serve", end_at_once)
-    status, document, err = json_of(
-        capfd, "run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2"
-    )
-    assert (status, document["runs"]) == (1, [])
-    assert "no worker process could be started" in err[-1]
-    assert "status 3" in err[-1]
-
-
-def end_at_once(_: object) -> NoReturn:
-    os._exit(3)
 
 
 def is_alive(pid: int) -> bool:
@@ -232,7 +137,7 @@ def wait_until(ready: Callable[[], bool]) -> None:
         sleep(0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
     with running_workers(tmp_path) as (command, pids):
         for pid in pids:
@@ -245,28 +150,13 @@ def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"runs.sqlite"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("sent_signal", [signal.SIGTERM, signal.SIGKILL])
 def test_workers_end_with_their_parent_in_the_middle_of_a_run(tmp_path: Path, sent_signal: signal.Signals) -> None:
     with running_workers(tmp_path) as (command, pids):
         command.send_signal(sent_signal)
         command.communicate(timeout=120)
         wait_until(lambda: not any(map(is_alive, pids)))
-
-
-@pytest.mark.slow
-def test_damaged_run_is_reported_and_repeated_by_a_worker(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene, folder = write_scene(tmp_path), tmp_path / "runs"
-    _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
-    path = Path(document["runs"][0]["path"])
-    path.write_bytes(b"no arrays")
-    words = ("run", scene, "--out", str(folder), "--sweep", "world.seed=0,7", "--workers", "2")
-    status, found, err = json_of(capfd, *words)
-    assert (status, [row["repeated"] for row in found["runs"]]) == (0, [False, False])
-    (message,) = [line for line in err if "random" not in line]
-    assert message.startswith(f"{path} is not a stored run: ")
-    status, found, _ = json_of(capfd, *words)
-    assert (status, [row["repeated"] for row in found["runs"]]) == (0, [True, True])
 
 
 def test_failed_store_ends_the_command_with_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -279,11 +169,3 @@ def test_failed_store_ends_the_command_with_status_2(tmp_path: Path, capfd: pyte
     status, _, err = lines_of(capfd, "run", scene, "--out", str(folder), *words)
     assert status == 2
     assert "Is a directory" in err[-1]
-
-
-@pytest.mark.parametrize("error", [StoreError("a: b"), SceneError([Fault("a.toml", 3, "ball.a", "is none")])])
-def test_errors_are_pickled_with_their_attributes(error: Exception) -> None:
-    import pickle
-
-    again = pickle.loads(pickle.dumps(error))
-    assert (type(again), str(again), vars(again)) == (type(error), str(error), vars(error))

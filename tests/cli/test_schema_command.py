@@ -6,22 +6,20 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.scene.files.json_schema import dumps, schema
-from tests.cli.calling import json_of, lines_of
+from tests.cli.calling import json_of, lines_of, output_of
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 
 def test_schema_without_a_table_prints_the_json_schema(capfd: pytest.CaptureFixture[str]) -> None:
-    assert call(["schema"]) == 0
-    assert capfd.readouterr().out == dumps()
+    for flags in ([], ["--json"]):
+        assert call(["schema", *flags]) == 0
+        assert capfd.readouterr().out == dumps()
 
 
-@pytest.mark.parametrize(
-    "table", ["ball", "[ball]", "solver", "body.box", "play.part", "pinball.bumper", "world", "kick"]
-)
+@pytest.mark.parametrize("table", ["[ball]", "body.box", "play.part", "world"])
 def test_table_lists_each_key_with_its_description(table: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, out, err = lines_of(capfd, "schema", table)
-    assert (status, err) == (0, [])
+    out = output_of(capfd, "schema", table)
     _, document, _ = json_of(capfd, "schema", table)
     listed = {line.split()[0]: line for line in out[2:]}
     assert list(listed) == list(document["properties"])
@@ -45,21 +43,6 @@ def test_ranges_omit_bounds_of_extreme_size(capfd: pytest.CaptureFixture[str]) -
     assert "number > 0 " in lines["radius"]
     assert "1e+" not in lines["position"]
     assert "required" in lines["position"]
-
-
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ("bal", "did you mean 'ball'?"),
-        ("ball.radius", "'radius' is a value, not a table"),
-        ("ball.x", "no key 'x'; known keys: name,"),
-        ("", "known keys: title,"),
-    ],
-)
-def test_unknown_table_is_reported_in_one_line(table: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, out, err = lines_of(capfd, "schema", table)
-    assert (status, out, len(err)) == (2, [], 1)
-    assert words in err[0]
 
 
 def test_every_table_of_a_scene_can_be_listed(capfd: pytest.CaptureFixture[str]) -> None:

@@ -212,7 +212,6 @@ def _command(example: Example, line: str, output: str | None, folder: Path) -> I
 def _parsed(example: Example, words: list[str]) -> Iterator[str]:
     context = click.Context(cli)
     command = cli.get_command(context, words[0])
-    assert command is not None
     try:
         command.make_context(words[0], words[1:])
     except click.UsageError as error:

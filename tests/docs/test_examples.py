@@ -6,7 +6,7 @@ import pytest
 
 from tests.docs.examples import PAGES, ROOT, examples, processes, run_page
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
 MAX_PROCESSES = 1
 """Largest number of commands of a page in the fast tests; each takes a second or more."""
@@ -14,11 +14,7 @@ MAX_PROCESSES = 1
 
 def _parameters() -> list[object]:
     return [
-        pytest.param(
-            page,
-            id=str(page.relative_to(ROOT)),
-            marks=[pytest.mark.slow] if _is_slow(page) else [],
-        )
+        pytest.param(page, id=str(page.relative_to(ROOT)), marks=[pytest.mark.nightly] if _is_slow(page) else [])
         for page in PAGES
     ]
 

@@ -51,9 +51,19 @@ def report(value):
 """
 
 INTERPRETER_FLAGS = pytest.mark.parametrize(
-    "flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"]
+    "flags", [(), pytest.param(("-O",), marks=pytest.mark.nightly)], ids=["plain", "optimised"]
 )
 """`python -O` removes every assert, including those of pymunk; that variant is slow, as all code runs twice."""
+
+
+def cases_of(text: str) -> list[list[str]]:
+    """Return name, outcome and code of each case of a text with one case per line."""
+    return [line.split(" | ", 2) for line in text.strip().splitlines()]
+
+
+def lambdas_of(text: str) -> str:
+    """Return the code of a mapping from the name of each case to a function that makes its scene."""
+    return "{" + ", ".join(f"{name!r}: lambda: {code}" for name, _, code in cases_of(text)) + "}"
 
 
 def run_isolated(code: str, flags: tuple[str, ...] = (), timeout: float = 60.0) -> Any:

@@ -4,23 +4,7 @@ import pytest
 
 from tests.hostile.ordeal import INTERPRETER_FLAGS, run_isolated
 
-pytestmark = pytest.mark.slow  # many bodies
-
-
-@INTERPRETER_FLAGS
-@pytest.mark.parametrize("count", [1_000, 1_000_000])
-def test_coincident_balls_are_refused(count: int, flags: tuple[str, ...]) -> None:
-    code = f"""
-grid = {{"origin": [0, 0], "columns": 1000, "rows": {count} // 1000, "spacing": [0, 0], "radius": 1}}
-emitter = {{"position": [0, 0], "count": {count}, "velocity_min": [0, 0], "velocity_max": [0, 0]}}
-report([
-    outcome(from_document, {{"grid": [grid]}}),
-    outcome(from_document, {{"grid": [grid], "ball": [{{"position": [1e9, 0], "radius": 1e8}}]}}),
-    outcome(from_document, {{"emitter": [{{**emitter, "collides": "all"}}]}}),
-    outcome(lambda: steps(start(from_document({{"emitter": [emitter]}})), 3)),
-])
-"""
-    assert run_isolated(code, flags) == ["SceneError", "SceneError", "SceneError", "done"]
+pytestmark = pytest.mark.nightly  # many bodies
 
 
 @INTERPRETER_FLAGS
@@ -34,19 +18,6 @@ def attempt(count):
 report([outcome(attempt, count) for count in (1_000, 3_000, 1_000_000)])
 """
     assert run_isolated(code, flags) == ["done", "SceneError", "SceneError"]
-
-
-@INTERPRETER_FLAGS
-def test_coincident_balls_beside_a_giant_ball_are_refused(flags: tuple[str, ...]) -> None:
-    """A giant ball makes all balls its neighbours, and there are too many to test every pair."""
-    code = """
-spread = {"origin": [0, 0], "columns": 200, "rows": 100, "spacing": [1, 1], "radius": 0.1}
-spot = {"origin": [1000, 0], "columns": 2000, "spacing": [0, 0], "radius": 0.1}
-giant = {"position": [1e6, 0], "radius": 1e4}
-report([outcome(from_document, {"grid": [spread, spot], "ball": [giant]}),
-     outcome(from_document, {"grid": [spread], "ball": [giant]})])
-"""
-    assert run_isolated(code, flags) == ["SceneError", "done"]
 
 
 @INTERPRETER_FLAGS
@@ -101,31 +72,6 @@ burst(None, 0.0).step()
 report([len(removed.retired), len(retired.retired)])
 """
     assert run_isolated(code, flags) == [1_000, 1_000]
-
-
-@INTERPRETER_FLAGS
-def test_a_hundred_thousand_particles_leave_the_bounds_at_once(flags: tuple[str, ...]) -> None:
-    code = """
-burst = {"position": [0, 0], "count": 100_000, "velocity_min": [200, 200], "velocity_max": [300, 300]}
-simulation = start(from_document({"world": {"bounds": [[-1, -1], [1, 1]]}, "emitter": [burst]}))
-steps(simulation, 3)
-frame = simulation.frame()
-report([len(simulation.retired), bool(frame.present.any()), bool(frame.velocity.any()), is_finite(simulation)])
-"""
-    assert run_isolated(code, flags) == [100_000, False, False, True]
-
-
-@INTERPRETER_FLAGS
-def test_forty_thousand_balls_in_a_sorted_line_are_added_quickly(flags: tuple[str, ...]) -> None:
-    """In sorted order pymunk's tree takes half a minute to add them; shuffled, a second or two."""
-    code = """
-simulation = start(from_document({
-    "grid": [{"origin": [0, 0], "columns": 40_000, "spacing": [3, 0], "radius": 1}],
-}))
-simulation.step()
-report(len(simulation.frame().position))
-"""
-    assert run_isolated(code, flags) == 40_000
 
 
 @INTERPRETER_FLAGS
@@ -199,24 +145,6 @@ report([
 
 
 @INTERPRETER_FLAGS
-def test_pair_table_too_large_for_memory_is_refused_before_allocation(flags: tuple[str, ...]) -> None:
-    code = """
-import os, resource
-resource.setrlimit(resource.RLIMIT_AS, (4 * 2**30, 4 * 2**30))
-from sandbox.engines.registry import ENGINES
-def reasons(columns):
-    grid = {"origin": [0, 0], "columns": columns, "rows": 100, "spacing": [3, 3], "radius": 1}
-    scene = from_document({"surface": {"sliding_friction": 0.2}, "grid": [grid]})
-    return ENGINES["exact"].missing(scene, scene.solver)
-(large,), few = reasons(1_000), reasons(2)
-os.environ["SANDBOX_MAX_MEMORY"] = "100KiB"
-(lowered,) = reasons(2)
-report(["SANDBOX_MAX_MEMORY=75GiB" in large, few, "SANDBOX_MAX_MEMORY=1MiB" in lowered])
-"""
-    assert run_isolated(code, flags) == [True, [], True]
-
-
-@INTERPRETER_FLAGS
 def test_broad_phase_is_fast_for_particles_and_for_columns_of_two_sizes(flags: tuple[str, ...]) -> None:
     """Testing every pair of particles without contacts, or of bodies in a column, would take minutes."""
     code = """
@@ -230,24 +158,6 @@ steps(start(from_document({"grid": [column], "ball": sizes[:1]}), "reference"), 
 report("done")
 """
     assert run_isolated(code, flags) == "done"
-
-
-@INTERPRETER_FLAGS
-@pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "sweep", "grid"])
-def test_too_many_candidate_pairs_are_refused_with_the_variable_to_set(
-    broad_phase: str, flags: tuple[str, ...]
-) -> None:
-    code = f"""
-import os
-line = {{"name": "g", "origin": [0, 0], "rows": 100, "columns": 1, "spacing": [3, 3], "radius": 1}}
-balls = [{{"position": [0, 999], "radius": 100}}]
-scene = from_document({{"grid": [line], "ball": balls, "world": {{"duration": 0.1}}}})
-whole = run(scene, "reference", broad_phase={broad_phase!r})
-os.environ["SANDBOX_MAX_PAIRS"] = "1000"
-cut = run(scene, "reference", broad_phase={broad_phase!r})
-report([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
-"""
-    assert run_isolated(code, flags) == ["ok", "refused", True]
 
 
 @INTERPRETER_FLAGS

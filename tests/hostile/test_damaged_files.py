@@ -5,7 +5,7 @@ import pytest
 from tools.fuzzing.damaged_files import KINDS, argument, file_cases
 from tools.fuzzing.isolated import Case, Limits, run_cases
 
-pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
 
 
 def failures(cases: list[Case], workers: int = 1) -> list[str]:
@@ -31,11 +31,11 @@ def test_undamaged_files_are_read_by_every_command() -> None:
     assert failures(cases) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_damaged_files_are_refused_or_recreated() -> None:
     assert failures(list(file_cases(7, 25))) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_many_damaged_files_are_refused_or_recreated() -> None:
     assert failures(list(file_cases(8, 400)), workers=2) == []

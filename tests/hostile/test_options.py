@@ -10,7 +10,7 @@ import pytest
 
 from sandbox.cli.main import COMMANDS, call, cli
 
-pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
 
 LONG = 10**6
 """characters of a long value"""
@@ -22,23 +22,15 @@ MISSING = "no-such-scene"
 """name in place of a scene: the command is refused with any options, so it never runs for long"""
 
 TEXTS = (
-    "", " ", "-", "--", "=", ",", ".", "\n", "a\nb", "\x1b[31m", "a\0b", "\udcff", "\u202e", "ü" * LONG, "a" * LONG,
-    "a b " * (LONG // 4), ",".join(["a"] * MANY), ",".join(f"a{k}" for k in range(MANY)), "." * LONG, ":" * LONG,
-    "'" * LONG, '"' * LONG, "[" * LONG, "x=" + "[" * LONG, "x=" + "{a=" * MANY, "x=" + "9" * LONG, "=" * LONG,
-    "x." * MANY + "y=1", "x[1]" * MANY + "=1", "solver.dt=" + ",".join(["1"] * MANY), "title=" + "\"," * MANY,
-    "solver.dt=0:1:" + "9" * 5000, "solver.dt=0:1:1000000000", "*=1", "*.*.*=1", "world=1", "ball.*=1",
-    "9" * 5000 + "x" + "9" * 5000, "1e400", "nan", "bot:" + "9" * LONG, ",".join(["bot"] * MANY),
+    "", "-", "\x1b[31m", "a\0b", "\udcff", "ü" * LONG, ",".join(f"a{k}" for k in range(MANY)), "x=" + "{a=" * MANY,
+    "solver.dt=0:1:" + "9" * 5000, "x[1]" * MANY + "=1", "nan",
 )  # fmt: skip
-NUMBERS = (
-    "", "x", "nan", "-nan", "inf", "-inf", "1e400", "-1e400", "-0", "-1", "0x10", "1_000", "9" * 60, "-" + "9" * 60,
-    "9" * 5000, "9" * LONG, "1" + "0" * 12, "1e9", "0." + "0" * LONG + "1", "٣", "½", "1\n2", "a\0b",
-)  # fmt: skip
+NUMBERS = ("", "x", "nan", "-inf", "1e400", "-1", "9" * LONG, "0." + "0" * LONG + "1", "٣", "a\0b")
 PATHS = (
-    "", "-", "x" * 256, "x" * 300 + ".png", "x/" * 3000, "x/" * 3000 + "y.html", "é" * 200, "a\nb", "a\0b",
-    "\udcff.png", "/dev/null", "/dev/null/x", "/dev/null/x.png", "/dev/zero", "/proc/x/y", "file", "file/x",
-    "file/x.png", "loop", "loop/x.svg", "broken", "broken/x.pdf", "folder", "folder.png", "no/such/folder.svg",
-    "a" * LONG,
+    "", "x" * 300 + ".png", "x/" * 3000 + "y.html", "a\0b", "\udcff.png", "/dev/null/x.png", "file/x", "loop",
+    "folder",
 )  # fmt: skip
+"""One value of each class: empty, of the wrong type, beyond all bounds, no text, no character, very long, unusable."""
 
 
 def commands() -> dict[str, click.Command]:
@@ -53,7 +45,7 @@ def values_for(parameter: click.Parameter) -> tuple[str, ...]:
     if isinstance(parameter.type, click.Path) or parameter.name in ("targets", "minimise"):
         return PATHS
     if parameter.name == "table":  # each value builds the schema, which takes a second
-        return TEXTS[::5]
+        return TEXTS[::3]
     return TEXTS + PATHS if isinstance(parameter, click.Argument) else TEXTS
 
 
@@ -92,9 +84,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(("name", "command", "parameter"), list(options()))
-def test_hostile_value_gives_a_short_message_and_status_2(
-    name: str, command: click.Command, parameter: click.Parameter, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_hostile_value_gives_a_short_message_and_status_2(name, command, parameter, capfd):
     base = refused_arguments(name, command)
     for value in values_for(parameter):
         if isinstance(parameter, click.Argument):
@@ -109,9 +99,7 @@ def test_hostile_value_gives_a_short_message_and_status_2(
 
 
 @pytest.mark.parametrize("command", list(commands().items()), ids=lambda item: item[0])
-def test_unknown_option_and_value_of_a_flag_are_refused(
-    command: tuple[str, click.Command], capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_unknown_option_and_value_of_a_flag_are_refused(command, capfd):
     name, definition = command
     flags = [f"{each.opts[0]}={'x' * LONG}" for each in definition.params if getattr(each, "is_flag", False)]
     for option in (f"--{'x' * LONG}", f"-{'x' * MANY}", "--\n", *flags):
@@ -134,12 +122,8 @@ def test_hostile_command_is_refused(name: str, capfd: pytest.CaptureFixture[str]
         ("play bounce", "--record"),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize(
-    "path", ["x" * 300, "x" * 300 + ".png", "x/" * 3000 + "y.html", "/dev/null", "/dev/null/x.png", "file/x.svg"]
-)
-def test_path_that_cannot_be_used_is_refused_before_the_work(
-    command: str, option: str, path: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize("path", ["x" * 300 + ".png", "/dev/null/x.png", "file/x.svg"])
+def test_path_that_cannot_be_used_is_refused_before_the_work(command, option, path, capfd):
     assert call([*command.split(), option, path]) == 2
     err = capfd.readouterr().err
     assert err.startswith(option)
@@ -149,9 +133,7 @@ def test_path_that_cannot_be_used_is_refused_before_the_work(
 @pytest.mark.parametrize(
     "command", ["run bounce --plot", "tradeoff bounce --plot", "play bounce --record", "compare bounce --minimise"]
 )
-def test_pipe_or_device_is_not_replaced_by_a_file(
-    command: str, folder: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_pipe_or_device_is_not_replaced_by_a_file(command, folder, capfd):
     assert call([*command.split(), "pipe.png"]) == 2
     assert "not a file" in capfd.readouterr().err
     assert (folder / "pipe.png").is_fifo()

@@ -13,12 +13,10 @@ from sandbox.action import Action, ActionError, Drive, Impulse, Remove, Reshape,
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Divergence
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.measure.run.sessions import rerun
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.window.playback.session import Session
 
-pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])
@@ -100,7 +98,7 @@ def table_actions(r: random.Random) -> TimedActions:
     return [*drive_actions(r), *((r.randrange(STEPS), action) for action in r.sample(each, 3))]
 
 
-def play(running: SwitchableSimulation | Session, actions: TimedActions, steps: int = STEPS) -> None:
+def play(running: SwitchableSimulation, actions: TimedActions, steps: int = STEPS) -> None:
     for k in range(steps):
         for when, action in actions:
             if when == k:
@@ -108,7 +106,7 @@ def play(running: SwitchableSimulation | Session, actions: TimedActions, steps: 
                     running.apply(action)
                 except ActionError:  # the body has been removed
                     continue
-        running.advance() if isinstance(running, Session) else running.step()
+        running.step()
 
 
 tables = st.integers(0, 2**32).map(random.Random)
@@ -159,16 +157,3 @@ def test_mirrored_table_gives_the_mirrored_motion(seed: int) -> None:
     np.testing.assert_allclose(-frame.angle, mirror.angle, rtol=0.0, atol=1e-8)  # 1e-9 m on discs of 0.1 m
     assert (frame.visits == mirror.visits).all()
     assert (frame.layer == mirror.layer).all()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_table_replays_to_the_same_state(seed: int) -> None:
-    r = random.Random(seed)
-    session = Session(from_document(table(r)))
-    play(session, table_actions(r))
-    state_hash = session.simulation.state_hash()
-    for step in (10, 25, STEPS):
-        assert all(0.0 < fraction <= 1.0 for fraction in session.seek(step))
-    assert session.simulation.state_hash() == state_hash
-    recording = session.recording()
-    assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash == state_hash

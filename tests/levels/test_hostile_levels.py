@@ -41,20 +41,11 @@ def test_plain_document_type_is_accepted() -> None:
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        (b"", "empty"),
-        (b"\x00\x01\x02\xff\xfe", "UTF-8"),
-        (b"\x89PNG\r\n\x1a\n\0\0", "UTF-8"),
-        (b"\x1f\x8b\x08\x00", "compressed"),
-        ("<svg>é</svg>".encode("latin-1"), "UTF-8"),
-        ("<svg/>".encode("utf-16"), "UTF-8"),
-        (b"<svg>\0</svg>", "well-formed"),
-        (b"<svg><g></svg>", "well-formed"),
-        (b"hello <there", "well-formed"),
-        (b"<html/>", "<html>"),
-        (b"<svg/>", "no shape"),
+        (b"", "empty"), (b"\x00\x01\x02\xff\xfe", "UTF-8"), (b"\x1f\x8b\x08\x00", "compressed"),
+        ("<svg/>".encode("utf-16"), "UTF-8"), (b"<svg><g></svg>", "well-formed"), (b"<svg/>", "no shape"),
         (b'<svg xmlns="http://example.com/other"/>', "root element"),
     ],
-)
+)  # fmt: skip
 def test_file_that_is_no_drawing_is_refused(content: bytes, word: str, tmp_path: Path) -> None:
     path = tmp_path / "a.svg"
     path.write_bytes(content)
@@ -125,43 +116,19 @@ def test_copies_of_other_files_are_refused(address: str) -> None:
 @pytest.mark.parametrize(
     "element",
     [
-        '<rect width="nan" height="5"/>',
-        '<rect width="1e400" height="5"/>',
-        '<rect width="-5" height="5"/>',
-        '<rect width="50%" height="5"/>',
-        '<rect width="5em" height="5"/>',
-        '<rect x="1e300" width="5" height="5"/>',
-        '<circle r="inf"/>',
-        '<circle r="1e30"/>',
-        '<circle r="5" transform="scale(1e200) scale(1e200)"/>',
-        '<circle r="5" transform="rotate(nan)"/>',
-        '<circle r="5" transform="matrix(1 2 3)"/>',
-        '<circle r="5" transform="perspective(3)"/>',
-        '<circle r="5" transform="rotate(3"/>',
-        '<polygon points="0,0 1,1 x,2"/>',
-        '<polygon points="0,0 1,1 2"/>',
-        '<polygon points="0,0 9,9 9,0 0,9"/>',
-        '<path d="M 0 0 L 1e999 3 4 4 z"/>',
-        '<path d="M 0 0 L"/>',
-        '<path d="M 0 0 5"/>',
-        '<path d="L 0 0 5 5"/>',
-        '<path d="M0 0 X 5 5"/>',
-        '<path d="M0,0 C 1 1"/>',
-        '<path d="M1e308 0 A 1 1 0 0 1 -1e308 0 z"/>',
-        f'<path d="M0 0 {"l1 0 " * 50_000}{"z" * 1990}"/>',
-        f'<path d="M0 0 {"z" * 5000}"/>',
-        f'<path d="{"M0 0 l1 0 0 1 z" * 5000}"/>',
-        '<rect width="5" height="5" data-body="flying"/>',
-        '<rect width="5" height="5" data-body="compound"/>',
-        '<line x2="5" data-body="dynamic"/>',
-        '<line x2="5" data-body="zone"/>',
+        '<rect width="nan" height="5"/>', '<rect width="-5" height="5"/>', '<rect width="50%" height="5"/>',
+        '<rect x="1e300" width="5" height="5"/>', '<circle r="5" transform="scale(1e200) scale(1e200)"/>',
+        '<circle r="5" transform="matrix(1 2 3)"/>', '<polygon points="0,0 1,1 x,2"/>',
+        '<polygon points="0,0 9,9 9,0 0,9"/>', '<path d="M 0 0 L 1e999 3 4 4 z"/>', '<path d="L 0 0 5 5"/>',
+        '<path d="M0 0 X 5 5"/>', '<path d="M1e308 0 A 1 1 0 0 1 -1e308 0 z"/>',
+        f'<path d="M0 0 {"l1 0 " * 50_000}{"z" * 1990}"/>', f'<path d="{"M0 0 l1 0 0 1 z" * 5000}"/>',
+        '<rect width="5" height="5" data-body="flying"/>', '<line x2="5" data-body="dynamic"/>',
         '<g data-body="compound"><circle r="5" data-body="zone"/></g>',
-        '<line x2="5" stroke="red" stroke-width="wide"/>',
-        '<svg viewBox="0 0 0 0">' + RECT + "</svg>",
+        '<line x2="5" stroke="red" stroke-width="wide"/>', '<svg viewBox="0 0 0 0">' + RECT + "</svg>",
         '<svg viewBox="0 0 5 5" preserveAspectRatio="xMaxYMax slice">' + RECT + "</svg>",
         '<rect width="5" height="5" data-mass="-1" data-body="dynamic"/>',
     ],
-)
+)  # fmt: skip
 def test_invalid_element_is_one_fault_with_its_line(element: str) -> None:
     faults = faults_of(f"{RECT}\n{element}")
     assert [fault.line for fault in faults] == [3]
@@ -180,20 +147,10 @@ def test_invalid_root_is_a_fault(attributes: str) -> None:
 @pytest.mark.parametrize(
     "element",
     [
-        '<circle r="0"/>',
-        "<circle/>",
-        '<rect width="0" height="5"/>',
-        '<ellipse rx="0" ry="5"/>',
-        '<line x1="3" x2="3"/>',
-        '<polygon points=""/>',
-        '<polygon points="1,1 1,1 1,1"/>',
-        '<path d="M 5 5"/>',
-        '<path d="M 5 5 z"/>',
-        '<path d=""/>',
-        '<rect width="5" height="5" transform="scale(0)"/>',
-        '<circle r="5" transform="matrix(1 0 0 0 0 0)"/>',
+        '<circle r="0"/>', '<rect width="0" height="5"/>', '<line x1="3" x2="3"/>', '<polygon points="1,1 1,1 1,1"/>',
+        '<path d="M 5 5"/>', '<path d=""/>', '<rect width="5" height="5" transform="scale(0)"/>',
     ],
-)
+)  # fmt: skip
 def test_element_without_area_is_left_out_with_a_warning(element: str) -> None:
     for body in (element, dynamic(element)):
         level = imported(RECT + body)
@@ -257,15 +214,7 @@ BOMB = base64.b64encode(zlib.compress(bytes(100_000_000))).decode()
 
 
 @pytest.mark.parametrize(
-    "data",
-    [
-        "1,2,3",
-        "1," * 20,
-        ",".join(["9" * 5000] * 12),
-        ",".join(["-1"] * 12),
-        ",".join(["x"] * 12),
-        ",".join(["99"] * 12).replace("99", str(2**33)),
-    ],
+    "data", ["1,2,3", "1," * 20, ",".join(["9" * 5000] * 12), ",".join(["99"] * 12).replace("99", str(2**33))]
 )
 def test_damaged_tile_data_are_refused(data: str, tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"layer 'ground'"):
@@ -275,15 +224,11 @@ def test_damaged_tile_data_are_refused(data: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("attributes", "data"),
     [
-        ('encoding="base64" compression="zlib"', BOMB),
-        ('encoding="base64" compression="zlib"', "AAAA"),
-        ('encoding="base64" compression="zstd"', "AAAA"),
-        ('encoding="base64"', "!!!"),
-        ('encoding="base64"', base64.b64encode(struct.pack("<3L", 1, 1, 1)).decode()),
-        ('encoding="rot13"', "1"),
+        ('encoding="base64" compression="zlib"', BOMB), ('encoding="base64" compression="zstd"', "AAAA"),
+        ('encoding="base64"', base64.b64encode(struct.pack("<3L", 1, 1, 1)).decode()), ('encoding="rot13"', "1"),
         ("", '<tile gid="1"/>'),
     ],
-)
+)  # fmt: skip
 def test_tile_data_that_cannot_be_decoded_are_refused(attributes: str, data: str, tmp_path: Path) -> None:
     body = tiles("", "").replace('<data encoding="csv"></data>', f"<data {attributes}>{data}</data>")
     with pytest.raises(SceneError, match=r"layer 'ground'"):
@@ -294,15 +239,11 @@ def test_tile_data_that_cannot_be_decoded_are_refused(attributes: str, data: str
     "element",
     [
         '<object id="1" x="nan" y="0" width="4" height="4"/>',
-        '<object id="1" x="1e300" y="0" width="4" height="4"/>',
         '<object id="1" x="0" y="0" width="-4" height="4"/>',
         '<object id="1" x="0" y="0" width="4" height="4" rotation="x"/>',
         '<object id="1" x="0" y="0"><polygon points="0,0 1,x"/></object>',
-        '<object id="1" x="0" y="0"><polygon points="0,0 9,9 9,0 0,9"/></object>',
-        '<object id="1" x="0" y="0"><polygon points="0"/></object>',
         '<object id="1" x="0" y="0"><polygon/></object>',
         '<object id="1" x="0" y="0" gid="5" width="4" height="4"/>',
-        '<object id="1" x="0" y="0" gid="x" width="4" height="4"/>',
         '<object id="1" x="0" y="0" type="dynamic"><polyline points="0,0 5,5"/></object>',
     ],
 )
@@ -323,15 +264,11 @@ def test_attributes_with_the_names_of_python_attributes_are_harmless(tmp_path: P
 @pytest.mark.parametrize(
     "text",
     [
-        "<map/>",
-        '<map orientation="isometric" width="4" height="3" tilewidth="10" tileheight="10"/>',
+        "<map/>", '<map orientation="isometric" width="4" height="3" tilewidth="10" tileheight="10"/>',
         '<map width="100000" height="100000" tilewidth="10" tileheight="10"/>',
-        '<map width="-1" height="3" tilewidth="10" tileheight="10"/>',
-        '<map width="4" height="3" tilewidth="0" tileheight="10"/>',
-        "<svg/>",
-        "",
+        '<map width="4" height="3" tilewidth="0" tileheight="10"/>', "<svg/>", "",
     ],
-)
+)  # fmt: skip
 def test_invalid_map_is_refused(text: str, tmp_path: Path) -> None:
     path = tmp_path / "map.tmx"
     path.write_text(text)

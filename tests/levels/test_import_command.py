@@ -1,6 +1,5 @@
 """The command `sandbox import`."""
 
-import json
 import sys
 from pathlib import Path
 
@@ -43,21 +42,6 @@ def test_level_itself_is_never_replaced(tmp_path: Path) -> None:
     assert path.read_bytes() == (DATA / "level.svg").read_bytes()
 
 
-def test_json_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert call(["import", LEVEL, "--json"]) == 0
-    document = json.loads(capfd.readouterr().out)
-    assert document["counts"]["ball"] == 2
-    assert sandbox.loads(document["toml"]).title == document["title"] == "Warehouse"
-    assert {"line", "path", "message", "file"} <= document["warnings"][0].keys()
-    target = str(tmp_path / "a.toml")
-    assert call(["import", LEVEL, "--json", "--to", target]) == 0
-    document = json.loads(capfd.readouterr().out)
-    assert (document["scene"], document["toml"]) == (target, None)
-    assert call(["import", "none.svg", "--json"]) == 2
-    document = json.loads(capfd.readouterr().out)
-    assert document["faults"][0]["file"] == "none.svg"
-
-
 def test_options_reach_the_scene(capfd: pytest.CaptureFixture[str]) -> None:
     options = ["--scale", "0.1", "--gravity", "0,-1.62", "--origin", "upper-left", "--tolerance", "2"]
     assert call(["import", LEVEL, *options]) == 0
@@ -70,15 +54,11 @@ def test_options_reach_the_scene(capfd: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        (["--scale", "0"], "--scale"),
-        (["--scale", "nan"], "--scale"),
-        (["--tolerance", "-1"], "--tolerance"),
-        (["--gravity", "9.81"], "--gravity"),
-        (["--gravity", "0,inf"], "--gravity"),
-        (["--origin", "middle"], "--origin"),
-        (["--to", "/nonexistent/a.toml"], "no such folder"),
+        (["--scale", "0"], "--scale"), (["--scale", "nan"], "--scale"), (["--tolerance", "-1"], "--tolerance"),
+        (["--gravity", "9.81"], "--gravity"), (["--gravity", "0,inf"], "--gravity"),
+        (["--origin", "middle"], "--origin"), (["--to", "/nonexistent/a.toml"], "no such folder"),
     ],
-)
+)  # fmt: skip
 def test_invalid_options_are_faults(arguments: list[str], word: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["import", LEVEL, *arguments]) == 2
     err = capfd.readouterr().err
@@ -93,14 +73,7 @@ def test_other_files_are_refused(name: str, capfd: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize(("package", "level"), [("svgelements", "level.svg"), ("pytmx", "level.tmx")])
-def test_missing_package_is_named_with_its_installation(
-    package: str, level: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_package_is_named_with_its_installation(package, level, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, package, None)
     assert call(["import", str(DATA / level)]) == 2
     assert 'pip install "sandbox2d[import]"' in capfd.readouterr().err
-
-
-def test_map_of_tiled_is_imported(capfd: pytest.CaptureFixture[str]) -> None:
-    assert call(["import", str(DATA / "level.tmx"), "--quiet"]) == 0
-    assert sandbox.loads(capfd.readouterr().out).title == "Tiled level"

@@ -33,9 +33,7 @@ offsets = st.floats(-50.0, 50.0)
 
 
 @given(angle=angles, scale=sizes, dx=offsets, dy=offsets, mirror=st.booleans())
-def test_circle_stays_a_circle_under_any_similarity(
-    angle: float, scale: float, dx: float, dy: float, mirror: bool
-) -> None:
+def test_circle_stays_a_circle_under_any_similarity(angle, scale, dx, dy, mirror):
     sign = -1.0 if mirror else 1.0
     transform = translation(dx, dy).after(rotation(angle)).after(Affine(scale, 0.0, 0.0, sign * scale))
     shape = ellipse_shape((3.0, 4.0), (2.0, 2.0), transform, 0.01)
@@ -45,9 +43,7 @@ def test_circle_stays_a_circle_under_any_similarity(
 
 
 @given(angle=angles, sx=sizes, sy=sizes, dx=offsets, dy=offsets)
-def test_rectangle_that_is_scaled_along_its_sides_and_rotated_stays_one(
-    angle: float, sx: float, sy: float, dx: float, dy: float
-) -> None:
+def test_rectangle_that_is_scaled_along_its_sides_and_rotated_stays_one(angle, sx, sy, dx, dy):
     transform = translation(dx, dy).after(rotation(angle)).after(Affine(sx, 0.0, 0.0, -sy))
     shape = rectangle_shape((1.0, 2.0), (4.0, 3.0), transform)
     assert isinstance(shape, RectangleShape)
@@ -72,9 +68,8 @@ def test_ellipse_is_a_polygon_within_the_tolerance(radii: tuple[float, float], t
     assert isinstance(shape, PolygonShape)
     area = math.pi * radii[0] * radii[1]
     missing = area - signed_area(shape.points)
-    perimeter = math.pi * (
-        3 * sum(radii) - math.sqrt((3 * radii[0] + radii[1]) * (radii[0] + 3 * radii[1]))
-    )  # Ramanujan
+    # Ramanujan
+    perimeter = math.pi * (3 * sum(radii) - math.sqrt((3 * radii[0] + radii[1]) * (radii[0] + 3 * radii[1])))
     assert 0.0 < missing <= tolerance * perimeter
     xs, ys = zip(*shape.points, strict=True)
     assert (max(xs) - min(xs), max(ys) - min(ys)) == pytest.approx((2 * radii[0], 2 * radii[1]), rel=1e-12)
@@ -92,18 +87,16 @@ def test_number_of_corners_grows_with_the_square_root_of_the_accuracy() -> None:
 def test_rounded_rectangle_has_the_area_of_its_sides_and_quarters() -> None:
     shape = rectangle_shape((0.0, 0.0), (10.0, 6.0), Affine(), 1e-4, (2.0, 1.0))
     assert isinstance(shape, PolygonShape)
-    assert signed_area(shape.points) == pytest.approx(
-        60.0 - (4.0 - math.pi) * 2.0, abs=1e-4 * 40.0
-    )  # tolerance × length
+    # tolerance × length
+    assert signed_area(shape.points) == pytest.approx(60.0 - (4.0 - math.pi) * 2.0, abs=1e-4 * 40.0)
 
 
 def test_rectangle_with_circular_corners_keeps_its_radius_and_outline() -> None:
     shape = rectangle_shape((0.0, 0.0), (10.0, 6.0), rotation(0.3).after(Affine(2.0, 0.0, 0.0, 2.0)), 1e-4, (1.0, 1.0))
     assert isinstance(shape, RectangleShape)
     assert (*shape.size, shape.radius) == pytest.approx((16.0, 8.0, 2.0), rel=1e-12)
-    assert signed_area(outline_of(shape, 1e-6)) == pytest.approx(
-        240.0 - (4.0 - math.pi) * 4.0, abs=1e-6 * 64.0
-    )  # tolerance × length
+    # tolerance × length
+    assert signed_area(outline_of(shape, 1e-6)) == pytest.approx(240.0 - (4.0 - math.pi) * 4.0, abs=1e-6 * 64.0)
 
 
 @pytest.mark.parametrize("radii", [(3.0, 3.0), (1.0, 0.5), (1.0, 1.0 + 1e-4)])
@@ -112,9 +105,7 @@ def test_rectangle_whose_corners_a_box_cannot_have_is_a_polygon(radii: tuple[flo
 
 
 @given(st.lists(st.tuples(offsets, offsets), min_size=3, max_size=4), st.sampled_from([1.0, 0.1, 0.01]))
-def test_bezier_curve_stays_within_the_tolerance_of_its_polyline(
-    controls: list[tuple[float, float]], tolerance: float
-) -> None:
+def test_bezier_curve_stays_within_the_tolerance_of_its_polyline(controls, tolerance):
     points = [controls[0], *bezier_points(controls, tolerance)]
     assert points[-1] == controls[-1]
     degree = len(controls) - 1

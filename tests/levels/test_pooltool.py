@@ -64,12 +64,9 @@ RECORDED = {
 """Shots of pooltool 0.6.0 at 1.5 m/s from (0.4953, 0.9906): the cue, velocity and spin after the stroke, and a later
 time and position before the first collision."""
 RECORDED_CAROM = (
-    {"V0": 3.0, "phi": 82.0, "a": 0.2},
-    [0.6168200674933491, 4.03371619815772],
-    [0.0, 0.0, -66.35129323585427],
-    0.3636815065827047,
-    [0.7047129881771683, 2.0387276774882443],
-)
+    {"V0": 3.0, "phi": 82.0, "a": 0.2}, [0.6168200674933491, 4.03371619815772], [0.0, 0.0, -66.35129323585427],
+    0.3636815065827047, [0.7047129881771683, 2.0387276774882443],
+)  # fmt: skip
 """The same at 3 m/s from (0.5, 0.7), with a ball of carom, of whose mass the cue's end is not a thirtieth."""
 
 
@@ -116,7 +113,6 @@ def test_stroke_table_and_friction_become_tables_of_the_scene() -> None:
     (stroke,) = scene.shots
     assert (stroke.ball, stroke.speed, stroke.side, stroke.height) == ("cue", 1.5, -0.2, 0.1)
     assert (stroke.aim, stroke.cue_mass) == (pytest.approx(math.pi / 3, rel=1e-15), 0.567)
-    assert scene.surface is not None
     assert (scene.surface.sliding_friction, scene.surface.rolling_friction, scene.surface.gravity) == (0.2, 0.01, 9.81)
     assert scene.surface.spinning_friction == pytest.approx(POOL["R"] * 4 / 9, rel=1e-15)
     assert scene.walls[0].points == ((0.0, 0.0), (0.0, 2.84))
@@ -153,12 +149,10 @@ def test_moving_balls_are_not_struck() -> None:
     [
         (("balls", "1", "params", "u_s"), 0.3, "balls.1.params.u_s"),
         (("balls", "1", "params", "stickiness"), 0.3, "balls.1.params"),
-        (("balls", "1", "state", "s"), 4, "balls.1"),
         (("balls", "1", "state", "rvw"), [[0.5, 1.7, 0.1], [0, 0, 1], [0, 0, 0]], "balls.1"),
         (("balls", "cue", "state", "s"), 4, "cue"),
         (("cue", "theta"), 10.0, "cue"),
         (("cue", "a"), 0.6, "cue"),
-        (("cue", "chalk"), 1, "cue"),
         (("cue", "specs", "end_mass"), 0.01, "cue.specs.end_mass"),
     ],
 )
@@ -176,31 +170,22 @@ def test_parts_that_a_scene_cannot_have_are_named(keys: tuple[str, ...], value: 
 @pytest.mark.parametrize(
     ("keys", "value", "path"),
     [
-        (("cue", "V0"), "fast", "cue.V0"),
         (("cue", "V0"), True, "cue.V0"),
         (("cue", "V0"), math.nan, "cue.V0"),
-        (("cue", "phi"), 10**4000, "cue.phi"),
         (("cue", "a"), 0.9, "cue"),  # with b = 0.9
         (("cue", "cue_ball_id"), "white", "cue.cue_ball_id"),
-        (("cue", "cue_ball_id"), ["cue"], "cue.cue_ball_id"),
-        (("cue", "specs"), None, "cue.specs"),
         (("cue", "specs", "end_mass"), None, "cue.specs"),
         (("balls",), [], "balls"),
-        (("balls", "1"), 7, "balls.1"),
         (("balls", "1", "params", "m"), 0, "balls.1.params.m"),
         (("balls", "1", "params", "e_b"), 1.5, "balls.1.params.e_b"),
-        (("balls", "1", "params", "g"), None, "balls.1.params.g"),
-        (("balls", "1", "state", "rvw"), [[0, 0, 0]], "balls.1.state.rvw"),
         (("balls", "1", "state", "rvw"), [[math.nan, 0, 0]] * 3, "balls.1.state.rvw[0][0]"),
         (("balls", "1", "history", "states"), [None], "balls.1.history.states[0]"),
         (("balls", "1\nx"), {}, "balls"),
-        (("balls", "\ud800"), {}, "balls"),
         (("table", "pockets"), {"a.b": {"center": 1, "radius": 1}}, 'table.pockets."a.b".center'),
         (("table", "cushion_segments", "linear", "3", "p2"), [0, 0, 1], "table.cushion_segments.linear.3.p2"),
         (("table", "cushion_segments", "linear", "3", "p1"), [0, 2.84, NOSE], "table.cushion_segments.linear.3"),
         (("table", "cushion_segments", "circular"), None, "table.cushion_segments.circular"),
         (("t",), -1, "t"),
-        (("events",), 3, "events"),
     ],
 )
 def test_invalid_values_are_named_by_their_path(keys: tuple[str, ...], value: Any, path: str) -> None:
@@ -237,19 +222,11 @@ def test_every_missing_key_is_a_fault_or_has_no_effect() -> None:
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        (b"", "well-formed"),
-        (b"{", "well-formed"),
-        (b"\xff\xfe", "UTF-8"),
-        (b"[]", "object"),
-        (b"{}", "no `cue`"),
-        (b'{"multisystem": []}', "several shots"),
-        (b'{"tilewidth": 16}', ".tmx"),
-        (b'{"scene": {}, "actions": []}', "sandbox run"),
-        (b"[" * 100_000, f"{MAX_DEPTH} levels"),
-        (b'{"a":' * MAX_DEPTH + b"1" + b"}" * MAX_DEPTH, f"{MAX_DEPTH} levels"),
-        (b'{"cue": ' + b"1" * 5000 + b"}", "digits"),
+        (b"", "well-formed"), (b"\xff\xfe", "UTF-8"), (b"{}", "no `cue`"), (b'{"multisystem": []}', "several shots"),
+        (b'{"tilewidth": 16}', ".tmx"), (b'{"scene": {}, "actions": []}', "sandbox run"),
+        (b"[" * 100_000, f"{MAX_DEPTH} levels"), (b'{"cue": ' + b"1" * 5000 + b"}", "digits"),
     ],
-)
+)  # fmt: skip
 def test_file_that_is_no_shot_is_refused(content: bytes, word: str, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     path.write_bytes(content)
@@ -292,9 +269,7 @@ def test_command_writes_a_scene_that_runs(tmp_path: Path, capfd: pytest.CaptureF
 @pytest.mark.parametrize(
     "option", [("--scale", "1"), ("--tolerance", "1"), ("--gravity", "0,0"), ("--origin", "centre")]
 )
-def test_options_of_drawings_are_refused(
-    option: tuple[str, str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_options_of_drawings_are_refused(option, tmp_path, capfd):
     shot = tmp_path / "a.json"
     shot.write_text(text_of(document()))
     assert call(["import", str(shot), *option]) == 2

@@ -44,12 +44,9 @@ def test_objects_become_the_shapes_that_they_are(tmp_path: Path) -> None:
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    st.floats(-720, 720), st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(1, 20)
-)  # the file is written anew for each
-def test_rotation_is_clockwise_about_the_corner_of_an_object(
-    tmp_path: Path, degrees: float, x: float, y: float, width: float, height: float
-) -> None:
+# the file is written anew for each
+@given(st.floats(-720, 720), st.floats(-50, 50), st.floats(-50, 50), st.floats(1, 20), st.floats(1, 20))
+def test_rotation_is_clockwise_about_the_corner_of_an_object(tmp_path, degrees, x, y, width, height):
     attributes = f'x="{x!r}" y="{y!r}" width="{width!r}" height="{height!r}" rotation="{degrees!r}"'
     (box,) = import_tmx(map_file(tmp_path, objects(f'<object id="1" {attributes}/>'))).scene.boxes
     cos, sin = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
@@ -71,9 +68,7 @@ def test_rotation_is_clockwise_about_the_corner_of_an_object(
         ("", "", "posts"),
     ],
 )
-def test_role_of_an_object_comes_from_properties_or_its_class(
-    attributes: str, properties: str, table: str, tmp_path: Path
-) -> None:
+def test_role_of_an_object_comes_from_properties_or_its_class(attributes, properties, table, tmp_path):
     own = f"<properties>{properties}</properties>"
     body = objects(f'<object id="1" x="0" y="0" width="4" height="4" {attributes}>{own}<ellipse/></object>')
     assert len(getattr(import_tmx(map_file(tmp_path, body)).scene, table)) == 1
@@ -116,13 +111,11 @@ SLOPE = f'<tile id="0"><objectgroup>{_TRIANGLE}</objectgroup></tile>'
 @pytest.mark.parametrize(
     ("flags", "expected"),
     [
-        (0, {(0, 10), (10, 10), (10, 6)}),
-        (1 << 31, {(10, 10), (0, 10), (0, 6)}),
-        (1 << 30, {(0, 0), (10, 0), (10, 4)}),
-        (1 << 29, {(10, 0), (10, 10), (6, 10)}),
+        (0, {(0, 10), (10, 10), (10, 6)}), (1 << 31, {(10, 10), (0, 10), (0, 6)}),
+        (1 << 30, {(0, 0), (10, 0), (10, 4)}), (1 << 29, {(10, 0), (10, 10), (6, 10)}),
         (1 << 31 | 1 << 29, {(0, 0), (0, 10), (4, 10)}),
     ],
-)
+)  # fmt: skip
 def test_flipped_tiles_have_flipped_shapes(flags: int, expected: set[tuple[int, int]], tmp_path: Path) -> None:
     rows = f"{1 + flags},0,0,0, 0,0,0,0, 0,0,0,0"
     (polygon,) = import_tmx(map_file(tmp_path, tiles(rows, SLOPE))).scene.polygons

@@ -4,14 +4,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 
 from sandbox.scene.compile.generators import size
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.files.load import loads
-from sandbox.scene.geometry.shapes import geometry_of
 from tests import strategies
 
 SCENE = """
@@ -60,20 +59,9 @@ def test_bodies_are_numbered_as_balls_grids_scatters_emitters() -> None:
     assert bodies.mass.tolist() == [0.5 * math.pi * 4, 1, 8, 8, 1, 1, 1]
     assert bodies.fixed.tolist() == [False, True, False, False, False, False, False]
     assert bodies.element.tolist() == [0, 1, 2, 2, 3, 4, 4]
+    assert np.array_equal(bodies.moment, bodies.mass * bodies.radius**2 / 2)  # discs
     assert [type(element) for element in bodies.elements] == [Ball, Ball, Grid, Scatter, Emitter]
     assert len(bodies) == 7
-
-
-def test_mass_is_given_or_from_the_density_or_1_kg() -> None:
-    disc = {"position": (0.0, 0.0), "radius": 3.0}
-    assert geometry_of(Ball(**disc, mass=2.5)).mass == 2.5
-    assert geometry_of(Ball(**disc, density=2.0)).mass == 2.0 * math.pi * 9.0
-    assert geometry_of(Ball(**disc)).mass == 1.0
-
-
-def test_moment_is_that_of_a_disc() -> None:
-    bodies = loads(SCENE).bodies
-    assert np.array_equal(bodies.moment, bodies.mass * bodies.radius**2 / 2)
 
 
 def test_added_body_gets_the_next_number_and_keeps_the_others() -> None:
@@ -89,25 +77,16 @@ def test_added_body_gets_the_next_number_and_keeps_the_others() -> None:
     assert len(bodies) == 7
 
 
-def test_added_fixed_body_has_no_velocity() -> None:
-    more = loads(SCENE).bodies.joined_by(Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), radius=1.0, fixed=True), "new")
-    assert more.fixed[-1]
-    assert more.velocity[-1].tolist() == [0, 0]
-
-
-def test_fixed_ball_built_in_python_has_no_velocity() -> None:
+def test_fixed_ball_has_no_velocity_and_arrays_without_bodies_are_empty() -> None:
     ball = Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), angular_velocity=4.0, radius=1.0, fixed=True)
     bodies = Scene(balls=(ball,)).bodies  # a scene file with it is refused
     assert not bodies.velocity.any()
     assert not bodies.angular_velocity.any()
-
-
-def test_scene_without_bodies_has_empty_arrays() -> None:
-    bodies = Scene().bodies
-    assert len(bodies) == 0
-    assert bodies.position.shape == bodies.velocity.shape == (0, 2)
-    assert bodies.radius.shape == bodies.moment.shape == (0,)
-    assert Scene().fixed_names == ()
+    more = bodies.joined_by(ball, "new")
+    assert more.fixed[-1] and not more.velocity.any()
+    empty = Scene().bodies
+    assert empty.position.shape == empty.velocity.shape == (0, 2)
+    assert empty.radius.shape == empty.moment.shape == (0,)
 
 
 def test_fixed_elements_are_numbered_as_planes_walls_posts() -> None:
@@ -129,7 +108,6 @@ def test_fixed_elements_are_numbered_as_planes_walls_posts() -> None:
     assert scene.fixed == (*scene.planes, *scene.walls, *scene.posts)
 
 
-@settings(max_examples=25)
 @given(strategies.scenes())
 def test_arrays_of_bodies_have_equal_lengths_and_are_finite(scene: Scene) -> None:
     bodies = scene.bodies

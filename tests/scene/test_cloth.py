@@ -8,18 +8,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.registry import start
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import dumps, from_document, load, loads
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import dumps, from_document, loads
+from tests.scene.faults import assert_faults
 
 CLOTH = {"corner": [1.0, 2.0], "columns": 4, "rows": 3, "spacing": [0.5, 0.25], "stiffness": 100.0, "damping": 0.1}
 
 
 def scene_of(**cloth: Any) -> Scene:
-    return from_document({"cloth": [{key: value for key, value in {**CLOTH, **cloth}.items() if value is not None}]})
+    return from_document({"cloth": [document_of(**cloth)]})
+
+
+def document_of(**cloth: Any) -> dict[str, Any]:
+    return {key: value for key, value in {**CLOTH, **cloth}.items() if value is not None}
 
 
 def test_nodes_are_numbered_along_rows_from_the_upper_left() -> None:
@@ -75,6 +77,7 @@ def test_every_link_starts_at_rest_length_and_their_number_is_right(
         expected += 0 if shear is None else 2 * (c - 1) * (r - 1)
         expected += 0 if bend is None else max(c - 2, 0) * r + c * max(r - 2, 0)
         assert len(links) == expected
+    assert (len(bodies.elements), len(set(links.names))) == (1, len(links))
     assert loads(dumps(scene)) == scene
 
 
@@ -118,35 +121,4 @@ def test_pinned_nodes_are_fixed_and_have_no_links_to_each_other(pins: Any, fixed
     ],
 )
 def test_wrong_value_is_a_fault_with_a_hint(cloth: dict[str, Any], key: str, message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        scene_of(**cloth)
-    (fault,) = caught.value.faults
-    assert fault.path == f"cloth[0].{key}".removesuffix(".")
-    assert message in fault.message
-
-
-def test_large_cloth_is_one_element_with_arrays_of_nodes_and_links() -> None:
-    scene = scene_of(columns=64, rows=64, shear=10.0, bend=1.0)
-    assert len(scene.bodies) == 4096
-    assert len(scene.bodies.elements) == 1
-    # 64·63 twice along rows and columns, 63² twice along diagonals, 64·62 twice between next neighbours, minus those
-    # within the pinned row
-    assert len(scene.links) == 2 * 64 * 63 + 2 * 63 * 63 + 2 * 64 * 62 - 63 - 62
-    assert len(set(scene.links.names)) == len(scene.links)
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_cloth_in_wind_hangs_along_the_sum_of_drag_and_weight(engine: str) -> None:
-    scene = load(
-        find("cloth"), ["cloth.sheet.columns=3", "cloth.sheet.rows=8", "world.linear_drag=4.0", "world.wind=[1.0,0.0]"]
-    )
-    simulation = start(scene, engine, scene.solver)
-    for _ in range(round(8.0 / scene.solver.dt)):
-        simulation.step()
-    position = simulation.frame().position.reshape(8, 3, 2)
-    simulation.close()
-    offset = position[-1] - position[0]
-    assert scene.world.wind[0] * scene.world.linear_drag == 4.0
-    # each column hangs along the sum of drag and weight; after 8 s of drag the swing has decayed to e^−16
-    assert offset[:, 0] / -offset[:, 1] == pytest.approx(4.0 / 9.81, rel=0.01)
+    assert_faults({"cloth": [document_of(**cloth)]}, f"{f'cloth[0].{key}'.removesuffix('.')}: {message}")

@@ -1,4 +1,6 @@
-"""ContactMatrix against a brute-force oracle over all pairs."""
+"""Which elements can collide, of balls and of solids, against a search over all pairs."""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,8 +21,7 @@ from tests.scene.touching import (
 )
 
 
-@pytest.mark.full
-@settings(max_examples=200)
+@settings(max_examples=50)
 @given(touching_scenes())
 def test_contact_matrix_equals_a_brute_force_search_over_pairs(scene: Scene) -> None:
     matrix = contact_matrix(scene)
@@ -75,18 +76,6 @@ def test_two_balls_can_collide_if_both_collide_and_one_moves(a: dict, b: dict, c
         assert matrix.free.tolist() == [not can] * 2
 
 
-def test_single_ball_is_free_and_two_balls_of_a_grid_can_collide() -> None:
-    assert contact_matrix(from_document({"ball": [BALL]})).free.tolist() == [True]
-    grid = {"origin": [0, 0], "columns": 2, "spacing": [9, 0], "radius": 1}
-    assert contact_matrix(from_document({"grid": [grid]})).free.tolist() == [False, False]
-    assert contact_matrix(from_document({"grid": [{**grid, "columns": 1}]})).free.tolist() == [True]
-
-
-def test_friction_makes_only_movable_bodies_turnable() -> None:
-    matrix = contact_matrix(from_document({"ball": [{**BALL, "friction": 1.0}, {**BALL, "fixed": True}]}))
-    assert matrix.turnable.tolist() == [True, False]
-
-
 def test_spawned_ball_is_part_of_the_contact_matrix() -> None:
     scene = from_document({"ball": [BALL]})
     more = scene.bodies.joined_by(Ball(position=(5.0, 0.0), radius=1.0, friction=0.5), "new")
@@ -95,8 +84,59 @@ def test_spawned_ball_is_part_of_the_contact_matrix() -> None:
     assert matrix.turnable.tolist() == [True, True]
 
 
-def test_contact_matrix_of_an_empty_scene_is_empty() -> None:
-    matrix = contact_matrix(Scene())
+BOX: dict[str, Any] = {"position": [0, 0], "size": [1, 1]}
+DISC: dict[str, Any] = {"position": [9, 0], "radius": 1}
+FLOOR: dict[str, Any] = {"point": [0, -5], "normal": [0, 1]}
+
+
+def test_single_compound_body_has_no_contacts() -> None:
+    body = {"position": [0, 0], "box": [{"size": [1, 1], "friction": 0.5}, {"size": [2, 2], "friction": 0.5}]}
+    matrix = contact_matrix(from_document({"body": [body]}))
+    assert not matrix.touches.any()
+    assert not matrix.mutual
+    assert not matrix.turnable.any()
+
+
+def test_two_compound_bodies_can_collide() -> None:
+    body = {"position": [0, 0], "box": [{"size": [1, 1]}]}
+    matrix = contact_matrix(from_document({"body": [body, {**body, "position": [5, 0]}]}))
+    assert matrix.touches.all()
+    assert matrix.mutual
+    assert matrix.solids
     assert not matrix.ball_ball
-    assert len(matrix.free) == len(matrix.turnable) == 0
-    assert (matrix.restitution, matrix.friction) == (0.0, 0.0)
+    assert matrix.turnable.all()  # a corner can turn a body even without friction
+
+
+def test_frictionless_ball_and_fixed_box_are_not_turnable() -> None:
+    matrix = contact_matrix(from_document({"box": [BOX], "ball": [DISC]}))
+    assert matrix.turnable.tolist() == [False, True]
+    assert not matrix.ball_ball
+    matrix = contact_matrix(from_document({"box": [{**BOX, "fixed": True, "friction": 1}], "ball": [DISC]}))
+    assert matrix.touches.all()
+    assert matrix.turnable.tolist() == [True, False]
+
+
+def test_each_part_has_its_own_coefficients() -> None:
+    parts = [{"radius": 1, "friction": 0.5}, {"radius": 1, "position": [3, 0], "restitution": 0.25}]
+    body = {"position": [0, 0], "restitution": 0.75, "ball": parts}
+    matrix = contact_matrix(from_document({"body": [body], "plane": [FLOOR]}))
+    surfaces, (first, second) = matrix.surfaces, matrix.surfaces.of_shape.tolist()
+    (floor,) = surfaces.of_fixed.tolist()
+    assert (surfaces.friction[first, floor], surfaces.restitution[first, floor]) == (0.5, 0.75)
+    assert (surfaces.friction[second, floor], surfaces.restitution[second, floor]) == (0.0, 0.25)
+    assert (matrix.friction, matrix.restitution) == (0.5, 0.75)
+    assert not matrix.ball_fixed[Plane]
+
+
+def test_part_with_its_own_material_ignores_coefficients_of_the_body() -> None:
+    materials = [{"name": "wood", "friction": 0.4}, {"name": "ice", "friction": 0.1}]
+    body = {"position": [0, 0], "material": "wood", "restitution": 0.5, "box": [{"size": [1, 1], "material": "ice"}]}
+    matrix = contact_matrix(from_document({"material": materials, "body": [body], "plane": [FLOOR]}))
+    assert (matrix.friction, matrix.restitution) == (0.1, 0.0)
+
+
+def test_body_with_a_joint_is_not_free() -> None:
+    ball = {**DISC, "name": "a", "collides": "none"}
+    matrix = contact_matrix(from_document({"ball": [ball], "joint": [{"kind": "motor", "rate": 1, "between": ["a"]}]}))
+    assert not matrix.touches.any()
+    assert not matrix.free.any()

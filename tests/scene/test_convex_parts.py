@@ -20,7 +20,7 @@ from sandbox.scene.geometry.polygon import (
     signed_area,
     straightness_tolerance,
 )
-from sandbox.scene.geometry.triangulation import convex_parts
+from sandbox.scene.geometry.triangulation import convex_parts, triangles
 
 L = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
 U = ((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (2.0, 2.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
@@ -86,34 +86,26 @@ def assert_parts(points: tuple[Point, ...]) -> tuple[tuple[Point, ...], ...]:
     return parts
 
 
-def test_outline_on_which_pymunk_recurses_endlessly_is_covered() -> None:
-    assert len(assert_parts(anticlockwise(RECURSING))) <= 4
-
-
 def test_convex_outline_is_returned_unchanged() -> None:
     square = ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     assert convex_parts(square) == (square,)
 
 
-@pytest.mark.parametrize(("points", "count"), [(L, 2), (U, 3), (T, 2)])
-def test_letters_are_cut_into_the_fewest_parts(points: tuple[Point, ...], count: int) -> None:
+@pytest.mark.parametrize(("points", "count"), [(L, 2), (U, 3), (T, 2), (comb(40), 41)])
+def test_known_shapes_are_cut_into_the_fewest_parts(points: tuple[Point, ...], count: int) -> None:
     assert len(assert_parts(points)) == count
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.1, 1.0])
-@pytest.mark.parametrize("points", [L, U, T, comb(5), comb(40), star(5), star(50), gear(12), gear(40), spiral(100)])
+@pytest.mark.parametrize("angle", [0.0, 0.1])
+@pytest.mark.parametrize("points", [L, U, T, comb(5), star(50), gear(12), spiral(100), anticlockwise(RECURSING)])
 def test_known_shapes_are_covered_at_any_angle(points: tuple[Point, ...], angle: float) -> None:
     assert_parts(moved(points, angle))
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("points", [comb(250), star(500), gear(200), spiral(500)])
 def test_outlines_of_a_thousand_corners_are_covered(points: tuple[Point, ...]) -> None:
     assert_parts(points)
-
-
-def test_comb_is_cut_into_a_back_and_its_teeth() -> None:
-    assert len(assert_parts(comb(40))) == 41
 
 
 def test_corners_on_straight_edges_of_a_concave_outline_are_left_out() -> None:
@@ -134,12 +126,6 @@ def test_parts_do_not_depend_on_scale(scale: float) -> None:
 def test_outline_far_from_the_origin_is_covered() -> None:
     for angle in (0.0, 0.3):
         assert len(convex_parts(moved(U, angle, by=(1e6, -1e6)))) == 3
-
-
-@given(st.lists(st.floats(0.05, 1.0), min_size=4, max_size=40))
-def test_random_stars_are_covered(radii: list[float]) -> None:
-    step = 2 * math.pi / len(radii)
-    assert_parts(tuple((r * math.cos(step * i), r * math.sin(step * i)) for i, r in enumerate(radii)))
 
 
 @given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=3), st.sampled_from([0.0, 0.4, 1.1]))
@@ -183,3 +169,38 @@ def test_outline_with_a_waist_narrower_than_the_tolerance_is_refused() -> None:
     assert outline_fault(hourglass) is None
     with pytest.raises(OutlineError, match=r"too narrow .* split it by hand"):
         convex_parts(hourglass)
+
+
+def area_of(points: tuple[Point, ...], cut: list[tuple[int, int, int]]) -> float:
+    areas = [signed_area([points[i] for i in triangle]) for triangle in cut]
+    assert min(areas) > 0.0
+    return math.fsum(areas)
+
+
+def test_triangle_is_not_divided() -> None:
+    assert triangles(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))) == [(2, 0, 1)]
+
+
+def test_collinear_corners_make_no_triangle_without_area() -> None:
+    outline = ((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0), (0.0, 3.0), (0.0, 2.0), (0.0, 1.0))
+    cut = triangles(outline)
+    assert len(cut) == 5
+    assert area_of(outline, cut) == 4.5
+
+
+def test_diagonal_through_a_corner_is_not_used() -> None:
+    arrow = ((0.0, 0.0), (2.0, -2.0), (4.0, 0.0), (2.0, 0.0), (2.0, 3.0), (1.9, 0.5))
+    cut = triangles(arrow)
+    assert len(cut) == 4
+    assert area_of(arrow, cut) == pytest.approx(signed_area(arrow), rel=1e-15)  # sums of a few exact terms
+
+
+def test_rectangle_is_cut_into_triangles_with_short_edges() -> None:
+    box = ((0.0, 0.0), (4.0, 0.0), (8.0, 0.0), (8.0, 1.0), (4.0, 1.0), (0.0, 1.0))
+    longest = max(max(math.dist(box[a], box[b]) for a, b in ((i, j), (j, k), (k, i))) for i, j, k in triangles(box))
+    assert longest == math.hypot(4.0, 1.0)
+
+
+def test_clockwise_outline_is_refused() -> None:
+    with pytest.raises(OutlineError, match="cannot be triangulated"):
+        triangles(((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)))

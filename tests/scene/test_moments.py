@@ -20,10 +20,6 @@ def rotated(points: Sequence[Point], angle: float, by: Point = (0.0, 0.0)) -> tu
     return tuple((by[0] + c * x - s * y, by[1] + s * x + c * y) for x, y in points)
 
 
-def regular(n: int, radius: float) -> tuple[Point, ...]:
-    return tuple((radius * math.cos(2 * math.pi * i / n), radius * math.sin(2 * math.pi * i / n)) for i in range(n))
-
-
 def radial(radii: Sequence[float]) -> tuple[Point, ...]:
     """A star-shaped outline about the origin with these radii."""
     step = 2 * math.pi / len(radii)
@@ -44,27 +40,6 @@ def test_disc_moments_are_the_closed_form() -> None:
     assert_moments(disc_moments((3.0, -4.0), 2.0), Moments(4 * math.pi, (3.0, -4.0), 8 * math.pi))
 
 
-@given(st.floats(0.01, 100), st.floats(0.01, 100))
-def test_rectangle_moments_are_the_closed_form(w: float, h: float) -> None:
-    corners = ((0.0, 0.0), (w, 0.0), (w, h), (0.0, h))
-    got = polygon_moments(corners)
-    assert got.area == pytest.approx(w * h, rel=EXACT)
-    assert got.second == pytest.approx(w * h * (w * w + h * h) / 12, rel=EXACT)
-    assert got.centroid == pytest.approx((w / 2, h / 2), rel=EXACT)
-
-
-def test_right_triangle_moments_are_the_closed_form() -> None:
-    # b·h³/36 about x and h·b³/36 about y, through the centroid
-    assert_moments(polygon_moments(((0.0, 0.0), (3.0, 0.0), (0.0, 5.0))), Moments(7.5, (1.0, 5 / 3), 15 * 34 / 36))
-
-
-@pytest.mark.parametrize("n", [3, 4, 5, 6, 17, 1000])
-def test_regular_polygon_moments_are_the_closed_form(n: int) -> None:
-    area = n / 2 * 4.0 * math.sin(2 * math.pi / n)
-    second = area * 4.0 / 6 * (2 + math.cos(2 * math.pi / n))
-    assert_moments(polygon_moments(regular(n, 2.0)), Moments(area, (0.0, 0.0), second))
-
-
 def test_annulus_sector_moments_approach_the_closed_form() -> None:
     inner, outer, half, n = 1.0, 2.0, 1.1, 20_000
     arc = [half * (2 * i / n - 1) for i in range(n + 1)]
@@ -77,19 +52,7 @@ def test_annulus_sector_moments_approach_the_closed_form() -> None:
     assert_moments(polygon_moments(corners), Moments(area, (x, 0.0), second), rel=4 * (2 * half / n) ** 2)
 
 
-def test_capsule_without_length_has_moments_of_a_disc() -> None:
-    assert_moments(capsule_moments((1.0, 2.0), (1.0, 2.0), 0.3), disc_moments((1.0, 2.0), 0.3))
-
-
-def test_thin_capsule_has_moments_of_a_rod() -> None:
-    length, radius = 3.0, 1e-9
-    got = capsule_moments((0.0, 1.0), (length, 1.0), radius)
-    # the caps add πr/2L to the area, 5e-10, and three times that to the moment
-    assert got.second / got.area == pytest.approx(length**2 / 12, rel=4e-9)
-    assert got.area == pytest.approx(2 * radius * length, rel=1e-9)
-
-
-@given(st.floats(0.0, 10.0), st.floats(0.01, 10.0), angles)
+@given(st.floats(0.0, 10.0) | st.just(0.0), st.floats(0.01, 10.0), angles)
 def test_capsule_moments_agree_with_quadrature(length: float, radius: float, angle: float) -> None:
     a, b = rotated(((0.0, 0.0), (length, 0.0)), angle, by=(2.0, -1.0))
 
@@ -114,15 +77,6 @@ def test_capsule_moments_agree_with_quadrature(length: float, radius: float, ang
     assert_moments(capsule_moments(a, b, radius), expected, rel=1e-9)
 
 
-def test_capsule_moments_agree_with_a_polygon_outline() -> None:
-    n, half, radius = 20_000, 1.5, 0.7
-    right = [-math.pi / 2 + math.pi * i / n for i in range(n + 1)]
-    corners = [(half + radius * math.cos(t), radius * math.sin(t)) for t in right]
-    corners += [(-half - radius * math.cos(t), -radius * math.sin(t)) for t in right]
-    # chords of angle h omit h²/6 of the caps' area and h²/3 of their moment
-    assert_moments(polygon_moments(corners), capsule_moments((-half, 0.0), (half, 0.0), radius), rel=(math.pi / n) ** 2)
-
-
 @given(stars)
 def test_area_and_centroid_agree_with_shapely(points: tuple[Point, ...]) -> None:
     got, oracle = polygon_moments(points), Polygon(points)
@@ -142,15 +96,6 @@ def test_second_moment_agrees_with_greens_theorem(points: tuple[Point, ...]) -> 
         cubes = [((ax - cx) ** 3, (ay - cy) ** 3, 1), (mx**3, my**3, 4), ((bx - cx) ** 3, (by - cy) ** 3, 1)]
         total += sum(weight * (x * (by - ay) - y * (bx - ax)) for x, y, weight in cubes) / 18
     assert got.second == pytest.approx(total, rel=1e-11)  # cancellation in the oracle
-
-
-@given(stars)
-def test_moments_of_triangles_add_up_to_the_polygon(points: tuple[Point, ...]) -> None:
-    triangles = [polygon_moments(((0.0, 0.0), b, c)) for b, c in zip(points, points[1:] + points[:1], strict=True)]
-    whole = polygon_moments(points)
-    second = sum(s.second + s.area * math.dist(s.centroid, whole.centroid) ** 2 for s in triangles)  # parallel axes
-    assert whole.area == pytest.approx(sum(s.area for s in triangles), rel=1e-11)
-    assert whole.second == pytest.approx(second, rel=1e-11)
 
 
 @given(stars, angles)

@@ -17,7 +17,7 @@ from sandbox.scene.files.load import from_document, loads
 from sandbox.scene.files.overrides import AddressError, parse_assignment, parse_path
 from sandbox.scene.files.shipped_scenes import scenes_in
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 BALL: dict[str, Any] = {"ball": [{"position": [0, 1], "radius": 0.5}]}
 
@@ -39,7 +39,7 @@ TOML: dict[str, Callable[[int], str]] = {
     "heading of an array": lambda n: f"[[ {'a . ' * n}a ]]\nb = 1",
 }
 
-DEPTHS = (MAX_DEPTH, 100, 1_000, 100_000, 1_000_000)
+DEPTHS = (MAX_DEPTH, 1_000, 1_000_000)
 
 
 def _deep(call: Callable[[], Any], frames: int) -> Any:
@@ -55,10 +55,6 @@ def test_deep_toml_is_refused_at_any_depth(kind: str) -> None:
             with pytest.raises(SceneError, match="nested too deeply") as raised:
                 _deep(lambda: loads(text, "a.toml"), frames)  # noqa: B023, it is called at once
             assert len(str(raised.value)) < 200
-
-
-@pytest.mark.parametrize("kind", TOML)
-def test_shallow_toml_has_no_nesting_fault(kind: str) -> None:
     with pytest.raises(SceneError) as raised:
         _deep(lambda: loads(TOML[kind](8), "a.toml"), 600)
     assert "nested" not in str(raised.value)
@@ -72,12 +68,10 @@ def test_depth_is_summed_over_keys_and_tables() -> None:
 
 
 def test_nesting_fault_has_its_line() -> None:
-    with pytest.raises(SceneError) as raised:
-        loads("title = 'a'\n\n[world]\ngravity = " + "[" * 99)
-    assert raised.value.faults[0].line == 4
-    with pytest.raises(SceneError) as raised:
-        loads("title = 'a'\n[" + "a." * 99 + "a]")
-    assert raised.value.faults[0].line == 2
+    for line, text in ((4, "title = 'a'\n\n[world]\ngravity = " + "[" * 99), (2, "title = 'a'\n[" + "a." * 99 + "a]")):
+        with pytest.raises(SceneError) as raised:
+            loads(text)
+        assert raised.value.faults[0].line == line
 
 
 def test_brackets_and_dots_within_strings_and_comments_do_not_count() -> None:
@@ -91,8 +85,7 @@ def test_brackets_and_dots_within_strings_and_comments_do_not_count() -> None:
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["'" * 10**6, '"' * 10**6, '\\"""' * 10**5, "a " * 10**6, "a," * 10**6, "." * 10**6, "[" + "a.,[]" * 10**5],
+    "text", ["'" * 10**6, '"' * 10**6, '\\"""' * 10**5, "a " * 10**6, "a," * 10**6, "." * 10**6, "[" + "a.,[]" * 10**5]
 )
 def test_any_text_is_checked_in_linear_time(text: str) -> None:
     check_text(text)

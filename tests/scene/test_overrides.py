@@ -22,6 +22,7 @@ DOCUMENT: dict[str, Any] = {
         {"name": "0", "mass": 9},
     ],
     "wall": [{"points": [[0, 0], [1, 1]]}],
+    "post": [],
 }
 
 
@@ -115,7 +116,7 @@ def test_assign_sets_only_the_value_at_the_path(path: str, location: tuple[str |
         ("ball.-1.mass", "no element '-1'"), ("wall.x.points", "names: wall-1; numbers: 0"),
         ("title.x", "single value"),
         ("world.gravity.2", "no element '2'"), ("world.gravity.0.x", "single value"), ("a.b.c", "no a"),
-        ("world.x.y", "no world.x"), ("ball.cue.x.y", "no ball.cue.x"), ("ball." + "9" * 500, "no element"),
+        ("world.x.y", "no world.x"), ("ball.cue.x.y", "no ball.cue.x"), ("post.0.mass", "numbers: none"),
         ("ball." + "9" * 5000, "the limit is 1,000"),
         ("ball.\u00b2.mass", "no element"), ("ball.1e0.mass", "no element"),
     ],
@@ -123,11 +124,6 @@ def test_assign_sets_only_the_value_at_the_path(path: str, location: tuple[str |
 def test_unknown_path_is_refused_with_the_available_names(path: str, words: str) -> None:
     with pytest.raises(AddressError, match=words):
         assign(DOCUMENT, path, 1)
-
-
-def test_path_into_an_empty_list_is_refused() -> None:
-    with pytest.raises(AddressError, match="numbers: none"):
-        assign({"ball": []}, "ball.0.mass", 1)
 
 
 @pytest.mark.parametrize(
@@ -156,11 +152,8 @@ def test_any_path_is_assigned_or_refused(path: str, value: int) -> None:
 def test_element_of_any_name_is_addressed_in_quotes(name: str) -> None:
     quote = "'" if '"' in name else '"'
     key, value = parse_assignment(f"ball.{quote}{name}{quote}.mass=2")
-    assert assign({"ball": [{"name": "other"}, {"name": name}]}, key, value)[1] == (
-        "ball",
-        int(name != "other"),
-        "mass",
-    )
+    _, where = assign({"ball": [{"name": "other"}, {"name": name}]}, key, value)
+    assert where == ("ball", int(name != "other"), "mass")
 
 
 def test_star_sets_every_element_and_returns_the_location_of_the_list() -> None:
@@ -171,18 +164,13 @@ def test_star_sets_every_element_and_returns_the_location_of_the_list() -> None:
     assert changed == {**DOCUMENT, "ball": [{**each, "restitution": 0.5} for each in DOCUMENT["ball"]]}
 
 
-def test_star_sets_items_within_values() -> None:
-    document = {"ball": [{"position": [0.0, 1.0]}, {"position": [2.0, 3.0]}]}
-    assert assign(document, "ball.*.position.1", 9)[0] == {"ball": [{"position": [0.0, 9]}, {"position": [2.0, 9]}]}
-    assert assign(document, 'ball."*".mass', 9)[0]["ball"][1] == {"position": [2.0, 3.0], "mass": 9}
-
-
 def test_star_works_in_nested_lists() -> None:
     document = {"pinball": {"bumper": [{"name": "a"}, {}], "wall": [{"points": [[0, 0], [1, 2]]}]}}
     changed, where = assign(document, "pinball.bumper.*.speed", 2)
     assert where == ("pinball", "bumper")
     assert changed["pinball"]["bumper"] == [{"name": "a", "speed": 2}, {"speed": 2}]
     assert assign(document, "pinball.wall.*.points.*[1]", 7)[0]["pinball"]["wall"] == [{"points": [[0, 7], [1, 7]]}]
+    assert assign({"ball": [{}, {"mass": 1}]}, 'ball."*".mass', 9)[0] == {"ball": [{"mass": 9}, {"mass": 9}]}
 
 
 def test_element_named_star_takes_precedence() -> None:

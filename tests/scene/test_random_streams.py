@@ -5,24 +5,17 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from sandbox.scene.files.load import from_document
 from sandbox.scene.random_streams import Stream, draws, key_of
 
 WITHOUT_INDEX = {
-    Stream.RACK,
-    Stream.LANDSCAPE,
-    Stream.SHOTS,
-    Stream.BALL_SEARCH,
-    Stream.FLIPPERS,
-    Stream.LANDING,
-    Stream.KEYS,
-}
+    Stream.RACK, Stream.LANDSCAPE, Stream.SHOTS, Stream.BALL_SEARCH, Stream.FLIPPERS, Stream.LANDING, Stream.KEYS,
+}  # fmt: skip
 """Streams of which a seed has only one; all others have an index."""
 
 MANY = 10_000
 """Number of indices: elements of a kind, turns or strokes."""
 
-SEEDS = (0, 1, 2, 3, 4, 7, 11, 12, 12345, 2**32 - 1, 2**32, 3 * 2**32 + 1, 2**63 - 1, *(s.value for s in Stream))
+SEEDS = (0, 1, 12345, 2**32, 3 * 2**32 + 1, 2**63 - 1, Stream.RACK.value, Stream.COIL.value)
 """Seeds; some equal the number of a stream, some take two 32-bit words."""
 
 
@@ -46,7 +39,7 @@ def keys(seed: int, many: int) -> Iterator[list[int]]:
             yield from (key_of(stream, seed, index) for index in range(many))
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_streams_of_a_seed_have_distinct_keys(seed):
     all_words = [words(key) for key in keys(seed, MANY)]
@@ -74,18 +67,7 @@ def test_keys_with_equal_words_have_equal_draws_in_numpy():
     assert np.random.PCG64([5, 0, 3]).random_raw() != np.random.PCG64([5, 3]).random_raw()
 
 
-@pytest.mark.parametrize("seed", [0, 1, 3, 2**40])
+@pytest.mark.parametrize("seed", [0, 2**40])
 def test_streams_of_a_seed_have_distinct_first_draws(seed):
     first_draws = [draws(s, seed, *(() if s in WITHOUT_INDEX else (k,))).random() for s in Stream for k in range(50)]
     assert len(set(first_draws)) == len(first_draws) - 49 * len(WITHOUT_INDEX)
-
-
-def test_rack_and_first_stack_have_distinct_draws():
-    assert draws(Stream.RACK, 7).random() != draws(Stream.STACK, 7, 0).random()
-
-
-def test_jitter_of_a_stack_depends_on_the_seed():
-    stack = {"name": "s", "base": [0, 0], "size": [1, 1], "columns": 1, "rows": 4, "jitter": 0.1}
-    positions = [from_document({"world": {"seed": seed}, "stack": [stack]}).bodies.position[:, 0] for seed in (1, 1, 2)]
-    assert (positions[0] == positions[1]).all()
-    assert (positions[0] != positions[2]).all()

@@ -12,9 +12,9 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
 from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
+from tests.scene.faults import assert_faults
 
 ROPE = {"start": [0.0, 0.0], "end": [3.0, 4.0], "links": 5}
 SPRINGS = {"kind": "springs", "stiffness": 200.0}
@@ -27,12 +27,6 @@ BALLS = [
 
 def scene_of(more: dict[str, Any] | None = None, **rope: Any) -> Scene:
     return from_document({**(more or {}), "rope": [{**ROPE, **rope}]})
-
-
-def faults_of(more: dict[str, Any] | None = None, **rope: Any) -> list[tuple[str, str]]:
-    with pytest.raises(SceneError) as caught:
-        scene_of(more, **rope)
-    return [(fault.path, fault.message) for fault in caught.value.faults]
 
 
 def gaps(scene: Scene) -> FloatArray:
@@ -68,12 +62,9 @@ def test_nodes_have_the_given_mass_and_do_not_collide() -> None:
     links=st.integers(2, 60), slack=st.floats(0.0, 20.0), x=st.floats(-3.0, 3.0), y=st.floats(-3.0, 3.0),
     gravity=st.sampled_from([[0.0, 0.0], [0.0, -9.81], [3.0, 1.0]]), kind=st.sampled_from(["rods", "planks"]),
 )  # fmt: skip
-@example(
-    links=7, slack=0.5, x=2e-313, y=2e-313, gravity=[0.0, -9.81], kind="rods"
-)  # subnormal: too few digits for a direction
-def test_slack_rope_has_the_given_link_length_and_ends(
-    links: int, slack: float, x: float, y: float, gravity: list[float], kind: str
-) -> None:
+# subnormal: too few digits for a direction
+@example(links=7, slack=0.5, x=2e-313, y=2e-313, gravity=[0.0, -9.81], kind="rods")
+def test_slack_rope_has_the_given_link_length_and_ends(links, slack, x, y, gravity, kind):
     length = max(math.hypot(x, y), 0.1) * (1.0 + slack)
     scene = scene_of(
         {"world": {"gravity": gravity}},
@@ -192,16 +183,7 @@ def test_joints_of_the_file_precede_those_of_ropes() -> None:
     ],
 )
 def test_wrong_value_is_a_fault_with_a_hint(rope: dict[str, Any], key: str, message: str) -> None:
-    ((path, fault_message),) = faults_of({"ball": BALLS}, **rope)
-    assert path == f"rope[0].{key}"
-    assert message in fault_message
-
-
-def test_fault_of_a_rope_has_its_line() -> None:
-    text = "[[rope]]\nstart = [0, 0]\nend = [1, 0]\nlinks = 3\nlength = 0.5\n"
-    with pytest.raises(SceneError) as caught:
-        loads(text)
-    assert [fault.line for fault in caught.value.faults] == [5]
+    assert_faults({"ball": BALLS, "rope": [{**ROPE, **rope}]}, f"rope[0].{key}: {message}")
 
 
 def test_chain_comes_to_rest_with_the_sag_stated_in_its_scene() -> None:

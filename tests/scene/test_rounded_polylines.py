@@ -26,7 +26,6 @@ def bent(turn: float, radius: float) -> list[tuple[float, ...]]:
 @given(angles, radii)
 def test_arc_is_tangent_to_both_edges(turn: float, radius: float) -> None:
     arc = arc_at(bent(turn, radius), 1)
-    assert arc is not None
     assert arc.turn == pytest.approx(turn, abs=SMALL)
     (bx, by), (ex, ey), (cx, cy) = arc.at(0.0), arc.at(1.0), arc.centre
     assert by == pytest.approx(0.0, abs=SMALL)  # begins on the first edge
@@ -43,7 +42,6 @@ def test_arc_is_tangent_to_both_edges(turn: float, radius: float) -> None:
 def test_arc_has_the_fewest_chords_within_the_tolerance(turn: float, radius: float, tolerance: float) -> None:
     corners = bent(turn, radius)
     arc = arc_at(corners, 1)
-    assert arc is not None
     points = rounded(corners, tolerance=tolerance)[1:-1]
     assert [math.dist(point, arc.centre) for point in points] == pytest.approx([radius] * len(points), abs=SMALL)
     sagitta = [radius - math.dist(((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), arc.centre) for a, b in pairwise(points)]

@@ -8,24 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.registry import start
-from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import dumps, from_document, load, loads
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import dumps, from_document, loads
+from tests.scene.faults import assert_faults, faults_of
 
 PYRAMID = {"base": [1.0, 2.0], "size": [0.4, 0.2], "columns": 4, "rows": 4, "fewer": 1}
 
 
 def scene_of(seed: int = 0, **stack: Any) -> Scene:
     return from_document({"world": {"seed": seed}, "stack": [{**PYRAMID, **stack}]})
-
-
-def faults_of(**stack: Any) -> list[str]:
-    with pytest.raises(SceneError) as caught:
-        scene_of(**stack)
-    return [str(fault) for fault in caught.value.faults]
 
 
 def test_pyramid_has_one_box_fewer_in_each_row_numbered_from_the_lower_left() -> None:
@@ -35,11 +26,6 @@ def test_pyramid_has_one_box_fewer_in_each_row_numbered_from_the_lower_left() ->
     expected = [[0.4, 2.1], [0.8, 2.1], [1.2, 2.1], [1.6, 2.1], [0.6, 2.3], [1.0, 2.3], [1.4, 2.3]]
     assert bodies.position[:7] == pytest.approx(np.array(expected), abs=1e-15)
     assert bodies.position[9] == pytest.approx(np.array([1.0, 2.7]), abs=1e-15)
-
-
-def test_pyramid_is_symmetric_about_its_base() -> None:
-    x = scene_of(base=[0.0, 0.0]).bodies.position[:, 0]
-    assert sorted(x.tolist()) == sorted((-x).tolist())
 
 
 def test_boxes_of_a_wall_are_the_gap_apart() -> None:
@@ -90,12 +76,10 @@ def test_second_stack_does_not_change_the_first() -> None:
     columns=st.integers(1, 12), rows=st.integers(1, 12), fewer=st.integers(0, 3), gap=st.floats(0.0, 1.0),
     width=st.floats(0.01, 10.0), height=st.floats(0.01, 10.0),
 )  # fmt: skip
-def test_stack_has_the_given_rows_centred_on_its_base(
-    columns: int, rows: int, fewer: int, gap: float, width: float, height: float
-) -> None:
+def test_stack_has_the_given_rows_centred_on_its_base(columns, rows, fewer, gap, width, height):
     keys = {"columns": columns, "rows": rows, "fewer": fewer, "gap": gap, "size": [width, height], "base": [0, 0]}
     if fewer * (rows - 1) >= columns:
-        assert any("is empty" in fault for fault in faults_of(**keys))
+        assert "is empty" in faults_of({"stack": [keys]})[0].message
         return
     scene = scene_of(**keys)
     bodies = scene.bodies
@@ -107,36 +91,7 @@ def test_stack_has_the_given_rows_centred_on_its_base(
     assert loads(dumps(scene)) == scene
 
 
-def test_empty_row_is_a_fault_with_its_line() -> None:
-    text = "[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 5\nrows = 4\nfewer = 2\n"
-    with pytest.raises(SceneError) as caught:
-        loads(text)
-    (fault,) = caught.value.faults
-    assert (fault.line, fault.path) == (5, "stack[0].rows")
-    assert "at most 3" in fault.message
-
-
-def test_too_many_boxes_are_a_fault() -> None:
-    assert any("the limit is 1,000,000" in fault for fault in faults_of(columns=1001, rows=1000, fewer=0))
-
-
-def test_boxes_of_a_stack_can_collide() -> None:
-    matrix = contact_matrix(scene_of())
-    assert matrix.mutual
-    assert matrix.solids
-    assert not matrix.ball_ball
-
-
-def test_tower_of_twenty_stands_for_ten_seconds_on_pymunk() -> None:
-    scene = load(find("tower"))
-    simulation = start(scene, "pymunk", scene.solver)
-    begin = simulation.frame()
-    for _ in range(round(10.0 / scene.solver.dt)):
-        simulation.step()
-    end = simulation.frame()
-    simulation.close()
-    assert len(scene.bodies) == 20
-    assert scene.world.duration == 10.0
-    # pymunk's tower leans and settles by 9 mm within ten seconds; it would fall at 0.8 m
-    assert np.abs(end.position - begin.position).max() < 0.05
-    assert np.abs(end.angle).max() < 0.02  # measured: 3 mrad
+def test_empty_row_and_too_many_boxes_are_faults() -> None:
+    text = "[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = {}\nrows = {}\nfewer = {}\n"
+    assert_faults(text.format(5, 4, 2), "5: stack[0].rows: at most 3")
+    assert_faults(text.format(1001, 1000, 0), "1: stack[0]: the limit is 1,000,000")

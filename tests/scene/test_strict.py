@@ -1,21 +1,23 @@
-"""Strictness: values in a scene file are never guessed or converted."""
+"""Strictness: values in a scene file are never guessed or converted, nor are settings."""
 
 import datetime
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
-from sandbox.scene.compile.scene import Scene
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, loads
-
-BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
+from tests.scene.faults import assert_faults, faults_of
 
 
 def faults(text: str) -> list[tuple[int | None, str]]:
-    with pytest.raises(SceneError) as caught:
-        loads(text)
-    return [(fault.line, fault.path) for fault in caught.value.faults]
+    return [(fault.line, fault.path) for fault in faults_of(text)]
+
+
+BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 
 
 @pytest.mark.parametrize(
@@ -25,7 +27,7 @@ def faults(text: str) -> list[tuple[int | None, str]]:
         "1979-05-27T07:32:00Z", "1" + "0" * 400, "-1" + "0" * 4000, "0x" + "f" * 300,
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("key", ["mass", "angle", "restitution"])
+@pytest.mark.parametrize("key", ["mass", "restitution"])
 def test_number_of_a_wrong_type_is_refused_at_its_line(key: str, value: str) -> None:
     assert (4, f"ball[0].{key}") in faults(f"{BALL}{key} = {value}\n")
 
@@ -41,7 +43,7 @@ def test_boolean_of_a_wrong_type_is_refused(value: str) -> None:
 
 
 @pytest.mark.parametrize("value", ["1", "true", "1.5", "[]", "{}", "1979-05-27", "07:32:00", "1979-05-27T07:32:00"])
-@pytest.mark.parametrize("key", ["name", "material", "colour"])
+@pytest.mark.parametrize("key", ["name", "colour"])
 def test_text_of_a_wrong_type_is_refused(key: str, value: str) -> None:
     assert (4, f"ball[0].{key}") in faults(f"{BALL}{key} = {value}\n")
 
@@ -56,9 +58,8 @@ def test_vector_of_a_wrong_type_is_refused(value: str) -> None:
 
 
 def test_unknown_choice_is_refused_with_the_choices() -> None:
-    with pytest.raises(SceneError, match="'explicit_euler', 'semi_implicit_euler'") as caught:
-        loads(f'{BALL}[solver]\nintegrator = "euler"\n')
-    assert caught.value.faults[0].path == "solver.integrator"
+    text = f'{BALL}[solver]\nintegrator = "euler"\n'
+    assert_faults(text, "5: solver.integrator: 'explicit_euler', 'semi_implicit_euler'")
 
 
 def test_integers_are_accepted_as_floats() -> None:
@@ -70,42 +71,18 @@ def test_integers_are_accepted_as_floats() -> None:
 @pytest.mark.parametrize(
     ("typo", "key"),
     [
-        ("[[ball]]\nposition=[0,0]\nraduis=1", "radius"), ("[wrold]\nseed=1", "world"), ("[[bal]]\nradius=1", "ball"),
-        ("[solver]\nsubstep=1", "substeps"), ("[[balls]]\nradius=1", "ball"), ("tilte='x'", "title"),
-        ("[world]\ngravty=[0,0]", "gravity"), ("[[walls]]\npoints=[[0,0],[1,1]]", "wall"),
+        ("[[ball]]\nposition=[0,0]\nraduis=1", "'radius'"), ("[wrold]\nseed=1", "'world'"),
+        ("[[bal]]\nradius=1", "'ball'"), ("[solver]\nsubstep=1", "'substeps'"), ("tilte='x'", "'title'"),
+        # words of other engines
+        (f"{BALL}elasticity = 1", "'restitution'"), (f"{BALL}bounciness = 1", "'restitution'"),
+        (f"{BALL}pos = 1", "'position'"), (f"{BALL}vel = 1", "'velocity'"), (f"{BALL}Rot = 1", "'angle'"),
+        (f"{BALL}mu = 1", "'friction'"), ("[[circle]]", "'ball'"), ("[[crate]]", "'box'"), ("[[rectangles]]", "'box'"),
+        ("[[segment]]", "'wall'"), ("[[line]]", "'wall'"),
+        (f"{BALL}static = true", "fixed = true"), ("[[static]]", "plane, wall or post"),
     ],
 )  # fmt: skip
-def test_misspelt_key_is_refused_with_a_suggestion(typo: str, key: str) -> None:
-    with pytest.raises(SceneError, match=f"did you mean '{key}'"):
-        loads(typo)
-
-
-@pytest.mark.parametrize(
-    ("word", "key"),
-    [
-        ("elasticity", "restitution"), ("bounciness", "restitution"), ("pos", "position"), ("vel", "velocity"),
-        ("rotation", "angle"), ("Rot", "angle"), ("mu", "friction"),
-    ],
-)  # fmt: skip
-def test_key_of_another_engine_is_refused_with_the_key_here(word: str, key: str) -> None:
-    with pytest.raises(SceneError, match=f"{word}: unknown key; did you mean '{key}'"):
-        loads(f"{BALL}{word} = 1")
-
-
-@pytest.mark.parametrize(
-    ("word", "table"),
-    [("circle", "ball"), ("crate", "box"), ("rectangles", "box"), ("segment", "wall"), ("line", "wall")],
-)
-def test_table_of_another_engine_is_refused_with_the_table_here(word: str, table: str) -> None:
-    with pytest.raises(SceneError, match=f"{word}: unknown key; did you mean '{table}'"):
-        loads(f"{BALL}[[{word}]]")
-
-
-def test_static_is_refused_with_the_keys_of_fixed_elements() -> None:
-    with pytest.raises(SceneError, match="static: unknown key; did you mean fixed = true"):
-        loads(f"{BALL}static = true")
-    with pytest.raises(SceneError, match="static: unknown key; did you mean plane, wall or post"):
-        loads(f"{BALL}[[static]]")
+def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: str) -> None:
+    assert any(f"unknown key; did you mean {key}" in fault.message for fault in faults_of(typo))
 
 
 def test_unknown_key_without_a_similar_one_lists_the_known_keys() -> None:
@@ -113,27 +90,21 @@ def test_unknown_key_without_a_similar_one_lists_the_known_keys() -> None:
         loads(f"{BALL}zzzz = 1")
 
 
-@pytest.mark.parametrize("plural", ["balls", "planes", "walls", "posts", "grids", "scatters", "emitters", "pairs"])
+@pytest.mark.parametrize("plural", ["balls", "planes", "emitters"])
 def test_plural_field_names_are_not_keys_of_a_file(plural: str) -> None:
     assert (4, plural) in faults(f"{BALL}[[{plural}]]\n")
     assert (4, plural) in faults(f"{BALL}[[{plural}]]\nraduis = 1\n")
 
 
-@pytest.mark.parametrize("kind", ["ball", "plane", "wall", "post", "material", "pair", "grid", "scatter", "emitter"])
+@pytest.mark.parametrize("kind", ["ball", "material", "grid"])
 def test_single_table_for_an_array_of_tables_is_refused(kind: str) -> None:
-    with pytest.raises(SceneError, match=rf"\[\[{kind}\]\]") as caught:
-        loads(f"title = 't'\n[{kind}]\nname = 'x'\n")
-    assert [(fault.line, fault.path) for fault in caught.value.faults] == [(2, kind)]
+    assert_faults(f"title = 't'\n[{kind}]\nname = 'x'\n", f"2: {kind}: [[{kind}]]")
 
 
 @pytest.mark.parametrize("kind", ["world", "solver"])
-@pytest.mark.parametrize("value", ["3", "[]", "'x'", "true", "[1]", "[{}]"])
+@pytest.mark.parametrize("value", ["3", "[]", "'x'", "true", "[1]", "[{}]", "[{ seed = 1 }]"])
 def test_value_that_is_not_a_table_is_refused(kind: str, value: str) -> None:
     assert faults(f"{kind} = {value}\n") == [(1, kind)]
-
-
-def test_array_of_tables_for_a_single_table_is_refused() -> None:
-    assert faults("[[world]]\nseed = 1\n") == [(1, "world")]
 
 
 def test_all_missing_keys_are_reported() -> None:
@@ -147,20 +118,13 @@ def test_all_missing_keys_are_reported() -> None:
 
 
 @pytest.mark.parametrize(
-    "value", [datetime.date(2000, 1, 1), datetime.time(1), datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC)]
+    "value", [datetime.date(2000, 1, 1), datetime.time(1), datetime.datetime(2000, 1, 1, tzinfo=datetime.UTC), None]
 )
 @pytest.mark.parametrize(
     "document",
-    [
-        {"title": None},
-        {"world": None},
-        {"ball": None},
-        {"ball": [None]},
-        {"pair": [{"between": ["a", None]}]},
-        {"x": None},
-    ],
+    [{"title": None}, {"world": None}, {"ball": None}, {"ball": [None]}, {"pair": [{"between": ["a", None]}]}],
 )
-def test_dates_are_refused_everywhere(document: dict[str, Any], value: object) -> None:
+def test_dates_and_null_are_refused_everywhere(document: dict[str, Any], value: object) -> None:
     def with_dates(node: Any) -> Any:
         if isinstance(node, dict):
             return {key: with_dates(inner) for key, inner in node.items()}
@@ -170,12 +134,6 @@ def test_dates_are_refused_everywhere(document: dict[str, Any], value: object) -
 
     with pytest.raises(SceneError):
         from_document(with_dates(document))
-
-
-def test_null_is_refused() -> None:
-    for key in ("world", "solver", "ball", "title"):
-        with pytest.raises(SceneError):
-            from_document({key: None})
 
 
 def test_scene_is_frozen_hashable_and_compared_by_value() -> None:
@@ -188,6 +146,40 @@ def test_scene_is_frozen_hashable_and_compared_by_value() -> None:
         one.title = "x"  # type: ignore[misc] # the point of the test
 
 
-def test_model_in_python_is_as_strict_as_a_file() -> None:
-    with pytest.raises(ValueError, match="finite"):
-        Scene.model_validate({"world": {"duration": float("nan")}})
+def test_substep_length_is_dt_over_substeps() -> None:
+    assert Settings(dt=0.01, substeps=4).h == 0.01 / 4
+
+
+def test_replace_changes_only_the_given_settings() -> None:
+    before = Settings(dt=0.5, slop=0.1, integrator="rk4")
+    after = before.replace(dt=0.25, bias=None)
+    assert after == Settings(dt=0.25, slop=0.1, integrator="rk4")
+    assert before.dt == 0.5
+
+
+@pytest.mark.parametrize(
+    "changes", [{"dt": 0.0}, {"dt": "0.1"}, {"dt": True}, {"step": 1}, {"substeps": 1.0}, {"dt": float("nan")}]
+)
+def test_replace_validates_as_strictly_as_a_file(changes: dict[str, object]) -> None:
+    with pytest.raises(ValidationError):
+        Settings().replace(**changes)
+
+
+def test_settings_left_to_the_engine_are_none() -> None:
+    unset = {key for key, value in Settings().model_dump().items() if value is None}
+    choices = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
+    contacts = {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
+    assert unset == choices | contacts | {"continuous", "sleeping", "sleep_time", "idle_speed", "workers"}
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_resolved_settings_of_extreme_sizes_and_masses_are_within_bounds(engine: str) -> None:
+    corners = [[-1e15, -1e15], [1e15, -1e15], [1e15, 1e15], [-1e15, 1e15]]
+    giant = {"position": [0, 0], "points": corners, "mass": 1e30}
+    plane = {"point": [0, -2e15], "normal": [0, 1]}
+    solver, world = {"dt": 1e-9}, {"duration": 1e-9}
+    scene = from_document({"polygon": [giant], "plane": [plane], "solver": solver, "world": world})
+    settings = scene.solver if engine == "pymunk" else scene.solver.replace(response="penalty")
+    chosen = ENGINES[engine].resolve(scene, settings)
+    assert chosen.slop == 1e9
+    assert chosen.stiffness == (None if engine == "pymunk" else 1e30)

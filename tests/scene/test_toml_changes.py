@@ -3,13 +3,13 @@
 import random
 import time
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
+from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.files.toml_changes import (
     AddElement,
     Change,
@@ -21,13 +21,13 @@ from sandbox.scene.files.toml_changes import (
     with_swapped_elements,
 )
 from sandbox.scene.files.toml_edit import statements
+from tests.samples import each_shipped_scene
 from tests.strategies import Rendered, documents, names, numbers, pairs, rendered, solids
 
 A, B = "[[ball]]\nr = 1  # a\n", "[[ball]]\nr = 2\n"
 BOX, WORLD = "[[box]]\ns = 1\n", "[world]\ng = 1\n"
 NEW = "[[ball]]\nr = 3\n"
 ADD = AddElement("ball", {"r": 3})
-SCENES = sorted((Path(__file__).parents[2] / "scenes").rglob("*.toml"))
 
 
 def check(before: str, after: str, *changes: Change) -> None:
@@ -102,12 +102,8 @@ def test_missing_key_is_inserted_in_the_form_of_its_table(before: str, after: st
 
 
 def test_keys_of_one_missing_table_are_inserted_together() -> None:
-    values = [
-        SetValue(("world", "a"), 1),
-        SetValue(("solver", "b"), 2),
-        SetValue(("t",), "x"),
-        SetValue(("world", "c"), 3),
-    ]
+    places = ("world", "a"), ("solver", "b"), ("t",), ("world", "c")
+    values = [SetValue(place, value) for place, value in zip(places, (1, 2, "x", 3), strict=True)]
     check(A, 't = "x"\n\n[world]\na = 1\nc = 3\n\n[solver]\nb = 2\n\n' + A, *values)
     assert with_changes("", values) == 't = "x"\n\n[world]\na = 1\nc = 3\n\n[solver]\nb = 2\n'
     kick = [SetValue(("ball", 0, "kick", "speed"), 1.0), SetValue(("ball", 0, "kick", "by"), "b")]
@@ -241,17 +237,13 @@ def test_invalid_text_is_refused() -> None:
 
 def test_numbers_of_numpy_are_written_as_plain_ones() -> None:
     numpy = pytest.importorskip("numpy")
-    check(
-        A,
-        A + "p = [0.5, 1.0]\nn = 3\n",
-        SetValue(("ball", 0, "p"), numpy.array([0.5, 1])),
-        SetValue(("ball", 0, "n"), numpy.int64(3)),
-    )
+    values = [SetValue(("ball", 0, "p"), numpy.array([0.5, 1])), SetValue(("ball", 0, "n"), numpy.int64(3))]
+    check(A, A + "p = [0.5, 1.0]\nn = 3\n", *values)
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_moved_balls_of_a_shipped_scene_leave_all_other_lines_unchanged(path: Path) -> None:
-    text = path.read_bytes().decode()
+@pytest.mark.parametrize("name", each_shipped_scene())
+def test_moved_balls_of_a_shipped_scene_leave_all_other_lines_unchanged(name: str) -> None:
+    text = find(name).read_bytes().decode()
     balls = tomllib.loads(text).get("ball", [])
     moves = [SetValue(("ball", k, "position"), [each["position"][0] + 0.125, 7.0]) for k, each in enumerate(balls)]
     result = with_changes(text, moves)
@@ -383,12 +375,10 @@ def is_touched(location: tuple[str | int, ...], changes: list[Change]) -> bool:
     return False
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @settings(max_examples=300, deadline=None)
 @given(rendered(documents() | solids()), st.data())
-def test_random_changes_of_any_layout_give_the_changed_document(
-    case: tuple[Any, Rendered], data: st.DataObject
-) -> None:
+def test_random_changes_of_any_layout_give_the_changed_document(case, data):
     document, text = case[0], case[1].text
     changes = data.draw(changes_of(document))
     result = with_changes(text, changes)
@@ -399,7 +389,7 @@ def test_random_changes_of_any_layout_give_the_changed_document(
             assert body.rstrip("\r\n") in remaining, body  # consumes those before it, so the order is checked
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @settings(max_examples=100, deadline=None)
 @given(rendered(documents()))
 def test_present_values_change_nothing(case: tuple[Any, Rendered]) -> None:
@@ -414,12 +404,10 @@ def test_present_values_change_nothing(case: tuple[Any, Rendered]) -> None:
     assert with_changes(text, []) == text
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @settings(max_examples=200, deadline=None)
 @given(rendered(documents()), st.dictionaries(names(), some_values, max_size=3), st.booleans())
-def test_added_element_removed_again_leaves_the_original_text(
-    case: tuple[Any, Rendered], values: dict[str, Any], is_cut: bool
-) -> None:
+def test_added_element_removed_again_leaves_the_original_text(case, values, is_cut):
     document, text = case[0], case[1].text
     text = text.removesuffix("\n").removesuffix("\r") if is_cut else text
     headings = {each.keys[0] for each in statements(text) if each.heading}
@@ -450,19 +438,17 @@ def test_swapped_elements_of_inline_arrays() -> None:
     assert with_swapped_elements(text, "plane", 0, 1) == "plane = [{ a = 2 }, # one\n  { a = 1 }]\n"
 
 
-@pytest.mark.full
-@settings(max_examples=60, deadline=None)
+@pytest.mark.fail_slow(30)
 @given(rendered(documents()), st.data())
 def test_swapping_twice_restores_any_text(case: tuple[dict[str, object], Rendered], data: st.DataObject) -> None:
     document, text = case
     tables = [key for key, value in document.items() if isinstance(value, list) and len(value) > 1]
-    if not tables:
-        return
+    assume(tables)
     table = data.draw(st.sampled_from(tables))
     try:
         swapped = with_swapped_elements(text.text, table, 0, 1)
     except TextEditError:  # such as elements whose subtables are scattered
-        return
+        reject()
     elements = document[table]
     assert isinstance(elements, list)
     assert tomllib.loads(swapped)[table] == [elements[1], elements[0], *elements[2:]]

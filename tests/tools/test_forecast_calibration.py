@@ -8,7 +8,7 @@ from sandbox.scene.files.load import from_document
 from tools.calibration.forecast import Observation, confusion, halves, observe, shares, summary
 from tools.calibration.random_scenes import KINDS, document
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 
 def row(foretold: bool, happened: bool, formulas: bool = False) -> Observation:
@@ -50,7 +50,7 @@ def test_observed_and_forecast_tunnelling_of_bullets_agree() -> None:
         assert found.formulas or not found.happened  # a bound may warn too often, never too rarely
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.timeout(1200)  # 84 scenes, each run five to seven times
 def test_precision_and_recall_on_the_held_out_half() -> None:
     kinds, parity = halves()["held-out"]

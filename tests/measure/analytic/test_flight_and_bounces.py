@@ -1,6 +1,7 @@
 """Closed forms of flight and bouncing against 40-digit arithmetic and each other, and unsupported scenes."""
 
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -19,8 +20,9 @@ from sandbox.scene.description.world import World
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
+from tests import runs_by_hand
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 G = 9.81
 GROUND = "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 3.0]\n"
@@ -40,22 +42,11 @@ def run_of(
     names: tuple[str, ...] | None = None,
 ) -> Trajectory:
     """Return a run of which only times, contacts and retirements matter."""
-    time = np.asarray(time, dtype=float)
     names = scene.bodies.names if names is None else names
-    retired_time = np.full(len(names), np.nan)
-    for index, when in (retired or {}).items():
-        retired_time[index] = when
-    shape = len(time), len(names)
-    rows = np.zeros((len(contacts), 2))
-    return Trajectory(
-        *(time, np.zeros((*shape, 2)), np.zeros((*shape, 2)), np.zeros(shape), np.zeros(shape)),
+    return replace(
+        runs_by_hand.run_of(scene, time=np.asarray(time, dtype=float), contacts=contacts),
         names=np.asarray(names, dtype=str),
-        contact_time=np.asarray([t for t, _ in contacts], dtype=float),
-        contact_pair=np.asarray([p for _, p in contacts], dtype=np.int64).reshape(-1, 2),
-        contact_point=rows,
-        contact_normal=rows,
-        contact_impulse=rows,
-        retired_time=retired_time,
+        retired_time=np.array([(retired or {}).get(k, np.nan) for k in range(len(names))]),
         missed_time=np.asarray([t for t, _ in missed], dtype=float),
         missed_pair=np.asarray([p for _, p in missed], dtype=np.int64).reshape(-1, 2),
     )
@@ -77,8 +68,8 @@ def flight_40(t: float, x: float, v: float, g: float, k: float, wind: float) -> 
         return tuple(sum(part) for part in terms) + tuple(sum(map(abs, part)) for part in terms)
 
 
-@pytest.mark.parametrize("k", [0.0, 5e-324, 1e-300, 1e-16, 1e-9, 1e-5, 1e-3, 0.1, 0.99, 1.0, 1.01, 3.0, 50.0, 1e3, 1e9])
-@pytest.mark.parametrize("t", [0.0, 1e-6, 0.37, 1.0, 12.5, 1e4])
+@pytest.mark.parametrize("k", [0.0, 5e-324, 1e-16, 1e-5, 0.1, 0.99, 1.01, 50.0, 1e9])
+@pytest.mark.parametrize("t", [0.0, 1e-6, 0.37, 1e4])
 def test_free_flight_agrees_with_40_digits(k: float, t: float) -> None:
     start, speed, gravity, wind = (3.7, -1.9), (11.3, 7.1), (0.25, -G), (-4.3, 2.2)
     world = World(gravity=gravity, linear_drag=k, wind=wind)
@@ -87,14 +78,6 @@ def test_free_flight_agrees_with_40_digits(k: float, t: float) -> None:
         x, v, x_size, v_size = flight_40(t, start[axis], speed[axis], gravity[axis], k, wind[axis])
         assert abs(position[0, axis] - x) <= 2e-15 * x_size  # nine roundings of at most 1.1e-16 each
         assert abs(velocity[0, axis] - v) <= 2e-15 * v_size  # likewise; e⁻ᶻ adds z·e⁻ᶻ of one rounding, z e⁻ᶻ < 1
-
-
-def test_free_flight_without_drag_is_the_parabola() -> None:
-    time = np.linspace(0.0, 2.0, 9)
-    position, velocity = free_flight(time, np.array([0.0, 10.0]), np.array([1.0, 2.0]), World(gravity=(0.0, -8.0)))
-    # Eighths and small integers: every operation is exact.
-    assert np.array_equal(position, np.column_stack((time, 10.0 + 2.0 * time - 4.0 * time**2)))
-    assert np.array_equal(velocity, np.column_stack((np.ones(9), 2.0 - 8.0 * time)))
 
 
 @pytest.mark.parametrize(("drag", "damping"), [(0.0, 0.3), (0.7, 0.3), (0.7, 0.999999), (1e-9, 0.5)])
@@ -119,7 +102,6 @@ def test_solution_of_a_damped_scene_is_free_flight_only() -> None:
     world = {"gravity": [0.0, -G], "damping": 0.5, "duration": 1.0}
     scene = from_document({"world": world, "ball": [flying]})
     found = solution(scene)
-    assert found is not None
     assert found.at(np.array([1.0])).spin[0, 0] == pytest.approx(1.5, rel=1e-15)  # one rounding
     spring = {"kind": "spring", "between": ["a"], "anchors": [[0, 0], [0, 0]], "rest_length": 0.0, "stiffness": 9.0}
     held = from_document({"world": world, "ball": [flying | {"name": "a"}], "joint": [spring]})
@@ -140,12 +122,6 @@ def test_free_flight_of_several_bodies_equals_that_of_each() -> None:
         one = free_flight(time, x[n], v[n], world)
         assert np.array_equal(position[:, n], one[0])
         assert np.array_equal(velocity[:, n], one[1])
-
-
-def test_free_flight_approaches_the_terminal_velocity() -> None:
-    world = World(gravity=(0.0, -G), linear_drag=2.0, wind=(3.0, 0.0))
-    _, velocity = free_flight(np.array([1e3]), np.zeros(2), np.array([50.0, 50.0]), world)
-    assert velocity[0] == pytest.approx((3.0, -G / 2.0), rel=1e-15)  # the initial velocity has decayed by e⁻²⁰⁰⁰ = 0
 
 
 def test_free_flight_under_quadratic_drag_is_refused() -> None:
@@ -171,18 +147,11 @@ def test_bounces_from_5_m_have_the_known_times_and_peaks() -> None:
     assert height[1:].tolist() == velocity[1:].tolist() == [0.0, 0.0]
 
 
-@given(
-    e=st.floats(0.01, 1.0),
-    height=st.floats(0.0, 100.0),
-    speed=st.floats(-20.0, 20.0),
-    fraction=st.floats(0.0, 1.0),
-)
+@given(e=st.floats(0.01, 1.0), height=st.floats(0.0, 100.0), speed=st.floats(-20.0, 20.0), fraction=st.floats(0.0, 1.0))
 @example(e=1.0 - 2.0**-53, height=5.0, speed=0.0, fraction=0.3)
 @example(e=1.0 - 1e-9, height=5.0, speed=-3.0, fraction=0.7)
 @example(e=0.5, height=0.0, speed=1e-160, fraction=0.5)
-def test_bounces_agree_with_stepping_from_impact_to_impact(
-    e: float, height: float, speed: float, fraction: float
-) -> None:
+def test_bounces_agree_with_stepping_from_impact_to_impact(e, height, speed, fraction):
     with mpmath.workdps(40):
         g, v = mpmath.mpf(G), mpmath.mpf(speed)
         impact = mpmath.sqrt(v**2 + 2 * g * height)
@@ -247,7 +216,6 @@ def test_closed_form_without_gravity_is_reflected_by_a_plane() -> None:
     scene = loads(GROUND + BALL.replace("0.8", "1.0") + "velocity = [2.0, -4.0]\n")
     time = np.arange(5.0)
     form = closed_form(run_of(scene, time, contacts=((1.5, (0, -1)),)), scene, 0)
-    assert form is not None
     assert form.valid.all()
     assert form.position[:, 0].tolist() == [1.0, 3.0, 5.0, 7.0, 9.0]
     assert form.position[:, 1].tolist() == [5.5, 1.5, 3.5, 7.5, 11.5]
@@ -270,7 +238,6 @@ def test_closed_form_of_a_dropped_ball_bounces_to_rest() -> None:
     scene = scene_of(GROUND, BALL)
     time = np.linspace(0.0, 12.0, 1201)
     form = closed_form(run_of(scene, time, contacts=((1.01, (0, -1)), (2.63, (0, -1)))), scene, 0)
-    assert form is not None
     assert form.valid.all()
     height, speed = bounces(time, 5.0, 0.0, G, 0.8)
     assert np.array_equal(form.position[:, 0], np.ones(1201))
@@ -288,8 +255,6 @@ def test_closed_form_bounces_off_a_slope_perpendicular_to_gravity() -> None:
     )
     time = np.linspace(0.0, 10.0, 101)
     one, other = (closed_form(run_of(scene, time), scene, 0) for scene in (flat, slope))
-    assert one is not None
-    assert other is not None
     height = (other.position - (10.0, 20.0)) @ (0.6, 0.8)
     assert height == pytest.approx(one.position[:, 1], abs=1e-12)  # a height rounded by 4e-15 m, over about 20 bounces
     assert (other.position - (10.0, 20.0)) @ (0.8, -0.6) == pytest.approx(np.zeros(101), abs=1e-14)  # roundings of 24 m
@@ -301,13 +266,11 @@ def test_closed_form_slides_along_a_frictionless_plane() -> None:
     hit = ((1.01, (0, -1)),)
     smooth = scene_of(GROUND, moving)
     form = closed_form(run_of(smooth, time, contacts=hit), smooth, 0)
-    assert form is not None
     assert form.valid.all()
     assert form.position[:, 0] == pytest.approx(1.0 + 3.0 * time, abs=4e-15)  # two roundings of up to 13 m
 
     rough = scene_of(GROUND, moving + "friction = 0.5\n")
     form = closed_form(run_of(rough, time, contacts=hit), rough, 0)
-    assert form is not None
     assert np.array_equal(form.valid, time < 1.0096376)  # only the free flight to the ground is valid
 
 
@@ -324,7 +287,6 @@ def test_first_flight_is_valid_where_bouncing_has_no_formula(world: str, ground:
     scene = scene_of(ground, BALL + ball, world=world)
     time = np.linspace(0.0, 3.0, 301)
     form = closed_form(run_of(scene, time), scene, 0)
-    assert form is not None
     normal = np.array([0.1, 3.0]) / np.hypot(0.1, 3.0) if "0.1, 3.0" in ground else np.array([0.0, 1.0])
     above = form.position @ normal - 0.5 > 0
     assert 0 < above.sum() < 301
@@ -336,7 +298,6 @@ def test_ball_without_collisions_falls_through_the_ground() -> None:
     scene = scene_of(GROUND, BALL + 'collides = "none"\n')
     time = np.linspace(0.0, 3.0, 31)
     form = closed_form(run_of(scene, time), scene, 0)
-    assert form is not None
     assert form.valid.all()
     assert form.position[-1, 1] == pytest.approx(5.5 - 0.5 * G * 9.0, rel=1e-15)  # a few roundings of 44 m
 
@@ -347,8 +308,6 @@ def test_bouncing_is_valid_until_contact_with_another_ball() -> None:
     time = np.linspace(0.0, 3.0, 31)
     run = run_of(scene, time, contacts=((1.0, (0, -1)), (2.05, (0, 1))), retired={1: 1.55})
     first, second = (closed_form(run, scene, n) for n in (0, 1))
-    assert first is not None
-    assert second is not None
     assert np.array_equal(first.valid, time < 2.05)
     assert np.array_equal(second.valid, time < 1.55)
 
@@ -356,14 +315,12 @@ def test_bouncing_is_valid_until_contact_with_another_ball() -> None:
 def test_missed_bounce_does_not_end_validity() -> None:
     scene = scene_of(GROUND, BALL)
     form = closed_form(run_of(scene, np.linspace(0, 3, 31), missed=((1.0, (0, -1)),)), scene, 0)
-    assert form is not None
     assert form.valid.all()
 
 
 def test_closed_form_of_a_resting_ball_stays_at_rest() -> None:
     scene = scene_of(GROUND, BALL.replace("5.5", "0.5"))
     form = closed_form(run_of(scene, [0.0, 1.0, 2.0], contacts=((0.0, (0, -1)),)), scene, 0)
-    assert form is not None
     assert form.position.tolist() == [[1.0, 0.5]] * 3
     assert form.velocity.tolist() == [[0.0, 0.0]] * 3
 
@@ -387,8 +344,6 @@ def test_closed_form_of_a_body_equals_that_of_its_scene() -> None:
         scene = load(find(name), ["world.duration=1.0", "solver.dt=0.1"])
         right, last = solved_run(scene, scene.solver), len(scene.bodies) - 1
         form = closed_form(run_of(scene, time, contacts=((0.0, (last, -1)),)), scene, last)
-        assert right is not None
-        assert form is not None
         assert form.spin is not None
         assert form.valid.all()
         assert form.position == pytest.approx(right.position[:, last], abs=1e-15)  # times are rounded differently

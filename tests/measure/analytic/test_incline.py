@@ -49,9 +49,8 @@ def distance(scene: Scene, tilt: float = 30.0) -> np.ndarray:
 
 
 def test_box_slides_with_low_friction_and_sticks_with_high_friction() -> None:
-    assert distance(incline_scene(friction=0.3)) == pytest.approx(
-        0.5 * G * (0.5 - 0.3 * HALF) * TIME**2, abs=1e-13
-    )  # roundings of 5 m
+    # roundings of 5 m
+    assert distance(incline_scene(friction=0.3)) == pytest.approx(0.5 * G * (0.5 - 0.3 * HALF) * TIME**2, abs=1e-13)
     assert not distance(incline_scene(friction=0.58)).any()
     assert solution_of(incline_scene(friction=0.58)).about == "rest on a plane"
 
@@ -60,16 +59,14 @@ def test_box_pushed_up_the_slope_stops_and_slides_back_with_low_friction() -> No
     up, down = G * (0.5 + 0.3 * HALF), G * (0.5 - 0.3 * HALF)
     stop = 3.0 / up
     expected = np.where(stop > TIME, -3.0 * TIME + 0.5 * up * TIME**2, -1.5 * stop + 0.5 * down * (TIME - stop) ** 2)
-    assert distance(incline_scene(friction=0.3, speed=-3.0)) == pytest.approx(
-        expected, abs=1e-13
-    )  # roundings of a few m
+    # roundings of a few m
+    assert distance(incline_scene(friction=0.3, speed=-3.0)) == pytest.approx(expected, abs=1e-13)
     stop = 3.0 / (G * (0.5 + 0.7 * HALF))
     stopped = stop <= TIME
     found = motion_of(incline_scene(friction=0.7, speed=-3.0), TIME)
     assert not found.velocity[stopped].any()
-    assert distance(incline_scene(friction=0.7, speed=-3.0))[stopped] == pytest.approx(
-        -1.5 * stop, abs=1e-14
-    )  # likewise
+    # likewise
+    assert distance(incline_scene(friction=0.7, speed=-3.0))[stopped] == pytest.approx(-1.5 * stop, abs=1e-14)
 
 
 def test_sliding_box_stops_after_the_published_distance_and_time() -> None:
@@ -83,9 +80,7 @@ def test_sliding_box_stops_after_the_published_distance_and_time() -> None:
     ("tilt", "friction", "speed", "spin"),
     [(0, 0.2, 3.0, 40.0), (0, 0.1, -1.0, -30.0), (30, 0.1, 0.0, 0.0), (30, 0.5, -4.0, 10.0)],
 )  # fmt: skip
-def test_slipping_and_rolling_ball_agrees_with_dop853_under_smoothed_friction(
-    tilt: float, friction: float, speed: float, spin: float
-) -> None:
+def test_slipping_and_rolling_ball_agrees_with_dop853_under_smoothed_friction(tilt, friction, speed, spin):
     sin, cos = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
     width = 3e-3  # m/s of slip over which the smoothed friction changes its sign
 
@@ -118,9 +113,7 @@ def test_disc_rolls_with_two_thirds_of_the_sliding_acceleration_and_speed() -> N
     spin=st.floats(-20.0, 20.0),
     ball=st.booleans(),
 )
-def test_friction_stays_in_its_cone_and_never_increases_slip(
-    pull: float, friction: float, speed: float, spin: float, ball: bool
-) -> None:
+def test_friction_stays_in_its_cone_and_never_increases_slip(pull, friction, speed, spin, ball):
     radius, inertia = (0.3, 2.0 / 0.3) if ball else (0.0, 0.0)
     phases = phases_of(pull, 5.0, friction, speed, spin if ball else 0.0, radius, inertia)
     assume(phases is not None)
@@ -133,15 +126,13 @@ def test_friction_stays_in_its_cone_and_never_increases_slip(
     if len(phases) == 2:  # the speed is continuous between phases
         first, last = phases
         t = last.begin
-        assert first.speed + first.tangential_accel * t == pytest.approx(
-            last.speed, abs=1e-12 * (1.0 + abs(pull) * t)
-        )  # rounding
+        # rounding
+        assert first.speed + first.tangential_accel * t == pytest.approx(last.speed, abs=1e-12 * (1.0 + abs(pull) * t))
 
 
 def test_lasting_contact_is_one_record_that_balances_momentum() -> None:
     scene = incline_scene(friction=0.3, speed=-3.0)
     form = solved_run(scene, scene.solver)
-    assert form is not None
     assert form.contact_time.tolist() == [0.0]
     assert form.contact_pair.tolist() == [[0, -1]]
     gain = 3.0 * (form.velocity[-1, 0] - form.velocity[0, 0])
@@ -159,7 +150,6 @@ def test_reference_engine_converges_to_closed_form(scene: Scene) -> None:
     for dt in (0.008, 0.002):
         truth = solved_run(scene, scene.solver.replace(dt=dt))
         found = run(scene, "reference", audit=False, dt=dt, integrator="velocity_verlet", slop=0.0)
-        assert truth is not None
         errors.append(float(np.hypot(*(found.position[-1, 0] - truth.position[-1, 0]))))
     assert errors[1] < 0.5 * errors[0] < 0.02  # first order, over about 5 m: a contact acts one step late
 

@@ -29,16 +29,11 @@ def state_derivative(_: float, s: np.ndarray) -> list[float]:
 @pytest.mark.parametrize(
     "start",
     [
-        (0.5, 0.0, 0.0, math.sqrt(3.0)),
-        (1.0, 0.0, 0.0, 1.0),
-        (1.0, 0.0, 0.4, 1.1),
-        (-0.3, 1.0, 0.9, -0.2),
-        (1.0, 0.0, 0.0, 0.3),
-        (1.0, 0.0, 0.0, 1.8),
-        (2.0, 1.0, -1.5, 0.2),
+        (0.5, 0.0, 0.0, math.sqrt(3.0)), (1.0, 0.0, 0.0, 1.0), (1.0, 0.0, 0.4, 1.1), (-0.3, 1.0, 0.9, -0.2),
+        (1.0, 0.0, 0.0, 0.3), (1.0, 0.0, 0.0, 1.8), (2.0, 1.0, -1.5, 0.2),
     ],
     ids=["e = ½", "circle", "rising", "backwards", "e = 0.91", "hyperbola", "hyperbola falling in"],
-)
+)  # fmt: skip
 def test_orbit_agrees_with_dop853(start: tuple[float, float, float, float]) -> None:
     expected = integrated(state_derivative, start, TIME)
     found = motion_of(planet(*start), TIME)
@@ -68,13 +63,11 @@ def test_planet_returns_after_one_period_and_is_opposite_after_half() -> None:
     scene = planet(0.5, 0.0, 0.0, math.sqrt(3.0))
     form = solution_of(scene).alone[0]
     assert isinstance(form, Kepler)
-    assert (form.half_axis, form.period) == pytest.approx(
-        (1.0, 2.0 * math.pi), rel=1e-15
-    )  # e = ½ in units of the semi-axis
+    # e = ½ in units of the semi-axis
+    assert (form.half_axis, form.period) == pytest.approx((1.0, 2.0 * math.pi), rel=1e-15)
     found = motion_of(scene, np.array([math.pi, 2.0 * math.pi, 200.0 * math.pi]))
-    assert found.position == pytest.approx(
-        np.array([[-1.3, -0.1], [0.7, -0.1], [0.7, -0.1]]), abs=1e-11
-    )  # over 100 periods
+    # over 100 periods
+    assert found.position == pytest.approx(np.array([[-1.3, -0.1], [0.7, -0.1], [0.7, -0.1]]), abs=1e-11)
 
 
 def test_orbit_about_a_fixed_body_equals_orbit_about_a_point() -> None:

@@ -77,9 +77,8 @@ def test_spring_is_anchored_at_a_rotated_fixed_body() -> None:
     joint = "[[joint]]\nkind = 'spring'\nbetween = ['m', 'nail']\nanchors = [[0, 0], [0.1, 0]]\nstiffness = 2.0\n"
     ball = "[[ball]]\nname = 'm'\nposition = [0.0, 3.1]\nradius = 0.1\ncollides = 'none'\nvelocity = [0.0, 0.2]\n"
     found = motion_of(scene_of(ball, nail, joint), TIME)
-    assert found.position[:, 1] - 3.1 == pytest.approx(
-        0.2 / 2**0.5 * np.sin(2**0.5 * TIME), abs=1e-14
-    )  # roundings of 3 m
+    # roundings of 3 m
+    assert found.position[:, 1] - 3.1 == pytest.approx(0.2 / 2**0.5 * np.sin(2**0.5 * TIME), abs=1e-14)
 
 
 @given(squared=st.floats(1e-3, 1e7), damping=st.floats(0.0, 1e5))

@@ -38,18 +38,10 @@ def swing_of(scene: Scene) -> Swing:
 @pytest.mark.parametrize(
     ("degrees", "rate"),
     [
-        (5, 0.0),
-        (90, 0.0),
-        (170, 0.0),
-        (-60, 2.0),
-        (30, -4.0),
-        (0, 6.0),
-        (0, 6.5),
-        (120, 8.0),
-        (-100, -5.0),
+        (5, 0.0), (90, 0.0), (170, 0.0), (-60, 2.0), (30, -4.0), (0, 6.0), (0, 6.5), (120, 8.0), (-100, -5.0),
         (179.9, 0.0),
     ],
-)
+)  # fmt: skip
 def test_pendulum_agrees_with_dop853(degrees: float, rate: float) -> None:
     solved = integrated(lambda _, s: [s[1], -G * math.sin(s[0])], [math.radians(degrees), rate], TIME)
     found = motion_of(pendulum_scene(degrees, rate), TIME)
@@ -102,9 +94,8 @@ def test_pendulum_at_rest_at_top_or_bottom_stays_at_rest() -> None:
 
 def test_pendulum_without_gravity_rotates_uniformly() -> None:
     found = motion_of(pendulum_scene(90, 2.0, world="duration = 10.0"), TIME)
-    assert found.position == pytest.approx(
-        np.column_stack((np.cos(2 * TIME), np.sin(2 * TIME))), abs=1e-14
-    )  # roundings of 20 rad
+    # roundings of 20 rad
+    assert found.position == pytest.approx(np.column_stack((np.cos(2 * TIME), np.sin(2 * TIME))), abs=1e-14)
 
 
 def test_plank_on_a_pivot_swings_by_its_moment_of_inertia() -> None:

@@ -43,7 +43,6 @@ def test_scene_with_one_unsolvable_body_has_no_solution() -> None:
 def test_contacts_are_sorted_by_time_with_the_pair_of_each_body() -> None:
     scene = scene_of(*MIXED, world=WORLD)
     found = solved_run(scene, scene.solver)
-    assert found is not None
     assert (np.diff(found.contact_time) >= 0.0).all()
     assert found.contact_pair[:, 1].tolist() == [-1] * len(found.contact_pair)
     assert sorted(set(found.contact_pair[:, 0].tolist())) == [0, 1]
@@ -83,7 +82,6 @@ def test_anchor_is_the_single_joint_to_a_static_body_in_either_order() -> None:
     for between in ("'b', 'n'", "'n', 'b'"):
         facts = SceneFacts.of(scene_of(ball, nail, f"[[joint]]\nkind = 'rod'\nbetween = [{between}]\n"))
         anchor = facts.anchor(0)
-        assert anchor is not None
         assert (anchor.place.tolist(), anchor.arm.tolist()) == ([0.0, 2.0], [0.0, 0.0])
     loose = nail.replace("fixed = true\n", "")
     assert SceneFacts.of(scene_of(ball, loose, "[[joint]]\nkind = 'rod'\nbetween = ['b', 'n']\n")).anchor(0) is None

@@ -32,7 +32,6 @@ def stack(columns: int, rows: int, fewer: int, extra: str = "") -> str:
 def test_stack_at_rest_keeps_its_positions(columns: int, rows: int, fewer: int) -> None:
     scene = static_scene(stack(columns, rows, fewer))
     form = solved_run(scene, scene.solver)
-    assert form is not None
     assert (form.position == scene.bodies.position).all()
     assert not form.velocity.any()
 
@@ -40,7 +39,6 @@ def test_stack_at_rest_keeps_its_positions(columns: int, rows: int, fewer: int) 
 def test_tower_carries_its_weight_from_row_to_row() -> None:
     scene = static_scene(stack(1, 20, 0, "mass = 3.0\n"))
     form = solved_run(scene, scene.solver)
-    assert form is not None
     assert form.contact_pair[0].tolist() == [0, -1]
     assert form.contact_impulse[0] == pytest.approx([0.0, -20 * 3.0 * 10.0 * 2.0], rel=1e-14)  # a sum of 20
     above = dict(zip(map(tuple, form.contact_pair.tolist()), form.contact_impulse, strict=True))
@@ -50,7 +48,6 @@ def test_tower_carries_its_weight_from_row_to_row() -> None:
 def test_statically_indeterminate_contact_impulses_are_nan() -> None:
     scene = static_scene(stack(2, 2, 1))
     form = solved_run(scene, scene.solver)
-    assert form is not None
     assert {tuple(pair) for pair in form.contact_pair.tolist()} == {(0, -1), (1, -1), (0, 1), (0, 2), (1, 2)}
     assert np.isnan(form.contact_impulse).any(axis=1).all()
 

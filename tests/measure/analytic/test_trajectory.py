@@ -21,7 +21,6 @@ def drop_scene(extra: str = "", ground: str = GROUND, world: str = "", solver: s
 def test_bounces_have_the_times_and_impulses_of_the_formula() -> None:
     scene = drop_scene("restitution = 0.5")
     form = solved_run(scene, scene.solver)
-    assert form is not None
     # From 5 m at g = 10: at 1 s with 10 m/s, then flights of 1, ½, ¼ … s; over at 3 s.
     expected = [1.0, 2.0, 2.5, 2.75, 2.875, 2.9375, 2.96875, 2.984375]
     assert form.contact_time == pytest.approx(expected, rel=1e-14)  # a sum of eight numbers, exact except for the root
@@ -37,7 +36,6 @@ def test_bounces_have_the_times_and_impulses_of_the_formula() -> None:
 def test_contact_impulses_balance_momentum() -> None:
     scene = drop_scene("restitution = 0.8\nvelocity = [2.0, 1.0]")
     form = solved_run(scene, scene.solver)
-    assert form is not None
     gain = 2.0 * (form.velocity[-1, 0] - form.velocity[0, 0])
     impulse = form.contact_impulse.sum(axis=0)
     # Σ impulses on the ground = weight · time − momentum gain of the ball; a dozen roundings of sums near 120.
@@ -48,7 +46,6 @@ def test_engine_differs_from_closed_form_by_its_known_error() -> None:
     """Explicit Euler lags behind the fall by g·h·T/2 until the first bounce at 1 s."""
     scene = drop_scene("restitution = 0.5")
     form, found = solved_run(scene, scene.solver), run(scene, "pymunk", audit=False)
-    assert form is not None
     before = form.time < 1.0
     error = found.position[before, 0, 1] - form.position[before, 0, 1]
     assert error == pytest.approx(10.0 * 0.01 * form.time[before] / 2.0, abs=1e-12)  # 100 roundings of numbers below 10
@@ -65,17 +62,10 @@ def test_frame_times_are_those_of_an_engine(solver: str) -> None:
 @pytest.mark.parametrize(
     ("name", "has"),
     [
-        ("ball", True),
-        ("bounce", True),
-        ("fireworks", True),
-        ("fast_ball", True),
-        ("circle_half_plane", True),
-        ("two_balls", True),
-        ("bullet", False),
-        ("incline", True),
-        ("gas", False),
+        ("ball", True), ("bounce", True), ("fireworks", True), ("fast_ball", True), ("circle_half_plane", True),
+        ("two_balls", True), ("bullet", False), ("incline", True), ("gas", False),
     ],
-)
+)  # fmt: skip
 def test_closed_form_exists_for_the_expected_shipped_scenes(name: str, has: bool) -> None:
     scene = load(find(name))
     assert (solved_run(scene, scene.solver) is not None) == has
@@ -102,10 +92,8 @@ def test_body_leaving_the_bounds_is_retired_when_an_engine_retires_it() -> None:
         "collides = 'none'", world="bounds = [[-1.0, 0.0], [1.0, 10.0]]", solver="dt = 0.01\nhalf_kick = true"
     )
     form, found = solved_run(scene, scene.solver), run(scene, "pymunk", audit=False)
-    assert form is not None
-    assert (
-        form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(1.05)]
-    )  # first frame with ½·10·t² > 5.5
+    # first frame with ½·10·t² > 5.5
+    assert form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(1.05)]
     assert form.position[-1, 0] == pytest.approx(found.position[-1, 0], abs=1e-12)  # 105 roundings
     assert form.velocity[-1].tolist() == [[0.0, 0.0]]
 
@@ -117,6 +105,5 @@ def test_body_with_expired_lifetime_is_retired_when_an_engine_retires_it() -> No
         "lifetime = 0.305\n"
     )
     form, found = solved_run(scene, scene.solver), run(scene, "pymunk", audit=False)
-    assert form is not None
     assert form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(0.31)] * 3
     assert form.position[-1] == pytest.approx(found.position[-1], abs=1e-12)  # 31 roundings

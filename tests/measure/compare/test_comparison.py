@@ -20,36 +20,9 @@ from sandbox.scene.description.world import DetectionName, IntegratorName, Setti
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 BOUNCE = load(find("bounce"), ["world.duration=2.0"])
-KEYS = [
-    "engine",
-    "status",
-    "reason",
-    "settings",
-    "set",
-    "max_position_error",
-    "rms_position_error",
-    "max_velocity_error",
-    "rms_velocity_error",
-    "energy_drift",
-    "momentum_drift",
-    "first_divergence",
-    "matched_contacts",
-    "missed_contacts",
-    "phantom_contacts",
-    "contacts_after_divergence",
-    "max_contact_delay",
-    "trusted_until",
-    "seconds",
-    "energy_against",
-    "events",
-    "missed",
-    "phantom",
-    "why",
-    "verdict",
-]
 
 
 @dataclass(frozen=True)
@@ -87,7 +60,6 @@ def test_explicit_euler_error_is_half_a_step_of_velocity() -> None:
     # Above 5 mm, 1 % of the radius, from T = 2·0.005/(g·h) = 0.102 s on.
     assert row.first_divergence == pytest.approx(0.11, rel=1e-12)
     assert row.count("matched") == row.count("missed") == row.count("phantom") == 0
-    assert row.seconds is not None
     assert row.seconds > 0
 
 
@@ -101,29 +73,7 @@ def test_bounce_is_matched_with_its_delay() -> None:
     (event,) = row.events or ()
     assert event.between == ("ball", "ground")
     assert event.time == pytest.approx(1.0096375546923, rel=1e-12)  # √(2·5/9.81)
-    assert event.delta_time is not None
     assert 0.0 < event.delta_time < 0.002  # late by g·h·T/2 over v = 0.5 ms, and by one step of detection
-
-
-def test_document_has_exactly_the_documented_keys() -> None:
-    document = compare(BOUNCE, ["pymunk"]).document("bounce")
-    expected = [
-        "scene",
-        "title",
-        "truth",
-        "truth_about",
-        "truth_confirmed_by",
-        "trusted_until",
-        "truth_difference",
-        "duration",
-        "tolerance",
-        "engines",
-        "interrupted",
-    ]
-    assert list(document) == expected
-    assert list(document["engines"][0]) == KEYS
-    assert (document["scene"], document["title"]) == ("bounce", "Bounce")
-    assert document["engines"][0]["settings"]["integrator"] == "explicit_euler"
 
 
 def test_engine_that_refuses_is_a_row_with_its_reason() -> None:
@@ -168,7 +118,6 @@ def test_exact_stopped_by_its_limit_is_replaced_by_a_refined_truth(monkeypatch: 
     monkeypatch.setattr(truth_module, "EXACT_LIMIT", -1.0)
     scene = load(find("two_balls"), ["solver.dt=0.01", BOUNDED])
     truth = truth_of(scene, scene.solver, 1e-3)
-    assert truth is not None
     assert truth.kind == "refined"
     assert "; exact was stopped: more counted work than" in truth.about
 
@@ -177,20 +126,7 @@ def test_truth_does_not_depend_on_the_compared_settings(monkeypatch: pytest.Monk
     install(monkeypatch)
     scene = load(find("newtons_cradle"), ["world.duration=0.4", BOUNDED])
     rough, fine = (compare(scene, ["pymunk"], iterations=n, slop=s) for n, s in ((2, 0.01), (20, 0.0)))
-    assert rough.best is not None
-    assert fine.best is not None
     assert (rough.best.trajectory.position == fine.best.trajectory.position).all()
-
-
-def test_refined_truth_agrees_with_the_known_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch)
-    scene = load(find("two_balls"), ["solver.dt=0.01", BOUNDED])
-    truth = truth_of(scene, scene.solver, 1e-3)
-    assert truth is not None
-    assert (truth.kind, truth.trusted_until) == ("refined", 1.0)
-    # They collide at 0.375 s and separate at 2.5 and 4.5 m/s; the last refinement may err by a tenth of the tolerance.
-    assert truth.trajectory.position[-1, 0, 0] == pytest.approx(-2.0 + 4.0 * 0.375 + 2.5 * 0.625, abs=2e-4)
-    assert truth.trajectory.position[-1, 1, 0] == pytest.approx(4.5 * 0.625, abs=2e-4)  # likewise
 
 
 def test_missed_wall_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,12 +145,11 @@ def test_why_names_half_kick_and_the_effect_of_finer_steps() -> None:
     assert tried["integrator", "rk4"].status == "refused"
     assert tried["detection", "swept"].status == "refused"
     assert tried["half_kick", True].max_position_error == pytest.approx(0.0, abs=1e-12)  # roundings of 10 m
-    assert row.verdict is not None
     assert row.verdict.startswith("pymunk: the most effective change is half_kick = True: ")
     assert not any(" and " in effect.label for effect in row.why)  # a single change suffices
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_why_combines_two_methods_if_neither_suffices_alone() -> None:
     """A bounce is exact to rounding with both exact flight and exact impact times, and with neither alone."""
     (row,) = compare(BOUNCE, ["reference"], why=True).rows
@@ -223,7 +158,6 @@ def test_why_combines_two_methods_if_neither_suffices_alone() -> None:
     alone = min(tried[flight].ratio or 0.0, tried[impact].ratio or 0.0)
     both = tried[f"{flight} and {impact}"]
     assert alone > 0.1
-    assert both.ratio is not None
     assert both.ratio < 1e-6 * alone
     assert dict(both.changes) == {"integrator": "velocity_verlet", "detection": "bisect"}
     assert row.verdict is not None
@@ -302,11 +236,6 @@ def test_diverged_engine_is_a_row_with_its_status() -> None:
 def test_tolerance_out_of_range_is_rejected(tolerance: float) -> None:
     with pytest.raises(ValueError, match="positive and finite"):
         compare(BOUNCE, ["pymunk"], tolerance=tolerance)
-
-
-def test_unknown_engine_is_an_error() -> None:
-    with pytest.raises(registry.UnknownEngineError, match="unknown engine 'nonsense'"):
-        sandbox.compare(BOUNCE, engines=["nonsense"])
 
 
 def test_progress_names_each_stage_of_a_comparison() -> None:

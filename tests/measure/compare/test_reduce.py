@@ -15,7 +15,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import shipped
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 TUNNEL = """
 title = "Tunnel"
@@ -148,7 +148,6 @@ def test_tunnelling_bullet_is_reduced_to_itself_and_its_wall() -> None:
     assert (scene.materials, scene.grids, len(scene.walls[0].points)) == ((), (), 2)
     assert scene.world.duration < 0.02
     assert scene.solver == loads(TUNNEL).solver
-    assert found.divergence is not None
     assert (found.divergence.body, found.divergence.time) == ("bullet", 0.01)  # the wall is 11 cm away, a step is 10 cm
     assert shows_divergence(scene)
     assert minimise(scene, BOTH).bodies == (1, 1)
@@ -176,11 +175,6 @@ def test_single_engine_is_compared_with_the_truth() -> None:
     assert found.bodies == (11, 2)
     assert str(test) == "pymunk and the truth"
     assert shows_divergence(found.scene, test)
-
-
-def test_reduction_is_deterministic() -> None:
-    first, second = reduced(TUNNEL), minimise(loads(TUNNEL), BOTH)
-    assert (dumps(first.scene), first.runs) == (dumps(second.scene), second.runs)
 
 
 def test_scene_without_disagreement_is_not_reduced() -> None:
@@ -275,9 +269,8 @@ def test_irreproducible_divergence_leaves_the_scene_unchanged(monkeypatch: pytes
     original = test.of
 
     def irreproducible(scene: Scene, time_limit: float = math.inf) -> DivergencePoint | None:
-        return (
-            None if time_limit == math.inf else original(scene, time_limit)
-        )  # only the final check is not limited in time
+        # only the final check is not limited in time
+        return None if time_limit == math.inf else original(scene, time_limit)
 
     monkeypatch.setattr(test, "of", irreproducible)
     found = minimise(loads(TUNNEL), test, max_scenes=5)
@@ -291,7 +284,6 @@ def test_scene_that_diverges_earlier_is_not_accepted() -> None:
     found = reduced(ROLLING, test)
     assert (found.scene.bodies.names, found.scene.fixed_names) == (("rolling",), ("thin",))
     assert found.scene.world.gravity == (0.0, 0.0)  # so that the floor could be removed after all
-    assert found.divergence is not None
     assert found.divergence.time >= 0.8 * 0.31
     assert shows_divergence(found.scene, test)
 

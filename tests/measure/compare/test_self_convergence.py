@@ -10,14 +10,13 @@ from sandbox.cli.compare import _accuracy_lines, _joint_order
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 
 def test_free_flight_with_quadratic_drag_is_refined_by_rk4() -> None:
     """The truth of smooth motion must be of order 4 to be better than the integrators that it judges."""
     scene = load(find("projectile"), ["world.quadratic_drag=0.1"])
     truth = truth_of(scene, scene.solver, 1e-3)
-    assert truth is not None
     # Independent: the same motion by scipy at a relative tolerance of 1e-12.
     y0, v0 = scene.bodies.position[0], scene.bodies.velocity[0]
     factor = scene.world.quadratic_drag  # 1/m

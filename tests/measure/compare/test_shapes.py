@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from sandbox.engines.registry import ENGINES
@@ -11,15 +10,12 @@ from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.measure.compare.attribution import setting_changes
 from sandbox.measure.compare.comparison import compare
 from sandbox.measure.compare.self_convergence import refine
-from sandbox.measure.metrics.clearance import clearance
-from sandbox.measure.metrics.invariants import energy_drift, momentum_drift
-from sandbox.measure.metrics.perturbation import PERTURBATION, perturb
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 PENDULUM = (
     "[world]\ngravity = [0.0, -9.81]\nduration = 1.0\n[solver]\ndt = 0.01\n"
@@ -51,23 +47,11 @@ def tower(boxes: int) -> Scene:
 def test_refined_truth_of_a_sliding_crate_agrees_with_the_formula() -> None:
     scene = sliding(0.3)
     truth = refine(scene, scene.solver, default_tolerance(scene))
-    assert truth is not None
     assert truth.agrees_until == 0.5
     distance = -(truth.trajectory.position[:, 0] - scene.bodies.position[0]) @ (math.cos(SLOPE), math.sin(SLOPE))
     expected = 0.5 * 9.81 * (math.sin(SLOPE) - 0.3 * math.cos(SLOPE)) * truth.trajectory.time**2
-    assert distance == pytest.approx(
-        expected, abs=0.1 * default_tolerance(scene)
-    )  # agreement of successive refinements
-
-
-def test_refined_pendulum_is_at_the_bottom_after_a_quarter_period() -> None:
-    scene = loads(PENDULUM)
-    truth = refine(scene, scene.solver, 1e-3)
-    assert truth is not None
-    assert truth.agrees_until == 1.0
-    # From the horizontal the period at 1 m is 2.3678419 s: after a quarter the bob is below its anchor.
-    x = np.interp(2.3678419 / 4.0, truth.trajectory.time, truth.trajectory.position[:, 0, 0])
-    assert x == pytest.approx(0.0, abs=3e-4)  # agreement, and interpolation over 4.4 m/s · 10 ms: 1e-4 m
+    # agreement of successive refinements
+    assert distance == pytest.approx(expected, abs=0.1 * default_tolerance(scene))
 
 
 def test_joint_method_is_a_setting_that_lowers_the_error_of_a_pendulum() -> None:
@@ -78,7 +62,6 @@ def test_joint_method_is_a_setting_that_lowers_the_error_of_a_pendulum() -> None
         assert row.momentum_drift is None  # the rod's pull on the world is not recorded
         assert (row.count("missed"), row.count("phantom")) == (0, 0)
     tried = {(effect.setting, effect.value): effect for effect in found.rows[1].why}
-    assert tried["joints", "rattle"].ratio is not None
     assert tried["joints", "rattle"].ratio < 0.2
     assert found.rows[1].verdict is not None
     assert "joints = rattle" in found.rows[1].verdict
@@ -100,36 +83,6 @@ def test_tower_has_lasting_contacts_and_no_energy_drift() -> None:
     assert row.first_divergence is None
     assert row.energy_drift is None
     assert row.momentum_drift == pytest.approx(0.0, abs=1e-9)  # Σ impulses of the ground = weight · time, to rounding
-
-
-def test_clearances_of_rotated_boxes() -> None:
-    scene = loads(
-        "[[plane]]\nname = 'p'\npoint = [0, -1]\nnormal = [0, 1]\n"
-        "[[wall]]\nname = 'w'\npoints = [[3, -1], [3, 1]]\nthickness = 0.2\n"
-        "[[post]]\nname = 'q'\nposition = [0, 3]\nradius = 0.5\n"
-        "[[ball]]\nname = 'ball'\nposition = [-2, 0]\nradius = 0.25\n"
-        "[[box]]\nname = 'box'\nposition = [0, 0]\nsize = [2.0, 1.0]\n"
-    )
-    bodies, root = scene.bodies, math.sqrt(1.25)
-    position = np.tile(bodies.position, (3, 1, 1))
-    angle = np.array([[0.0, 0.0], [0.0, math.pi / 2], [0.0, math.atan2(1.0, 2.0)]])
-    gaps = {k: clearance(scene, bodies, position, angle, (1, k)) for k in (-1, -2, -3)}
-    # Flat, upright, and with a corner to the right; on its diagonal, top and bottom are 2·sin + cos apart.
-    half_height = math.sin(angle[2, 1]) + 0.5 * math.cos(angle[2, 1])
-    assert gaps[-1] == pytest.approx([0.5, 0.0, 1.0 - half_height], abs=1e-15)  # sines
-    assert gaps[-2] == pytest.approx([1.9, 2.4, 2.9 - root], abs=1e-15)  # likewise
-    assert gaps[-3][:2] == pytest.approx([2.0, 1.5], abs=1e-15)  # likewise
-    assert clearance(scene, bodies, position, angle, (0, 1))[:2] == pytest.approx([0.75, 1.25], abs=1e-15)  # likewise
-
-
-def test_perturbation_displaces_a_box_and_keeps_its_joints() -> None:
-    scene = loads(PENDULUM.replace("[[ball]]", "[[box]]").replace("radius = 0.1", "size = [0.2, 0.2]"))
-    other = perturb(scene)
-    assert other is not None
-    assert np.hypot(*(other.bodies.position - scene.bodies.position)[0]) == pytest.approx(
-        PERTURBATION, rel=1e-3
-    )  # 1 + 1e-12
-    assert other.links.figures.tolist() == scene.links.figures.tolist()
 
 
 @pytest.mark.parametrize(
@@ -162,7 +115,6 @@ def test_closed_form_of_a_falling_box_is_valid_until_a_corner_touches() -> None:
     )
     assert solved_run(scene, scene.solver) is None  # it may hit the plane, and is no ball
     form = closed_form(run(scene, audit=False), scene, 0)
-    assert form is not None
     last = form.valid.nonzero()[0][-1] * 0.001
     # It falls until its centre is half a diagonal above the ground: ½·10·t² = 3 − √½.
     assert last == pytest.approx(math.sqrt((3.0 - math.sqrt(0.5)) / 5.0), abs=0.0011)  # a step
@@ -171,18 +123,4 @@ def test_closed_form_of_a_falling_box_is_valid_until_a_corner_touches() -> None:
         "[[box]]\nname = 'b'\nposition = [0, 3]\nsize = [1, 1]\nangular_velocity = 2.0\n"
     )
     whole = solved_run(free, free.solver)
-    assert whole is not None
     assert whole.angle[-1, 0] == pytest.approx(2.0, rel=1e-15)  # a product
-
-
-def test_energy_drift_includes_the_energy_of_a_spring() -> None:
-    scene = loads(
-        "[world]\nduration = 0.9\n[solver]\ndt = 0.001\n[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 0.1\n"
-        "[[ball]]\nname = 'b'\nposition = [2, 0]\nradius = 0.1\n"
-        "[[joint]]\nkind = 'spring'\nbetween = ['a', 'b']\nrest_length = 1.0\nstiffness = 50.0\n"
-    )
-    found = run(scene, audit=False)
-    fraction, _ = energy_drift(found, scene, None, False)
-    # ω = 10: within the band ωh/2 of the scheme; without the stored energy the drift would be of order 1.
-    assert fraction == pytest.approx(0.0, abs=0.005)
-    assert momentum_drift(found, scene) == pytest.approx(0.0, abs=1e-12)  # equal and opposite forces

@@ -5,7 +5,7 @@ import pytest
 import sandbox
 from sandbox.scene.compile.scene import Scene
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 FALL = """
 title = "Fall"
@@ -34,7 +34,6 @@ def test_integrator_sweep_has_rows_of_the_only_engine_with_all_of_them(fall: Sce
     euler, other, rk4 = (row.score.max_position for row in found.rows)
     # g·h·T/2 = 10 · 0.01 · 0.5 / 2 m, behind and ahead; rk4 is exact for a parabola.
     assert (euler, other) == (pytest.approx(0.025, rel=1e-9), pytest.approx(0.025, rel=1e-9))
-    assert rk4 is not None
     assert rk4 < 1e-12
     assert (found.truth, len(found.trajectories)) == ("closed_form", 3)
     assert list(found.trajectories) == [row.name for row in found.rows]
@@ -64,13 +63,6 @@ def test_sweeps_are_combined_and_each_changed_scene_has_its_truth(fall: Scene) -
 def test_every_engine_that_can_run_all_values_is_compared(fall: Scene) -> None:
     found = sandbox.compare(fall, sweep={"solver.dt": [0.01, 0.005]})
     assert [row.engine for row in found.rows] == [*sandbox.ENGINES, *sandbox.ENGINES]
-
-
-def test_document_has_the_swept_values_of_each_row(fall: Scene) -> None:
-    found = sandbox.compare(fall, ["reference"], sweep={"solver.integrator": ["rk4", "leapfrog"]})
-    rows = found.document()["engines"]
-    assert [row["set"] for row in rows] == [{"solver.integrator": "rk4"}, {"solver.integrator": "leapfrog"}]
-    assert [(row["truth"], row["trusted_until"]) for row in rows] == [("closed_form", 0.5)] * 2
 
 
 def test_representation_lists_the_rows_in_few_lines(fall: Scene) -> None:

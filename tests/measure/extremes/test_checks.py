@@ -87,9 +87,7 @@ def test_run_without_motion_violates_no_rule() -> None:
         ("settles", RESTING, {"velocity": speeds(1, 0, 10, 0.1)}, "'a' still moves at 0.1 m/s after 1 s"),
     ],
 )
-def test_violated_rule_is_reported_with_its_reason(
-    rule: str, document: dict[str, Any], arrays: dict[str, Any], words: str
-) -> None:
+def test_violated_rule_is_reported_with_its_reason(rule, document, arrays, words):
     evidence = run_under_test(document, {rule}, **arrays)
     violation = RULES[rule](evidence)
     assert violation is not None

@@ -9,7 +9,7 @@ from sandbox.measure.extremes.isolation import MAX_ATTEMPTS, IsolatedWorker, Wor
 from sandbox.measure.extremes.outcome import Task
 from sandbox.measure.extremes.worker import exit_text
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 MISBEHAVING = """
 import ctypes, os, signal, sys, time

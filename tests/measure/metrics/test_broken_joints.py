@@ -10,8 +10,6 @@ from sandbox.engines.common.energy_balance import energy_of
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.invariants import joint_error, joint_errors
 from sandbox.measure.run.runner import run
-from sandbox.measure.run.sessions import rerun
-from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame, Trajectory
@@ -114,8 +112,6 @@ def test_broken_rod_has_no_error(engine: str) -> None:
     assert not np.isnan(errors[~broken, 2]).any()
     whole = joint_error(found, scene())
     unbroken = joint_error(Trajectory(**{**vars(found), "broken_time": np.empty(0)}), scene())
-    assert whole is not None
-    assert unbroken is not None
     assert whole < 0.01 < unbroken  # of its length: the intact rod, and the broken one
 
 
@@ -128,15 +124,6 @@ def test_break_times_are_stored_and_older_files_load_as_unbroken(engine: str, tm
         older = {name: arrays[name] for name in arrays.files if name != "broken_time"}
     np.savez(tmp_path / "older.npz", **older)
     assert Trajectory.load(tmp_path / "older.npz").breaks(3).tolist() == [np.inf] * 3
-
-
-@every_engine
-def test_replay_breaks_the_same_joints_at_the_same_times(engine: str) -> None:
-    first = run(scene(), engine)
-    session = Recording(scene(), engine, scene().solver, (), 1.0, first.info["state_hash"])
-    again = rerun(Recording.from_json(session.to_json()))
-    assert again.info["state_hash"] == first.info["state_hash"]
-    assert np.array_equal(again.broken_time, first.broken_time, equal_nan=True)
 
 
 def test_row_counts_broken_joints() -> None:

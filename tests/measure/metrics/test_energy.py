@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from sandbox.measure.analytic import bounces
 from sandbox.measure.metrics import energy
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.scene import Scene
@@ -118,21 +117,6 @@ def test_chunk_size_does_not_change_energies(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(energy, "CHUNK", 21)
     for a, b in zip(whole, energies(run, scene), strict=True):
         assert a == pytest.approx(b, rel=1e-15, nan_ok=True)  # products may be summed in a different order
-
-
-def test_energy_of_a_bouncing_ball_falls_by_e_squared() -> None:
-    scene = loads("[world]\ngravity = [0.0, -9.81]\n[[ball]]\nposition = [0.0, 5.0]\nradius = 0.5\n")
-    time = np.linspace(0.0, 3.0, 301)
-    height, speed = bounces(time, 5.0, 0.0, 9.81, 0.8)
-    run = resting_run(
-        scene,
-        301,
-        time=time,
-        position=np.column_stack((0 * time, height))[:, None],
-        velocity=np.column_stack((0 * time, speed))[:, None],
-    )
-    levels = np.where(time < 1.0096376, 1.0, np.where(time < 1.0096376 * 2.6, 0.64, 0.4096)) * 5.0 * 9.81
-    assert energies(run, scene).total == pytest.approx(levels, rel=1e-13)  # a dozen roundings in heights and speeds
 
 
 def test_no_bodies_and_no_frames_have_no_energy() -> None:

@@ -54,22 +54,17 @@ GROOVE = 'kind = "groove"\ngroove = [[0.0, 0.0], [0.0, 4.0]]'
         ('kind = "gear"\nratio = 2.0', (9.0, 9.0), 0.5, 1.0),
     ],
 )
-def test_joint_error_is_the_distance_from_its_constraint(
-    joint: str, position: tuple[float, float], angle: float, error: float
-) -> None:
+def test_joint_error_is_the_distance_from_its_constraint(joint, position, angle, error):
     assert error_at(joint, position, angle) == pytest.approx(error, abs=1e-15)  # rounding of sines of right angles
 
 
 @pytest.mark.parametrize(
     "joint",
     [
-        'kind = "spring"\nstiffness = 1.0',
-        'kind = "motor"\nrate = 1.0',
-        'kind = "ratchet"\nratchet = 1.0',
-        'kind = "pivot"\nat = [1.5, 0.0]\nmax_force = 5.0',
-        'kind = "pivot"\nat = [1.5, 0.0]\nmax_bias = 0.0',
+        'kind = "spring"\nstiffness = 1.0', 'kind = "motor"\nrate = 1.0', 'kind = "ratchet"\nratchet = 1.0',
+        'kind = "pivot"\nat = [1.5, 0.0]\nmax_force = 5.0', 'kind = "pivot"\nat = [1.5, 0.0]\nmax_bias = 0.0',
     ],
-)
+)  # fmt: skip
 def test_springs_motors_and_joints_that_give_way_have_no_joint_error(joint: str) -> None:
     assert math.isnan(error_at(joint, (9.0, 9.0)))
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
@@ -94,9 +89,8 @@ def test_largest_error_is_a_fraction_of_a_length(joint: str, fraction: float) ->
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
     moved = resting_run(scene).position
     moved[2, 1] = (4.0, 0.0)
-    assert joint_error(resting_run(scene, position=moved), scene) == pytest.approx(
-        fraction, rel=1e-14
-    )  # a few roundings
+    # a few roundings
+    assert joint_error(resting_run(scene, position=moved), scene) == pytest.approx(fraction, rel=1e-14)
 
 
 def test_diverged_joint_has_infinite_error() -> None:

@@ -48,9 +48,8 @@ stiffness = 200.0
 def test_springs_store_half_k_times_their_strain_squared() -> None:
     scene = loads(SPRINGS)
     # ½·10·(5 − 2)² + ½·8·1² + ½·200·(0.5 − 0.2)²
-    assert energies(resting_run(scene), scene).potential == pytest.approx(
-        [45.0 + 4.0 + 9.0] * 4, rel=1e-15
-    )  # sums of 3
+    # sums of 3
+    assert energies(resting_run(scene), scene).potential == pytest.approx([45.0 + 4.0 + 9.0] * 4, rel=1e-15)
 
 
 def test_spring_with_a_largest_force_stores_its_work() -> None:
@@ -109,9 +108,8 @@ softening = {softening}
 def test_attraction_potential_equals_its_integral(toward: str, softening: float, depth: float) -> None:
     """∫ s/(r² + ε²) dr from r to infinity: s/r, or (s/ε)·(π/2 − atan(r/ε))."""
     scene = loads(ATTRACTED.format(mass=1.0, fixed="true", toward=toward, softening=softening))
-    assert energies(resting_run(scene), scene).potential == pytest.approx(
-        [-2.0 * depth] * 4, rel=1e-14
-    )  # a few roundings
+    # a few roundings
+    assert energies(resting_run(scene), scene).potential == pytest.approx([-2.0 * depth] * 4, rel=1e-14)
 
 
 def test_attraction_between_two_moving_bodies_counts_once() -> None:
@@ -121,7 +119,7 @@ def test_attraction_between_two_moving_bodies_counts_once() -> None:
     assert [energies(trajectory, scene, body=n).potential[0] for n in range(2)] == [-2.0, -2.0]
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize(
     ("text", "band"),
@@ -139,15 +137,8 @@ def test_attraction_between_two_moving_bodies_counts_once() -> None:
             "[[attraction]]\ntoward = [0.0, 0.0]\nstrength = 1.0\n",
             0.003 * 1.5,
         ),
-        # A pair about its common centre: 1.5 times the values above.
-        (
-            '[[ball]]\nname = "b"\nposition = [0.75, 0]\nvelocity = [0, 0.5]\nradius = 0.01\n'
-            '[[ball]]\nname = "s"\nposition = [-0.75, 0]\nvelocity = [0, -0.5]\nradius = 0.01\n'
-            '[[attraction]]\ntoward = "s"\nstrength = 1.0\n',
-            0.01,
-        ),
     ],
-    ids=["spring", "Kepler", "pair"],
+    ids=["spring", "Kepler"],
 )
 def test_energy_stays_within_the_band_of_the_scheme(engine: str, text: str, band: float) -> None:
     scene = loads(f"[world]\nduration = 6.0\n[solver]\ndt = 0.001\nrecord_every = 10\n{text}")

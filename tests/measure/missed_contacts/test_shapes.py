@@ -1,10 +1,14 @@
-"""Missed contacts of other shapes than balls, by their largest inner disc, and of joined pairs."""
+"""Missed contacts of other shapes than balls, of joined pairs and on layers, and the history of contacts."""
+
+from typing import Any
 
 import numpy as np
 import pytest
 
+import sandbox
+from sandbox.measure.missed_contacts.contact_history import ContactHistory
 from sandbox.measure.run.runner import run
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import from_document, loads
 from sandbox.trajectory import Trajectory
 
 WALL = "[[wall]]\nname = 'w'\npoints = [[0, -5], [0, 5]]\n"
@@ -81,3 +85,74 @@ def test_limbs_of_a_ragdoll_do_not_miss_each_other() -> None:
     )
     own = {n for n, name in enumerate(scene.bodies.names) if name.startswith("doll")}
     assert not any(set(pair) <= own for pair in run(scene).missed_pair.tolist())
+
+
+PAIRS = np.array([[3, 7], [0, -1], [999_999, -1_000_000], [5, 6]])
+
+
+def test_pair_is_found_in_its_own_step_only():
+    history = ContactHistory()
+    history.add(PAIRS[:2])
+    history.add(PAIRS[2:])
+    when = np.array([0, 1, 0, 1])
+    assert history.found(when, PAIRS[[0, 0, 2, 2]]).tolist() == [True, False, False, True]
+
+
+def test_no_pair_is_found_in_a_step_without_contacts():
+    history = ContactHistory()
+    history.add(np.empty((0, 2), np.int64))
+    assert history.found(np.zeros(4, np.int64), PAIRS).tolist() == [False] * 4
+
+
+def test_pairs_with_adjacent_indices_are_distinguished():
+    history = ContactHistory()
+    history.add(np.array([[1, 0], [0, 5]]))
+    pairs = np.array([[0, 1], [1, -1], [0, 4], [0, 6], [0, 5]])
+    assert history.found(np.zeros(5, np.int64), pairs).tolist() == [False] * 4 + [True]
+
+
+def test_forget_keeps_the_last_step_and_add_copies_its_pairs():
+    history, pairs = ContactHistory(), PAIRS.copy()
+    history.add(PAIRS[:1])
+    history.add(pairs)
+    pairs[:] = 0
+    history.forget()
+    assert len(history) == 1
+    assert history.found(np.zeros(4, np.int64), PAIRS).all()
+
+
+both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+
+LAYERED_WALL = {"points": [[0.5, -1], [0.5, 1]], "layers": ["up"]}
+POST = {"position": [0.5, 0.0], "radius": 0.01, "layers": ["up"]}
+PLANE = {"point": [0.5, 0.0], "normal": [-1.0, 0.0], "layers": ["up"]}
+TARGET = {"position": [0.5, 0.0], "radius": 0.01, "layer": "up"}
+BULLET: dict[str, Any] = {"position": [0.0, 0.0], "velocity": [70.0, 0.0], "radius": 0.01}
+
+
+@both
+@pytest.mark.parametrize("thing", ["wall", "post", "ball"])
+@pytest.mark.parametrize(("layer", "missed"), [("ground", 0), ("up", 1)])
+def test_bullet_misses_only_shapes_of_its_own_layer(engine: str, thing: str, layer: str, missed: int) -> None:
+    more: dict[str, Any] = {"wall": {"wall": [LAYERED_WALL]}, "post": {"post": [POST]}, "ball": {}}[thing]
+    balls = [{**BULLET, "layer": layer}, *([TARGET] if thing == "ball" else [])]
+    run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": balls, **more}), engine)
+    assert run.missed_contacts == missed
+
+
+@both
+def test_body_is_audited_on_its_new_layer_after_a_change(engine: str) -> None:
+    zone = {"position": [0.0, 0.0], "radius": 0.05, "to_layer": "up"}
+    run = sandbox.run(
+        from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [LAYERED_WALL], "zone": [zone]}), engine
+    )
+    assert run.missed_contacts == 1
+
+
+@both
+def test_plane_of_another_layer_is_not_missed(engine: str) -> None:
+    for layer in ("ground", "up"):
+        ball = {**BULLET, "layer": layer}
+        run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [ball], "plane": [PLANE]}), engine)
+        assert run.missed_contacts == 0
+        assert len(run.contact_time) == (layer == "up")

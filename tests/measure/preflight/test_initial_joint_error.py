@@ -4,7 +4,8 @@ import pytest
 
 from sandbox.measure.preflight import Diagnostic, warnings
 from sandbox.scene.files.load import load, loads
-from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
+from sandbox.scene.files.shipped_scenes import find
+from tests.samples import each_shipped_scene
 
 TWO = """
 [[ball]]
@@ -78,6 +79,6 @@ def test_worst_violated_joint_is_named_and_the_others_are_counted() -> None:
     assert warning.details == {"joint": "joint-2", "error": pytest.approx(2.0), "others": 2}
 
 
-@pytest.mark.parametrize("scene", [each for each in shipped() if "joints/" in each.name], ids=lambda each: each.name)
-def test_no_shipped_scene_starts_with_violated_joints(scene: ShippedScene) -> None:
-    assert not {"joint_start", "anchors"} & {w.kind for w in warnings(load(scene.path))}
+@pytest.mark.parametrize("name", [each for each in each_shipped_scene() if "joints/" in each.values[0]])
+def test_no_shipped_scene_starts_with_violated_joints(name: str) -> None:
+    assert not {"joint_start", "anchors"} & {w.kind for w in warnings(load(find(name)))}

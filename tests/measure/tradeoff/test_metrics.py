@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.measure.run.runner import run as run_scene
-from sandbox.measure.tradeoff.metrics import METRICS, default_zoom, displacement, measure_all
+from sandbox.measure.tradeoff.metrics import default_zoom, displacement, measure_all
 from sandbox.measure.tradeoff.objective import choose_metric
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
@@ -68,7 +68,6 @@ def test_non_finite_state_has_a_huge_error(scene: Scene, bad: float) -> None:
     found = measure_all(run, context_of(scene, run_of(scene, contacts=[(0.5, (0, -1))])))
     for name in ("max_position", "final_position", "bounce_height", "drift", "settle_time"):
         value = found[name]
-        assert value is not None
         assert value > 1e100
     assert not any(value is not None and math.isnan(value) for value in found.values())
 
@@ -119,9 +118,8 @@ def test_penetration_is_the_deepest_of_pairs_with_contacts(scene: Scene) -> None
     position = shifted(run_of(scene), 4, 0, (0.0, -4.6))  # centre 0.4 m above the ground, radius 0.5 m
     assert measure_all(run_of(scene, position), context_of(scene))["penetration"] is None  # no contact was recorded
     touched = run_of(scene, position, contacts=[(0.4, (0, -1)), (0.5, (1, -1))])
-    assert measure_all(touched, context_of(scene))["penetration"] == pytest.approx(
-        0.1, rel=1e-12
-    )  # rounding of 5 − 4.6
+    # rounding of 5 − 4.6
+    assert measure_all(touched, context_of(scene))["penetration"] == pytest.approx(0.1, rel=1e-12)
     clear = run_of(scene, contacts=[(0.4, (0, -1))])
     assert measure_all(clear, context_of(scene))["penetration"] == 0.0
 
@@ -217,10 +215,6 @@ def test_final_position_is_of_the_last_frame_with_a_body(scene: Scene) -> None:
     truth = run_of(scene, retired=[0.95, 0.95, np.nan])
     run = run_of(scene, shifted(truth, slice(None), 0, (0.5, 0.0)), retired=[0.95, 0.95, np.nan])
     assert measure_all(run, context_of(scene, truth))["final_position"] == 0.5
-
-
-def test_each_metric_has_its_name_and_a_description() -> None:
-    assert all(name == metric.name and metric.about for name, metric in METRICS.items())
 
 
 def test_default_zoom_fits_the_scene_into_the_window() -> None:

@@ -1,16 +1,19 @@
-"""Recommendations: the cheapest setting within the tolerance, and the most accurate one within the budget."""
+"""Pareto fronts and recommendations: the cheapest setting within a tolerance, the most accurate one within a budget."""
 
 import math
+from itertools import pairwise
 from random import Random
 
 import pymunk
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sandbox.engines.pymunk_adapter.colliders import new_space
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.objective import Objective
+from sandbox.measure.tradeoff.objective import Objective, is_dominated, pareto
 from sandbox.measure.tradeoff.recommendation import (
     label,
     nearest_to_budget,
@@ -32,7 +35,6 @@ def never(_: Evaluation) -> float:
 
 def test_cheapest_within_the_tolerance_is_recommended() -> None:
     found = recommend_cheapest(POINTS, OBJECTIVE, (), never)
-    assert found is not None
     assert (found.point, found.fresh_seeds, found.fresh_error) == (POINTS[1], (), None)
 
 
@@ -44,7 +46,6 @@ def test_setting_that_fails_on_fresh_seeds_is_skipped() -> None:
         return {10.0: 0.011, 20.0: 0.009}[point.cost or 0.0]
 
     found = recommend_cheapest(POINTS, OBJECTIVE, (4, 5, 6), error_on_fresh_seeds)
-    assert found is not None
     assert (found.point, found.fresh_seeds, found.fresh_error) == (POINTS[2], (4, 5, 6), 0.009)
     assert rerun == POINTS[1:3]
     assert "9 mm with other seeds" in found.sentence
@@ -60,7 +61,6 @@ def test_times_within_the_noise_are_decided_by_counted_work() -> None:
         numbers = zip(engines, costs, (3.0, 2.0, 1.0), strict=True)
         points = [point_of(cost, 0.0, engine, counted=counted) for engine, cost, counted in numbers]
         found = recommend_cheapest(points, OBJECTIVE, (), never)
-        assert found is not None
         return found.point.counted
 
     for engines in ("aaa", "abc"):
@@ -76,7 +76,6 @@ def test_setting_with_fewer_changes_is_preferred_at_equal_time_and_work() -> Non
     plain = point_of(10.4, 0.001, counted=10.4, substeps=2)
     points = [point_of(10.0, 0.002, counted=10.0, substeps=2, half_kick=True), plain]
     found = recommend_cheapest(points, OBJECTIVE, (), never)
-    assert found is not None
     assert found.point is plain
 
 
@@ -86,21 +85,17 @@ def test_timing_noise_does_not_change_the_recommendation() -> None:
         points = [point_of(c * noise.uniform(1.0, 1.2), e, counted=c) for c, e in ((10.0, 0.009), (20.0, 0.001))]
         points.append(point_of(11.0 * noise.uniform(1.0, 1.2), 0.002, counted=11.0))
         found = recommend_cheapest(points, OBJECTIVE, (), never)
-        assert found is not None
         assert found.point.counted == 10.0
 
 
 def test_cost_measured_with_recording_is_not_compared() -> None:
     found = recommend_cheapest([point_of(1.0, 0.0, repeats=0), point_of(9.0, 0.0)], OBJECTIVE, (), never)
-    assert found is not None
     assert found.point.cost == 9.0
 
 
 def test_nearest_to_tolerance_is_most_accurate_and_to_budget_cheapest() -> None:
     objective = OBJECTIVE._replace(tolerance=1e-9, budget=1e-9)
     near, cheap = nearest_to_tolerance(POINTS, objective), nearest_to_budget(POINTS, objective)
-    assert near is not None
-    assert cheap is not None
     assert (near.point, cheap.point) == (POINTS[3], POINTS[0])
     assert "ms per frame" in cheap.sentence
     assert nearest_to_tolerance([point_of(1.0, None)], objective) is None
@@ -127,15 +122,6 @@ def test_pymunk_lines_configure_a_space_as_the_engine_does() -> None:
     assert pymunk_lines(resolved.replace(substeps=1, half_kick=False))[-1] == "space.step(0.02)"
 
 
-def test_pymunk_lines_set_the_sleep_of_a_space() -> None:
-    scene = scene_of(DROP)
-    resolved = ENGINES["pymunk"].resolve(scene, scene.solver.replace(sleeping=True, sleep_time=0.25))
-    ours, own = new_space(scene, resolved), pymunk.Space()
-    exec("\n".join(pymunk_lines(resolved)), {"space": own})
-    for name in ("sleep_time_threshold", "idle_speed_threshold"):
-        assert getattr(own, name) == getattr(ours, name)
-
-
 def test_point_without_finite_error_is_not_recommended() -> None:
     useless = [point_of(1.0, None), point_of(1.0, math.nan), point_of(1.0, math.inf)]
     assert not any(point.is_usable for point in useless)
@@ -144,10 +130,8 @@ def test_point_without_finite_error_is_not_recommended() -> None:
 
 
 def test_most_accurate_within_the_budget_is_recommended() -> None:
-    found = recommend_most_accurate(
-        POINTS, OBJECTIVE, (), never
-    )  # 0.5 ms per frame, 60 a second: 30 ms per simulated second
-    assert found is not None
+    # 0.5 ms per frame, 60 a second: 30 ms per simulated second
+    found = recommend_most_accurate(POINTS, OBJECTIVE, (), never)
     assert found.point == POINTS[2]
     assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=0.01), (), never) is None
     assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=None), (), never) is None
@@ -155,14 +139,12 @@ def test_most_accurate_within_the_budget_is_recommended() -> None:
 
 def test_cheapest_of_equally_accurate_points_is_recommended() -> None:
     found = recommend_most_accurate([point_of(9.0, 0.0), point_of(3.0, 0.0)], OBJECTIVE, (), never)
-    assert found is not None
     assert found.point.cost == 3.0
 
 
 def test_step_longer_than_a_frame_has_to_fit_into_one() -> None:
     """20 ms per second in steps of 0.1 s is 2 ms in the frame that contains the step."""
     found = recommend_most_accurate([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], OBJECTIVE, (), never)
-    assert found is not None
     assert found.point.settings.dt == 0.01
 
 
@@ -172,29 +154,24 @@ def test_step_longer_than_max_dt_is_not_recommended() -> None:
         recommend_cheapest(points, OBJECTIVE._replace(max_dt=0.02), (), never),
         recommend_most_accurate(points, OBJECTIVE._replace(max_dt=0.02), (), never),
     ):
-        assert pick is not None
         assert pick.point.settings.dt == 0.02
 
 
 def test_sentence_states_settings_error_and_cost() -> None:
     found = recommend_cheapest([point_of(12.0, 0.00031, dt=0.01, substeps=4)], OBJECTIVE, (), never)
-    assert found is not None
     assert found.sentence == (
         "pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms per simulated second (1.2 % of real time), "
         "0.2 ms per frame of the budget of 0.5 ms"
     )
     coarse = recommend_cheapest([point_of(12.0, 0.0, dt=0.1)], OBJECTIVE, (), never)
-    assert coarse is not None
     assert "longer than a frame" in coarse.sentence
 
 
 def test_missed_contacts_are_stated_as_a_ratio() -> None:
     objective = Objective(METRICS["passes"], 0.5, None, 60.0)
     found = recommend_cheapest([point_of(1.0, 0.125)], objective, (), never)
-    assert found is not None
     assert "1 in 8 contacts missed" in found.sentence
     whole = recommend_cheapest([point_of(1.0, 0.0)], objective, (), never)
-    assert whole is not None
     assert "1 in" not in whole.sentence
 
 
@@ -202,3 +179,63 @@ def test_label_names_set_and_omitted_settings() -> None:
     assert label(point_of(1.0, 0.0)) == "pymunk with the settings of the scene"
     assert label(point_of(1.0, 0.0, dt=0.001, half_kick=True)) == "pymunk with dt = 0.001, half_kick = true"
     assert label(point_of(1.0, 0.0, substeps=2, integrator=None)) == "pymunk with substeps = 2 without integrator"
+
+
+NUMBERS = st.one_of(st.sampled_from([0.0, 1.0, 2.0, 3.0]), st.floats(0.0, 1e6))
+"""A few values, so that ties are common, and a wide range."""
+CLOUD = st.lists(st.tuples(NUMBERS, NUMBERS), max_size=30)
+Pair = tuple[float, float]
+
+
+def cost(point: Pair) -> float:
+    return point[0]
+
+
+def error(point: Pair) -> float:
+    return point[1]
+
+
+def dominates(a: Pair, b: Pair) -> bool:
+    """Return whether a is no worse than b in both coordinates, and better in one."""
+    return a[0] <= b[0] and a[1] <= b[1] and a != b
+
+
+@given(CLOUD)
+def test_members_of_the_front_are_not_dominated(points: list[Pair]) -> None:
+    for member in pareto(points, cost, error):
+        assert not any(dominates(other, member) for other in points)
+
+
+@given(CLOUD)
+def test_points_outside_the_front_are_dominated(points: list[Pair]) -> None:
+    front = pareto(points, cost, error)
+    for point in points:
+        assert point in front or any(dominates(member, point) for member in front)
+
+
+@given(CLOUD)
+def test_front_is_sorted_by_cost_with_decreasing_error(points: list[Pair]) -> None:
+    front = pareto(points, cost, error)
+    for before, after in pairwise(front):
+        assert before[0] < after[0]
+        assert before[1] > after[1]
+
+
+def test_first_of_equals_is_kept() -> None:
+    equals = [("a", 1.0, 2.0), ("b", 1.0, 2.0), ("c", 1.0, 3.0)]
+    assert pareto(equals, lambda each: each[1], lambda each: each[2]) == equals[:1]
+
+
+def test_front_of_no_points_is_empty() -> None:
+    assert pareto([], cost, error) == []
+
+
+def test_dominance_needs_the_cost_margin_and_no_larger_error() -> None:
+    assert is_dominated(10.0, 1.0, [(6.9, 1.0)], 0.7)
+    assert not is_dominated(10.0, 1.0, [(7.1, 1.0)], 0.7)  # cheaper, but by less than the margin
+    assert not is_dominated(10.0, 1.0, [(1.0, 1.1)], 0.7)  # cheaper, but less accurate
+
+
+def test_no_point_dominates_itself() -> None:
+    assert not is_dominated(0.0, 0.0, [(0.0, 0.0)], 0.7)
+    assert not is_dominated(1.0, 0.0, [(1.0, 0.0)], 0.7)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import sandbox
-from sandbox.engines.registry import ENGINES, UnknownEngineError
+from sandbox.engines.registry import UnknownEngineError
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.preflight import Diagnostic, warnings
 from sandbox.measure.seeds import with_seed
@@ -19,7 +19,7 @@ from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.objective import UnknownMetricError
-from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, WORK_FACTOR, label
+from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, WORK_FACTOR
 from sandbox.measure.tradeoff.result import Recommendation
 from sandbox.measure.tradeoff.study import setting_warnings
 from sandbox.progress import Progress
@@ -27,10 +27,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from tests.runs_by_hand import DROP, SWING, scene_of
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
-DOCUMENT_KEYS = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
-POINT_KEYS = {"engine", "settings", "error", "cost_ms_per_second", "status"}
 RANDOM = """
 [world]
 gravity = [0.0, -10.0]
@@ -90,9 +88,7 @@ def test_recommendation_is_within_the_tolerance_in_an_independent_run() -> None:
     found = study(scene, tolerance=4e-3)
     assert found.truth == "closed_form"
     assert found.metric.name == "max_position"
-    assert found.within_tolerance is not None
     point = found.within_tolerance.point
-    assert point.error is not None
     assert point.error <= 4e-3
     assert error_of(scene, point) == point.error
     accurate = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
@@ -105,9 +101,7 @@ def test_recommendation_for_a_random_scene_is_within_the_tolerance_on_new_seeds(
     scene = scene_of(RANDOM)
     found = study(scene, tolerance=6e-3, seeds=2)
     assert found.seeds == (4, 5)
-    assert found.within_tolerance is not None
     assert found.within_tolerance.fresh_seeds == (6, 7, 8)
-    assert found.within_tolerance.fresh_error is not None
     assert found.within_tolerance.fresh_error <= 6e-3
     for seed in (101, 102):
         assert error_of(with_seed(scene, seed), found.within_tolerance.point) <= 6e-3
@@ -116,7 +110,6 @@ def test_recommendation_for_a_random_scene_is_within_the_tolerance_on_new_seeds(
 def test_fresh_seeds_wrap_around_at_the_largest_seed() -> None:
     last = scene_of(RANDOM.replace("seed = 4", f"seed = {2**63 - 1}"))
     found = study(last, tolerance=1.0, most=1)
-    assert found.within_tolerance is not None
     assert found.within_tolerance.fresh_seeds == (0, 1, 2)
 
 
@@ -153,38 +146,13 @@ def test_settings_that_diverge_are_points_with_a_reason() -> None:
     json.dumps(found.document(), allow_nan=False)
 
 
-def test_settings_that_an_engine_does_not_support_are_omitted() -> None:
-    scene = scene_of(DROP.replace("dt = 0.02", 'dt = 0.02\nintegrator = "rk4"'))
-    assert ENGINES["pymunk"].missing(scene, scene.solver)
-    found = study(scene, most=3)
-    assert [point.status for point in found.points] == ["ok"] * 3
-    assert found.points[0].changes == {"integrator": None}
-    assert "without integrator" in label(found.points[0])
-
-
-def test_document_has_the_documented_keys_and_valid_json_numbers() -> None:
-    found = study(scene_of(DROP), tolerance=4e-3, budget=5.0)
-    document = json.loads(json.dumps(found.document("drop.toml"), allow_nan=False))
-    assert set(document) >= DOCUMENT_KEYS
-    assert (document["scene"], document["metric"], document["truth"]) == ("drop.toml", "max_position", "closed_form")
-    for row in [*document["points"], *document["pareto"], document["within_tolerance"], document["within_budget"]]:
-        assert set(row) >= POINT_KEYS
-    errors = [row["error"] for row in document["pareto"]]
-    costs = [row["cost_ms_per_second"] for row in document["pareto"]]
-    assert errors == sorted(errors, reverse=True)
-    assert costs == sorted(costs)
-    assert [each.split(" setting")[0] for each in document["answers"]] == ["cheapest", "most accurate"]
-
-
 def test_work_counters_are_reproducible() -> None:
     first, second = (study(scene_of(DROP), most=3) for _ in range(2))
     assert [point.work for point in first.points] == [point.work for point in second.points]
     assert all(point.work for point in first.points)
 
 
-def test_machine_speed_and_load_do_not_change_the_result(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_machine_speed_and_load_do_not_change_the_result(monkeypatch):
     """A slow clock makes runs take 1,000 times as long, and a third of all runs is delayed by other programs."""
     found = []
     for slow in (1.0, 1e3):
@@ -201,8 +169,6 @@ def test_machine_speed_and_load_do_not_change_the_result(
         (p.engine, p.settings, p.error, p.counted) for p in second.points
     ]
     assert first.spent == second.spent
-    assert first.within_tolerance is not None
-    assert second.within_tolerance is not None
     assert first.within_tolerance.point.settings == second.within_tolerance.point.settings
     assert second.within_tolerance.point.cost > 100.0 * first.within_tolerance.point.cost
 
@@ -234,7 +200,6 @@ def test_given_runs_are_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_nearest_is_given_if_nothing_meets_the_tolerance_or_budget() -> None:
     found = study(scene_of(DROP), tolerance=1e-12, budget=1e-9)
     assert (found.within_tolerance, found.within_budget) == (None, None)
-    assert found.nearest_to_tolerance is not None
     assert found.nearest_to_budget is not None
     assert found.nearest_to_tolerance.point.error == min(p.error for p in found.points if p.is_usable)
     assert all("the nearest is pymunk" in line for line in found.answers())
@@ -261,32 +226,14 @@ def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> Non
     assert f"because no truth is known ({why})" in found.error_about
 
 
-def test_metric_in_pixels_scales_with_the_zoom() -> None:
-    scene = scene_of(DROP)
-    small, large = (study(scene, metric="pixels", zoom=zoom, most=1).points[0].error for zoom in (10.0, 1000.0))
-    assert small is not None
-    assert large == pytest.approx(100.0 * small, rel=1e-12)
-
-
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"tolerance": 0.0},
-        {"tolerance": math.nan},
-        {"tolerance": math.inf},
-        {"tolerance": -1.0, "metric": "missed_contacts"},
-        {"budget": 0.0},
-        {"budget": math.inf},
-        {"fps": math.nan},
-        {"seeds": 0},
-        {"zoom": -1.0},
-        {"effort": 0.0},
-        {"effort": math.inf},
-        {"time_limit": 0.0},
-        {"repeats": 0},
-        {"most": 0},
+        {"tolerance": 0.0}, {"tolerance": math.nan}, {"tolerance": math.inf}, {"budget": 0.0}, {"budget": math.inf},
+        {"tolerance": -1.0, "metric": "missed_contacts"}, {"fps": math.nan}, {"seeds": 0}, {"zoom": -1.0},
+        {"effort": 0.0}, {"effort": math.inf}, {"time_limit": 0.0}, {"repeats": 0}, {"most": 0},
     ],
-)
+)  # fmt: skip
 def test_invalid_argument_is_rejected_before_any_run(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "find_truth", None)
     with pytest.raises(ValueError, match=r"at least|positive"):
@@ -304,7 +251,6 @@ def test_unknown_names_are_rejected_before_any_run(monkeypatch: pytest.MonkeyPat
 def test_default_tolerance_of_missed_contacts_is_zero() -> None:
     found = study(scene_of(DROP), metric="missed_contacts", most=3)
     assert found.tolerance == 0.0
-    assert found.within_tolerance is not None
     assert found.within_tolerance.point.error == 0.0
 
 
@@ -339,7 +285,6 @@ def test_recommended_setting_that_may_tunnel_is_warned_of_with_safe_substeps() -
     scene = scene_of(BULLET)
     found = study(scene, metric="missed_contacts", budget=100.0, most=30)
     recommendation = found.within_tolerance
-    assert recommendation is not None
     assert recommendation.point.error == 0.0
     (warning,) = tunnelling(recommendation)
     safe = warning.details["safe_substeps"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.scene.description.base import Point
@@ -186,18 +186,6 @@ def test_saved_file_is_the_text(draft: SceneDraft, tmp_path: Path) -> None:
     assert sorted(each.name for each in tmp_path.iterdir()) == ["car.toml", "other.toml"]
 
 
-def test_byte_order_mark_and_line_endings_are_kept(tmp_path: Path) -> None:
-    path = tmp_path / "dos.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
-    draft = SceneDraft.read(path)
-    assert not draft.is_changed
-    move(draft, ElementKey("ball", 0))
-    draft.save()
-    content = path.read_bytes()
-    assert content.startswith(b"\xef\xbb\xbf# a car")
-    assert content.count(b"\r\n") == content.count(b"\n") == TEXT.count("\n")
-
-
 def test_change_of_the_file_on_disk_is_noticed(draft: SceneDraft, tmp_path: Path) -> None:
     assert not draft.is_file_changed()
     (tmp_path / "car.toml").write_text(TEXT + "# more\n")
@@ -207,17 +195,14 @@ def test_change_of_the_file_on_disk_is_noticed(draft: SceneDraft, tmp_path: Path
 
 
 def test_folder_that_cannot_be_written_is_a_fault(draft: SceneDraft, tmp_path: Path) -> None:
+    (tmp_path / "folder.toml").mkdir()
     for name, message in (
         ("no/such/folder.toml", "there is no folder"),
         ("scene.json", "ends in .toml"),
-        (".", "ends in .toml"),
+        ("folder.toml", "is a folder"),
     ):
-        with pytest.raises(SceneError) as caught:
+        with pytest.raises(SceneError, match=message):
             draft.save(tmp_path / name)
-        assert message in caught.value.faults[0].message
-    (tmp_path / "folder.toml").mkdir()
-    with pytest.raises(SceneError, match="is a folder"):
-        draft.save(tmp_path / "folder.toml")
     assert (tmp_path / "car.toml").read_text() == TEXT
 
 
@@ -310,7 +295,6 @@ def plain(value: Any) -> Any:
     return [plain(each) for each in value] if isinstance(value, tuple | list) else value
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(OPERATIONS, max_size=12))
 def test_undoing_everything_restores_the_start(operations: list[tuple[str, int, float]]) -> None:
     draft = SceneDraft(TEXT)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.scene.compile.scene import Scene
@@ -97,7 +97,6 @@ SIMILARITIES = st.builds(
 )
 
 
-@settings(max_examples=50, deadline=None)
 @given(SIMILARITIES)
 def test_bodies_and_static_elements_are_mapped(by: Similarity) -> None:
     rigid = [key for key in KEYS if key.table not in (*CANNOT_ROTATE, "rope", "stack")]
@@ -119,7 +118,6 @@ def test_bodies_and_static_elements_are_mapped(by: Similarity) -> None:
     assert np.abs(np.asarray(plane.point) - ends[0]).max() < ROUNDING
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.tuples(st.floats(-9, 9), st.floats(-9, 9)))
 def test_translation_moves_every_body_of_every_element(shift: tuple[float, float]) -> None:
     moved = after(Similarity(shift=shift), KEYS)
