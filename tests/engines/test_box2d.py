@@ -14,8 +14,9 @@ from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named, 
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
+from tests.engines.stepping import advance
 
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
 GRAVITY = {"gravity": [0.0, -9.81], "duration": 1.0}
@@ -50,12 +51,6 @@ def test_restitution_holds_below_the_default_threshold_of_1_m_per_s(speed: float
     floor = FLOOR | {"restitution": 0.5}
     result = computed(scene_of(world={"duration": 1.0}, plane=[floor], ball=[ball(0, 0.6, velocity=[0, -speed])]))
     assert result.velocity[-1, 0, 1] == pytest.approx(0.5 * speed, rel=1e-5)
-
-
-def test_bullet_is_stopped_unless_continuous_collision_is_off() -> None:
-    scene = load("bullet")
-    assert computed(scene).position[-1, 0, 0] < 1.0
-    assert computed(scene, continuous=False).position[-1, 0, 0] > 1.5
 
 
 def test_sleeping_bodies_stop() -> None:
@@ -219,30 +214,18 @@ def test_actions_change_the_world() -> None:
     )  # fmt: skip
     simulation = start(scene, "box2d")
     simulation.contacts()
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     assert simulation.frame().position[0, 1] == pytest.approx(2.6, abs=0.01)
     simulation.apply(Toggle(time=0.0, thing="shelf", solid=False))
     simulation.apply(Spawn(time=0.0, ball=Ball(position=(-5.0, 3.0), radius=0.5)))
     simulation.apply(Remove(time=0.0, body="b"))
-    for _ in range(150):
-        simulation.step()
-    frame = simulation.frame()
+    frame = advance(simulation, 150).frame()
     assert frame.position[[0, 2], 1] == pytest.approx([0.5, 0.5], abs=0.01)
     assert frame.present.tolist() == [True, False, True]
     with pytest.raises(ActionError, match="32-bit"):
         simulation.apply(Move(time=0.0, body="a", position=(1e6, 3.0)))
     with pytest.raises(ActionError, match="drive"):
         simulation.apply(Drive(time=0.0, drive="none", level=1.0))
-    simulation.close()
-
-
-def test_spawned_body_moves() -> None:
-    simulation = start(scene_of(ball=[ball(0, 5)]), "box2d")
-    simulation.apply(Spawn(time=0.0, ball=Ball(position=(5.0, 5.0), velocity=(1.0, 0.0), radius=0.5)))
-    for _ in range(50):
-        simulation.step()
-    assert simulation.frame().position[1, 0] == pytest.approx(5.5, rel=1e-5)  # 50 sums of 32 bits
     simulation.close()
 
 
@@ -298,16 +281,11 @@ def test_divergence_is_a_divergence_for_a_single_step() -> None:
 def test_joints_last_when_a_coefficient_needs_other_shapes() -> None:
     """With a rough floor, smooth boxes need separate shapes against it and each other, and Box2D's bodies are new."""
     boxes = [{"name": name, "position": [x, 5.0], "size": [1.0, 0.2]} for name, x in (("a", 0.5), ("b", 1.5))]
-    joints = [
-        PIVOT | {"between": ["a"], "at": [0.0, 5.0], "strength": 1e6},
-        {"kind": "rod", "between": ["a", "b"]},
-    ]
+    joints = [PIVOT | {"between": ["a"], "at": [0.0, 5.0], "strength": 1e6}, {"kind": "rod", "between": ["a", "b"]}]
     simulation = start(scene_of(plane=[FLOOR], box=boxes, joint=joints), "box2d")
     simulation.step()
     simulation.apply(SetParameter(time=0.0, path="plane.*.friction", value=0.3))
-    for _ in range(50):
-        simulation.step()
-    frame = simulation.frame()
+    frame = advance(simulation, 50).frame()
     hinge = frame.position[0] - 0.5 * np.asarray([math.cos(frame.angle[0]), math.sin(frame.angle[0])])
     assert hinge == pytest.approx([0.0, 5.0], abs=0.02)  # Box2D's joints are soft
     assert math.dist(frame.position[0], frame.position[1]) == pytest.approx(1.0, abs=0.02)

@@ -275,30 +275,21 @@ def compare(space: pymunk.Space, steps: int = STEPS) -> tuple[CapturedSpace, lis
     return captured, differences
 
 
-@pytest.mark.parametrize(
-    "make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, point_joints, limited_joints, kinematic]
-)
-def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
-    captured, differences = compare(make())
-    assert not captured.omitted
-    assert max(differences) == 0.0
+SPACES = (balls, pyramid, mixed, moving_surfaces, sleeping, joints, point_joints, limited_joints, kinematic)
 
 
-@pytest.mark.parametrize(
-    "make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, point_joints, limited_joints, kinematic]
-)
-def test_scene_of_a_damped_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space]) -> None:
+@pytest.mark.parametrize("damping", [1.0, 0.9])
+@pytest.mark.parametrize("make", SPACES)
+def test_scene_of_a_space_continues_it_to_the_same_bits(make: Callable[[], pymunk.Space], damping: float) -> None:
     space = make()
-    space.damping = 0.9
+    space.damping = damping
     captured, differences = compare(space)
-    assert captured.scene.world.damping == 0.9
+    assert captured.scene.world.damping == damping
     assert not captured.omitted
     assert max(differences) == 0.0
 
 
-@pytest.mark.parametrize(
-    "make", [balls, pyramid, mixed, moving_surfaces, sleeping, joints, point_joints, limited_joints, kinematic]
-)
+@pytest.mark.parametrize("make", SPACES)
 def test_scene_of_a_space_is_a_scene_file(make: Callable[[], pymunk.Space]) -> None:
     space = make()
     scene = from_pymunk(space, dt=DT, title="captured")
@@ -631,8 +622,10 @@ print("RESULT", max(differences), bool(captured.omitted), bool(captured.inexact)
 """
 
 
-@pytest.mark.full  # child processes
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.fail_slow(30)  # child processes
+@pytest.mark.parametrize(
+    "name", [EXAMPLES[0], *(pytest.param(each, marks=pytest.mark.nightly) for each in EXAMPLES[1:])]
+)
 def test_examples_of_pymunk_are_captured(name: str, tmp_path: Path) -> None:
     environment = {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy", "PYTHONPATH": str(Path(__file__).parents[2])}
     command = [sys.executable, "-W", "ignore", "-c", RUN_EXAMPLE, name]
@@ -646,7 +639,7 @@ def test_examples_of_pymunk_are_captured(name: str, tmp_path: Path) -> None:
     assert has_omissions == "True" or float(difference) <= (1e-3 if is_inexact == "True" else 0.0)
 
 
-@pytest.mark.full  # pymunk's unit tests in a child process
+@pytest.mark.nightly  # pymunk's unit tests in a child process
 def test_spaces_of_the_unit_tests_of_pymunk_are_captured() -> None:
     command = [sys.executable, "-W", "ignore", "-m", "tests.engines.capture_unit_tests"]
     done = subprocess.run(

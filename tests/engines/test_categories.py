@@ -19,7 +19,8 @@ from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import dumps, from_document, loads
+from sandbox.scene.files.load import from_document
+from tests.engines.stepping import advance
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
 
@@ -157,27 +158,6 @@ def test_passages_that_filters_allow_are_no_missed_contacts(engine: str, mask: l
     assert (missed == 0) == (mask is not None)
 
 
-def test_categories_are_kept_in_files() -> None:
-    scene = scene_with(
-        ball=[ball(0.0, categories=[], mask=["shot", "enemy"])],
-        plane=[{"point": [0.0, -5.0], "normal": [0.0, 1.0], "mask": ["shot"]}],
-    )
-    assert loads(dumps(scene)) == scene
-
-
-def test_generators_give_their_categories_to_their_bodies() -> None:
-    rope = {
-        "start": [0.0, 0.0],
-        "end": [1.0, 0.0],
-        "links": 4,
-        "radius": 0.01,
-        "categories": ["player"],
-        "mask": ["enemy"],
-    }
-    bodies = scene_with(rope=[rope]).bodies
-    assert {element.mask for element in bodies.elements[1:]} == {("enemy",)}
-
-
 def test_engines_name_the_categories_that_their_filters_have_no_bits_for() -> None:
     def scene_of(count: int) -> Scene:
         return from_document({"ball": [ball(float(k), categories=[f"c{k}"]) for k in range(count)]})
@@ -202,8 +182,7 @@ def test_spawned_bodies_collide_by_their_categories(engine: str) -> None:
     simulation.apply(Spawn(time=0, ball=spawned))
     with pytest.raises(ActionError, match="no category is named 'friend'; categories of the scene: player"):
         simulation.apply(Spawn(time=0, ball=Ball(position=(0.0, 5.0), radius=0.1, categories=("friend",))))
-    for _ in range(100):
-        simulation.step()
+    advance(simulation, 100)
     assert simulation.frame().velocity[0, 0] == pytest.approx(2.0, abs=1e-5)  # 32-bit rounding in Box2D
 
 

@@ -48,7 +48,7 @@ def record_contacts(script: list[Interval], joints: bool, impulses_only: bool) -
     return [*found, log.take()]
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("joints", [False, True])
 @settings(max_examples=200)
 @given(intervals())
@@ -68,11 +68,7 @@ def test_lasting_contact_is_one_row_with_the_summed_impulse() -> None:
     np.testing.assert_allclose(found.impulse, [[-10.0 / 3.0, -20.0 / 3.0]] * 2, rtol=1e-15)
 
 
-@given(
-    st.lists(st.integers(0, len(PAIRS) - 1), min_size=1, max_size=6),
-    st.integers(1, 5),
-    st.integers(0, 2**32 - 1),
-)
+@given(st.lists(st.integers(0, len(PAIRS) - 1), min_size=1, max_size=6), st.integers(1, 5), st.integers(0, 2**32 - 1))
 def test_batches_of_repeated_pairs_are_bit_identical_to_records(pairs: list[int], substeps: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = (np.asarray([PAIRS[k][side] for k in pairs], np.int64) for side in (0, 1))

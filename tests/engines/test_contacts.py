@@ -5,8 +5,9 @@ import pytest
 
 from sandbox.engines.common.contact_log import PairIndex
 from sandbox.engines.registry import start
-from sandbox.scene.files.load import from_document, load
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
 BOUNCING_SCENE = {
     "world": {"gravity": [0, -9.81]},
@@ -19,8 +20,7 @@ BOUNCING_SCENE = {
 def test_each_bounce_is_one_row_and_resting_contact_another():
     simulation = start(from_document(BOUNCING_SCENE))
     assert len(simulation.contacts()) == 0
-    for _ in range(4000):
-        simulation.step()
+    advance(simulation, 4000)
     contacts = simulation.contacts()
     fall = np.sqrt(2 / 9.81)
     bounces = fall + 2 * fall * np.cumsum(0.5 ** np.arange(1, 5))
@@ -33,51 +33,64 @@ def test_each_bounce_is_one_row_and_resting_contact_another():
     assert total == pytest.approx([0, -2 * 9.81 * 4.0], abs=1e-9)  # rounding of 4,000 sums of 0.02
 
 
-def test_repeated_queries_split_the_impulse_but_keep_the_first_contact_time():
-    queried_once, queried_often = start(from_document(BOUNCING_SCENE)), start(from_document(BOUNCING_SCENE))
-    queried_once.contacts()
-    queried_often.contacts()
-    batches = []
-    for k in range(4000):
-        queried_once.step()
-        queried_often.step()
-        if k % 7 == 0:
-            batches.append(queried_often.contacts())
-    batches.append(queried_often.contacts())
-    expected = queried_once.contacts()
-    times = np.unique(np.concatenate([c.time for c in batches]))
-    assert np.array_equal(times, expected.time)
-    for time, impulse in zip(expected.time, expected.impulse, strict=True):
-        split = sum(c.impulse[c.time == time].sum(axis=0) for c in batches)
-        assert split == pytest.approx(impulse, rel=1e-11)  # the order of up to 3,000 additions differs
+def crowded_scene():
+    """Return balls that slide, bounce and come to rest between a plane, a wall and a post."""
+    stuff = {"restitution": 0.5, "friction": 0.3}
+    balls = [([-2, 0.6], [3, 0]), ([0, 0.7], [0, 0]), ([0.1, 2.0], [0, -2]), ([1.5, 3.0], [-1, 0])]
+    return make_scene(
+        world={"gravity": [0, -9.81]}, plane=[{"point": [0, 0], "normal": [0, 1], **stuff}],
+        wall=[{"points": [[3, 0], [3, 3], [2.5, 4]], "thickness": 0.1, **stuff}],
+        post=[{"position": [-3, 1], "radius": 0.3, **stuff}],
+        ball=[{"position": x, "velocity": v, "radius": 0.4, **stuff} for x, v in balls],
+    )  # fmt: skip
 
 
-@pytest.mark.parametrize("persistence", [1, 3, 10])
-def test_impulses_of_a_pile_balance_its_momentum(persistence):
-    """Includes pairs that separate and collide again at once, where pymunk counts remembered impulses twice."""
-    scene = load(find("pile"), ["grid.ball.rows=8", "grid.ball.columns=10"])
-    simulation = start(scene, "pymunk", scene.solver.replace(persistence=persistence))
-    simulation.contacts()
-    for _ in range(240):
-        simulation.step()
-    contacts, frame = simulation.contacts(), simulation.frame()
-    outside = contacts.pair[:, 1] < 0
-    mass = scene.bodies.mass[:, None]
-    gained = (mass * frame.velocity).sum(axis=0) - (mass * scene.bodies.velocity).sum(axis=0)
-    weight = mass.sum() * np.array([0, -9.81]) * simulation.time
-    # Rounding of about 1e5 additions of terms of 1e-2 N·s.
-    assert gained == pytest.approx(weight - contacts.impulse[outside].sum(axis=0), abs=1e-9)
-    assert (contacts.pair[~outside, 0] < contacts.pair[~outside, 1]).all()
+@pytest.mark.parametrize(
+    ("engine", "settings"),
+    [
+        ("pymunk", {}), ("exact", {}), ("reference", {}), ("reference", {"detection": "swept"}),
+        ("reference", {"detection": "bisect"}), ("reference", {"response": "penalty"}),
+    ],
+)  # fmt: skip
+def test_contacts_queried_every_step_sum_to_those_queried_once(engine, settings):
+    scene = crowded_scene()
+    often, once = (start(scene, engine, scene.solver.replace(**settings)) for _ in range(2))
+    once.contacts()
+    batches = [often.contacts()]
+    for _ in range(200):
+        once.step()
+        often.step()
+        batches.append(often.contacts())
+    sums = {}
+    for time, pair, impulse in (
+        each for rows in batches for each in zip(rows.time, rows.pair, rows.impulse, strict=True)
+    ):
+        key = time, *pair
+        sums[key] = sums.get(key, 0.0) + impulse
+    whole = once.contacts()
+    assert len(whole) >= len(sums) > 5  # two balls may touch twice at one time
+    totals = {}
+    for time, pair, impulse in zip(whole.time, whole.pair, whole.impulse, strict=True):
+        totals[time, *pair] = totals.get((time, *pair), 0.0) + impulse
+    assert sums.keys() == totals.keys()
+    for key, impulse in totals.items():
+        assert sums[key] == pytest.approx(impulse, rel=1e-11, abs=1e-12)  # the order of up to 200 additions differs
+    assert often.state_hash() == once.state_hash()
 
 
-def test_first_query_returns_current_contacts():
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_first_query_returns_current_contacts(engine):
     document = {**BOUNCING_SCENE, "ball": [{"position": [0, 0.4999], "radius": 0.5}]}
-    simulation = start(from_document(document))
-    for _ in range(10):
-        simulation.step()
+    simulation = advance(start(from_document(document), engine), 10)
     contacts = simulation.contacts()
     assert contacts.pair.tolist() == [[0, -1]]
     assert contacts.time.tolist() == [simulation.time]
+    assert contacts.normal[0] == pytest.approx([0.0, -1.0], abs=1e-12)  # a plane of pymunk is a segment of 2e4 m
+    assert contacts.impulse.any() == (engine == "pymunk")  # which has that of the last step
+    simulation.step()
+    later = simulation.contacts()
+    assert later.time.tolist() == contacts.time.tolist()
+    assert later.impulse[0] == pytest.approx([0.0, -9.81e-3], rel=1e-3)  # its weight for a step; it still settles
 
 
 def test_order_and_sign_of_a_pair_do_not_depend_on_the_moving_body():
@@ -88,8 +101,7 @@ def test_order_and_sign_of_a_pair_do_not_depend_on_the_moving_body():
         ]
         simulation = start(from_document({"solver": {"dt": 0.01}, "ball": balls}))
         simulation.contacts()
-        for _ in range(20):
-            simulation.step()
+        advance(simulation, 20)
         (event,) = simulation.contacts()
         assert event.pair == (0, 1)
         assert event.normal == pytest.approx((1, 0), abs=1e-15)  # head-on: y is 0 throughout
@@ -101,8 +113,7 @@ def test_ball_in_a_corner_of_one_wall_is_one_contact():
     ball = {"position": [0.6, 0.6], "velocity": [-1, -1], "radius": 0.5}
     simulation = start(from_document({"wall": [wall], "ball": [ball], "solver": {"dt": 0.01}}))
     simulation.contacts()
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     contacts = simulation.contacts()
     assert contacts.pair.tolist() == [[0, -1]]
     assert contacts.impulse[0] == pytest.approx([-1, -1], abs=1e-9)  # both sides, summed; iterations converge to 1e-10

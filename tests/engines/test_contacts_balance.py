@@ -12,44 +12,32 @@ from sandbox.engines.switching import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Contacts
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 GRAVITY = np.array([0.0, -9.81])
 
 TOLERANCE = 1e-10
 """N·s: a thousand times the rounding of about 1e5 additions of terms of 1e-2 N·s to a sum of at most 10."""
 
-FLOOR_SCENE = """
-[world]
-gravity = [0.0, -9.81]
-duration = 3.0
-[solver]
-dt = 0.005
-[[wall]]
-name = "floor"
-points = [[-3.0, 0.0], [3.0, 0.0]]
-thickness = 0.1
-restitution = 0.5
-friction = 0.5
-[[wall]]
-name = "shelf"
-points = [[-0.5, 0.6], [0.5, 0.7]]
-thickness = 0.02
-restitution = 0.5
-friction = 0.5
-[[scatter]]
-name = "ball"
-lower = [-0.7, 0.8]
-upper = [0.7, 2.4]
-count = 30
-radius = 0.07
-restitution = 0.8
-friction = 0.6
-"""
+
+def floor_scene(persistence: int) -> Scene:
+    """Return balls that fall on a shelf and on the floor below it."""
+    rough = {"restitution": 0.5, "friction": 0.5}
+    floor = {"name": "floor", "points": [[-3.0, 0.0], [3.0, 0.0]], "thickness": 0.1, **rough}
+    shelf = {"name": "shelf", "points": [[-0.5, 0.6], [0.5, 0.7]], "thickness": 0.02, **rough}
+    balls = {"name": "ball", "lower": [-0.7, 0.8], "upper": [0.7, 2.4], "count": 30, "radius": 0.07}
+    return make_scene(
+        world={"gravity": [0.0, -9.81], "duration": 3.0},
+        solver={"dt": 0.005, "persistence": persistence},
+        wall=[floor, shelf],
+        scatter=[{**balls, "restitution": 0.8, "friction": 0.6}],
+    )
 
 
 def pile(persistence: int) -> Scene:
@@ -66,8 +54,7 @@ def momentum_error(scene: Scene, settle: int, steps: int, actions: dict[int, Act
         actions: actions by the step before which they apply.
     """
     simulation = start(scene, "pymunk")
-    for _ in range(settle):
-        simulation.step()
+    advance(simulation, settle)
     simulation.contacts()
     initial = simulation.frame()
     batches = []
@@ -89,8 +76,7 @@ def momentum_error(scene: Scene, settle: int, steps: int, actions: dict[int, Act
     return float(np.abs(gained - momentum[:count])[present].max()), contacts
 
 
-@pytest.mark.parametrize("persistence", [1, 3, 10])
-@pytest.mark.parametrize("settle", [0, 150])
+@pytest.mark.parametrize(("persistence", "settle"), [(1, 0), (3, 150), (10, 0)])
 def test_impulses_on_each_ball_of_a_pile_balance_its_momentum(persistence: int, settle: int) -> None:
     error, contacts = momentum_error(pile(persistence), settle, 360, {})
     assert error < TOLERANCE
@@ -117,7 +103,6 @@ def test_impulses_on_each_ball_of_a_pile_balance_its_momentum(persistence: int, 
 )
 @pytest.mark.parametrize("persistence", [3, 20])
 def test_impulses_balance_momentum_during_actions(actions: dict[int, Action], persistence: int) -> None:
-    scene = loads(FLOOR_SCENE.replace("dt = 0.005", f"dt = 0.005\npersistence = {persistence}"))
-    error, contacts = momentum_error(scene, 0, 600, actions)
+    error, contacts = momentum_error(floor_scene(persistence), 0, 600, actions)
     assert error < TOLERANCE
     assert len(contacts) > 300

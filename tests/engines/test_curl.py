@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from sandbox.engines.tabletop.motion import SHORT, curled, figures_of, rolled
 from sandbox.scene.description.surface import Floor
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 G, MU = 9.81, 0.01
 DECELERATION = MU * G
@@ -50,15 +50,6 @@ def test_short_time_form_continues_the_closed_form() -> None:
     times = [fraction * SHORT * 2.0 / DECELERATION for fraction in (1.0 - 1e-9, 1.0 + 1e-9)]
     below, above = (np.asarray(curled(2.0, 0.0, DECELERATION, 0.5, time)) / time for time in times)
     assert above[:2] == pytest.approx(below[:2], abs=1e-14)  # its second-order term is 1e-18
-
-
-def test_puck_stops_at_its_total_displacement() -> None:
-    total = 2.3**2 / DECELERATION / (2.0 - 0.08j)
-    for factor in (1.0, 1.5):
-        x, y, vx, vy = curled(2.3, 0.0, DECELERATION, 0.08, factor * 2.3 / DECELERATION)
-        assert complex(x, y) == pytest.approx(total, rel=1e-15)  # rounding
-        assert (vx, vy) == (0.0, 0.0)
-    assert total.imag == pytest.approx(1.077, abs=1e-3)  # about 1 m, typical of curling stones over 27 m
 
 
 @given(

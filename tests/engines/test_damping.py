@@ -11,11 +11,11 @@ from scipy.integrate import solve_ivp
 from sandbox.action import ActionError, Force, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.pymunk_adapter.particles import MIN_COMPILED
-from sandbox.engines.registry import ENGINES, start
+from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests import accounts
+from tests.engines.stepping import advance
 
 DT = 0.01
 G = 9.81
@@ -29,22 +29,6 @@ def scene_of(damping: float = 0.3, gravity: float = -G, **more: Any) -> Scene:
 
 def ball(x: float = 0.0, y: float = 0.0, **more: Any) -> dict[str, Any]:
     return {"position": [x, y], "radius": 0.25, "mass": 2.0, **more}
-
-
-@pytest.mark.parametrize("damping", [1e-9, 0.3, 0.9, 1.0])
-@pytest.mark.parametrize("count", [1, MIN_COMPILED])
-@pytest.mark.parametrize("collides", ["none", "all"])
-def test_velocity_and_spin_follow_the_closed_form_on_pymunk(damping: float, count: int, collides: str) -> None:
-    balls = [ball(2.0 * k, 9.0, velocity=[3.0, -4.0], angular_velocity=5.0, collides=collides) for k in range(count)]
-    simulation = start(scene_of(damping, 0.0, ball=balls, solver={"substeps": 3}), "pymunk")
-    for k in range(1, 101):
-        simulation.step()
-        kept = damping ** (k * DT)
-        frame = simulation.frame()
-        assert frame.velocity == pytest.approx(
-            np.tile([3.0 * kept, -4.0 * kept], (count, 1)), rel=1e-12
-        )  # 300 roundings
-        assert frame.angular_velocity == pytest.approx(np.full(count, 5.0 * kept), rel=1e-12)  # likewise
 
 
 @pytest.mark.parametrize("substeps", [1, 3])
@@ -101,8 +85,7 @@ def test_box2d_divides_velocities_by_its_implicit_step() -> None:
         0.3, 0.0, ball=[ball(velocity=[3.0, -4.0], angular_velocity=5.0)], world={"linear_drag": 0.5, "wind": [0, 0]}
     )
     simulation = start(scene, "box2d")
-    for _ in range(100):
-        simulation.step()
+    advance(simulation, 100)
     rate, frame = -math.log(0.3), simulation.frame()
     # 100 roundings of 32-bit numbers, 6e-8 each
     assert frame.velocity[0] == pytest.approx(np.array([3.0, -4.0]) / (1.0 + (rate + 0.5) * DT) ** 100, rel=1e-5)
@@ -162,8 +145,7 @@ def test_damping_work_matches_its_integral() -> None:
     ):
         simulation = start(scene, engine, scene.solver.replace(**settings))
         simulation.account()
-        for _ in range(100):
-            simulation.step()
+        advance(simulation, 100)
         assert simulation.account()[Cause.DRAG] == pytest.approx(truth, rel=error)
 
 
@@ -226,22 +208,6 @@ def test_driven_bodies_are_not_damped_on_the_reference() -> None:
         ends = []
         for damping in (0.1, 1.0):
             simulation = start(scene_of(damping, 0.0, ball=[ball(name="a")], drive=[drive]), "reference")
-            for _ in range(30):
-                simulation.step()
+            advance(simulation, 30)
             ends.append(simulation.state_hash())
         assert ends[0] == ends[1]
-
-
-def test_engines_agree_as_the_step_gets_small() -> None:
-    balls = [ball(2.0 * k, 1.0 + 0.3 * k, velocity=[0.5, 1.0], angular_velocity=2.0, collides="none") for k in range(3)]
-    scene, ends = scene_of(0.2, ball=balls, solver={"dt": 1e-3}), []
-    for name in ("pymunk", "reference", "box2d"):
-        if name not in ENGINES:
-            continue
-        simulation = start(scene, name)
-        for _ in range(500):
-            simulation.step()
-        frame = simulation.frame()
-        ends.append(np.column_stack((frame.position, frame.velocity, frame.angle, frame.angular_velocity)))
-    for end in ends[1:]:
-        assert end == pytest.approx(ends[0], abs=0.01)  # first order: h·λ·(g/λ) = 0.01

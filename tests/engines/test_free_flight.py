@@ -13,6 +13,7 @@ from sandbox.engines.contract import Divergence
 from sandbox.engines.pymunk_adapter import particles as free
 from sandbox.engines.registry import start
 from sandbox.scene.files.load import from_document
+from tests.engines.stepping import advance
 
 EPS = np.finfo(float).eps
 
@@ -59,20 +60,6 @@ def test_flight_without_collisions_is_bit_identical_to_pymunk(states, gravity, d
     assert np.array_equal(frame.angular_velocity, [body.angular_velocity for body in bodies])
 
 
-@given(st.floats(1e-3, 0.1), st.integers(1, 200), st.floats(-20, 20))
-def test_explicit_euler_is_ahead_by_half_g_h_t(dt, steps, speed):
-    simulation = start(
-        scene([{"position": [0, 10], "velocity": [0, speed], "radius": 1}], {"gravity": [0, -9.81]}, dt=dt)
-    )
-    for _ in range(steps):
-        simulation.step()
-    time, y = steps * dt, float(simulation.frame().position[0, 1])
-    exact = 10 + speed * time - 0.5 * 9.81 * time**2
-    # The error of the scheme is exactly +g·h·T/2; the rest is rounding, at most a few ulps of the largest term a step.
-    scale = 10 + abs(speed) * time + 9.81 * time**2
-    assert y - exact == pytest.approx(0.5 * 9.81 * dt * time, abs=4 * steps * EPS * scale)
-
-
 @given(st.floats(1e-3, 0.1), st.integers(1, 200), st.tuples(st.floats(-20, 20), st.floats(-20, 20)))
 def test_half_kick_is_exact_to_rounding(dt, steps, velocity):
     world = {"gravity": [1.5, -9.81]}
@@ -84,8 +71,7 @@ def test_half_kick_is_exact_to_rounding(dt, steps, velocity):
         rtol=0,
         atol=64 * EPS * (20 + 9.81 * dt),  # g·h/2 is added and subtracted again
     )
-    for _ in range(steps):
-        simulation.step()
+    advance(simulation, steps)
     time, frame = steps * dt, simulation.frame()
     g, v = np.asarray(world["gravity"]), np.asarray(velocity)
     scale = 10 + 20 * time + 9.81 * time**2
@@ -98,44 +84,13 @@ def test_half_kick_is_exact_to_rounding(dt, steps, velocity):
 def test_linear_drag_is_exact_in_velocity(k, dt, wind):
     world = {"gravity": [0, -9.81], "linear_drag": k, "wind": list(wind)}
     simulation = start(scene([{"position": [0, 0], "velocity": [30, 40], "radius": 1}], world, dt=dt))
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     time = 50 * dt
     terminal = np.asarray(wind) + np.array([0, -9.81]) / k
     exact = terminal + (np.array([30, 40]) - terminal) * math.exp(-k * time)
     # Each of the 50 steps rounds sums as large as the largest velocity.
     scale = 60 + float(np.abs(terminal).max())
     assert np.allclose(simulation.frame().velocity[0], exact, rtol=0, atol=50 * 8 * EPS * scale)
-
-
-@pytest.mark.parametrize(("linear", "quadratic"), [(0.2, 0.0), (0.0, 0.01), (0.1, 0.02)])
-def test_drag_converges_in_first_order(linear, quadratic):
-    from scipy.integrate import solve_ivp
-
-    gravity, wind = np.array([0, -9.81]), np.array([-8.0, 0.0])
-
-    def slope(_, state):
-        u = state[2:] - wind
-        return np.concatenate((state[2:], gravity - (linear + quadratic * np.hypot(*u)) * u))
-
-    start_state = [0, 0, 35, 35]
-    oracle = solve_ivp(slope, (0, 4), start_state, method="DOP853", rtol=1e-12, atol=1e-12).y[:2, -1]
-    world = {
-        "gravity": [0, -9.81],
-        "linear_drag": linear,
-        "quadratic_drag": quadratic,
-        "wind": [-8, 0],
-        "duration": 4,
-    }
-    steps = np.array([0.04, 0.02, 0.01, 0.005])
-    errors = []
-    for dt in steps:
-        simulation = start(scene([{"position": [0, 0], "velocity": [35, 35], "radius": 1}], world, dt=float(dt)))
-        for _ in range(round(4 / dt)):
-            simulation.step()
-        errors.append(np.hypot(*(simulation.frame().position[0] - oracle)))
-    order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert order == pytest.approx(1.0, abs=0.2)  # the tolerance of the project for a fitted order
 
 
 @pytest.mark.parametrize("drag", [{"linear_drag": 1e9}, {"quadratic_drag": 1e9}, {"quadratic_drag": 3.0}])
@@ -149,30 +104,6 @@ def test_drag_of_any_strength_is_stable(drag):
         # The speed decreases at most down to the terminal velocity.
         assert speed <= max(fastest, 9.81 / drag.get("linear_drag", 1e-9) + 2 * math.sqrt(9.81 / 1.0))
         fastest = max(speed, 1e-3)
-
-
-def test_particles_and_space_bodies_obey_the_same_law_with_drag_and_force():
-    """A ball in the space that never touches anything moves bit-identically to one outside of it."""
-    world = {"gravity": [0.3, -9.81], "linear_drag": 0.7, "quadratic_drag": 0.05, "wind": [3, -1]}
-    common = {"velocity": [3.0, 12.0], "radius": 0.1, "mass": 0.37}
-    document = {
-        "world": world,
-        "solver": {"dt": 0.01},
-        "ball": [
-            {"name": "free", "position": [0, 0], "collides": "none", **common},
-            {"name": "meeting", "position": [0, 0], **common},
-        ],
-        "plane": [{"point": [0, -900], "normal": [0, 1]}],
-    }
-    simulation = start(from_document(document))
-    assert simulation.flying == 1
-    for name in ("free", "meeting"):
-        simulation.apply(Force(time=0, body=name, force=(0.11, -0.07)))
-    for _ in range(300):
-        simulation.step()
-    frame = simulation.frame()
-    assert np.array_equal(frame.position[0], frame.position[1])
-    assert np.array_equal(frame.velocity[0], frame.velocity[1])
 
 
 SPARKS = {"position": [0.3, 0.7], "velocity_min": [-20, 10], "velocity_max": [20, 40], "radius": 0.05}
@@ -283,5 +214,4 @@ def test_diverging_particle_is_named(min_compiled, monkeypatch):
     name = sparks_scene.bodies.names[123]
     simulation.apply(Force(time=0, body=name, force=(3e13, 0.0)))
     with pytest.raises(Divergence, match=name):
-        for _ in range(100):
-            simulation.step()
+        advance(simulation, 100)

@@ -24,8 +24,9 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import dumps, from_document, loads
+from sandbox.scene.files.load import from_document
 from tests.accounts import closed_account
+from tests.engines.stepping import advance
 
 ENGINES = ["pymunk", "box2d", "reference"]
 every_engine = pytest.mark.parametrize("engine", ENGINES)
@@ -137,9 +138,7 @@ def test_carrier_turns_a_ball_on_a_pivot(engine: str) -> None:
 def test_actions_set_position_and_velocities(engine: str) -> None:
     simulation = start(scene_of(box=[paddle(0.0)], ball=[ball(5.0)]), engine)
     simulation.apply(Move(time=0, body="paddle", position=(1.0, 2.0), velocity=(3.0, 0.0), angular_velocity=-2.0))
-    for _ in range(100):
-        simulation.step()
-    frame = simulation.frame()
+    frame = advance(simulation, 100).frame()
     index = simulation.bodies.names.index("paddle")
     assert frame.position[index] == pytest.approx([1.0 + 3.0 * 0.5, 2.0], abs=SINGLE)
     assert frame.angle[index] == pytest.approx(-1.0, abs=TURN if engine == "box2d" else SINGLE)
@@ -152,10 +151,7 @@ def test_actions_set_position_and_velocities(engine: str) -> None:
 @every_engine
 def test_forces_and_impulses_are_refused(engine: str) -> None:
     simulation = start(scene_of(box=[paddle(0.0)]), engine)
-    for action in (
-        Impulse(time=0, body="paddle", impulse=(1.0, 0.0)),
-        Force(time=0, body="paddle", force=(1.0, 0.0)),
-    ):
+    for action in (Impulse(time=0, body="paddle", impulse=(1.0, 0.0)), Force(time=0, body="paddle", force=(1.0, 0.0))):
         with pytest.raises(ActionError, match="is kinematic: no impulse or force changes its motion"):
             simulation.apply(action)
     simulation.close()
@@ -168,22 +164,10 @@ def test_kinematic_body_can_be_added_to_a_running_scene(engine: str) -> None:
         name="paddle", position=(1.0, 0.0), size=(0.2, 1.0), kinematic=True, velocity=(-1.0, 0.0), restitution=1.0
     )
     simulation.apply(Spawn(time=0, box=box))
-    for _ in range(200):
-        simulation.step()
-    frame = simulation.frame()
+    frame = advance(simulation, 200).frame()
     assert frame.position[1] == pytest.approx([0.0, 0.0], abs=SINGLE)
     assert frame.velocity[0, 0] == pytest.approx(-3.0, abs=SINGLE)
     simulation.close()
-
-
-@pytest.mark.parametrize("engine", ["exact"])
-def test_engines_without_kinematic_bodies_refuse_them_by_name(engine: str) -> None:
-    scene = scene_of(ball=[ball(0.0, kinematic=True, velocity=[1.0, 0.0])])
-    with pytest.raises(Refusal, match="kinematic bodies"):
-        start(scene, engine)
-    simulation = start(scene_of(ball=[ball(0.0)]), engine)
-    with pytest.raises(ActionError, match="does not model kinematic bodies"):
-        simulation.apply(Spawn(time=0, ball=Ball(position=(3.0, 0.0), radius=0.1, kinematic=True)))
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
@@ -255,10 +239,7 @@ def test_pymunk_refuses_what_it_cannot_combine_with_kinematic_bodies() -> None:
             {"box": [paddle(0.0)], "thrust": [{"body": "paddle", "force": [1, 0]}]},
             "thrust[0].body: 'paddle' is kinematic",
         ),
-        (
-            {"box": [paddle(0.0)], "drive": [STROKE]},
-            "'paddle' is kinematic; remove `kinematic`",
-        ),
+        ({"box": [paddle(0.0)], "drive": [STROKE]}, "'paddle' is kinematic; remove `kinematic`"),
         (
             {"box": [paddle(0.0)], "joint": [{"kind": "pivot", "between": ["paddle"], "at": [0, 0]}]},
             "no joint can move these bodies: 'paddle' is kinematic",
@@ -269,12 +250,6 @@ def test_faults_are_named(tables: dict[str, Any], path: str) -> None:
     with pytest.raises(SceneError) as caught:
         scene_of(**tables)
     assert path in str(caught.value)
-
-
-def test_key_is_kept_in_a_scene_file() -> None:
-    scene = scene_of(box=[paddle(0.0, velocity=[1.0, 0.0])])
-    assert loads(dumps(scene)) == scene
-    assert scene.bodies.kinematic.tolist() == [True]
 
 
 def lift_scene(**lift: Any) -> Scene:

@@ -7,12 +7,12 @@ import pytest
 
 from sandbox.action import ActionError, Launch, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.engines.switching import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.files.load import from_document, load
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
+from tests.engines.stepping import advance
 
 BOUNDS = [[-3.0, -3.0], [3.0, 30.0]]
 
@@ -37,12 +37,6 @@ def mixed_scene(**world: Any) -> Scene:
 
 
 ROWS = {"g": slice(1, 3), "scatter-1": slice(3, 6), "s": slice(6, 10), "emitter-2": slice(10, 12)}
-
-
-def advance(simulation: SwitchableSimulation, steps: int) -> SwitchableSimulation:
-    for _ in range(steps):
-        simulation.step()
-    return simulation
 
 
 def state_rows(frame: Frame, rows: slice) -> list[Any]:
@@ -78,14 +72,6 @@ def test_another_seed_gives_another_reproducible_layout(generator: str) -> None:
     assert other == repeated
 
 
-def test_layout_equals_that_of_a_scene_with_the_seed() -> None:
-    simulation, scene = start(mixed_scene()), mixed_scene(seed=99)
-    for generator in ROWS:
-        simulation.apply(Launch(time=0.0, generator=generator, seed=99))
-    assert simulation.frame().position.tolist() == scene.bodies.position.tolist()
-    assert simulation.frame().velocity.tolist() == scene.bodies.velocity.tolist()
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_launch_restores_retired_and_removed_sparks(engine: str) -> None:
     simulation = start(mixed_scene(bounds=BOUNDS), engine)
@@ -102,17 +88,6 @@ def test_launch_restores_retired_and_removed_sparks(engine: str) -> None:
     assert {n: t for n, t in retired.items() if n not in (6, 7, 8, 9)} == {
         n: t for n, t in simulation.retired.items() if n not in (6, 7, 8, 9)
     }
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_launched_sparks_fly_as_at_the_start(engine: str) -> None:
-    scene = load(find("fireworks"))
-    simulation, fresh = advance(start(scene, engine), 40), start(scene, engine)
-    simulation.apply(Launch(time=0.0, generator="spark", seed=scene.world.seed))
-    for _ in range(20):
-        simulation.step()
-        fresh.step()
-        assert state_rows(simulation.frame(), slice(None)) == state_rows(fresh.frame(), slice(None))
 
 
 def test_launch_keeps_changed_parameters_spawned_bodies_and_pulls() -> None:

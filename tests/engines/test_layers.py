@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import ActionError, Launch, Spawn, Switch
-from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.filters import reachable_layers
@@ -18,8 +17,9 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
 
@@ -176,11 +176,9 @@ def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused(engine: str)
         simulation.apply(Spawn(time=0, ball=spawned))
     with pytest.raises(ActionError, match=r"no layer is named 'attic'.*ground, up"):
         simulation.apply(Spawn(time=0, ball=Ball(position=(0.0, 3.0), radius=0.1, layer="attic")))
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     simulation.apply(Switch(time=0))
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     assert simulation.frame().layer.tolist() == [0, 1, 0]
     # rounding of a solve, in 32-bit numbers on Box2D
     assert simulation.frame().velocity[:, 0].tolist() == pytest.approx(
@@ -195,8 +193,7 @@ def test_launched_bodies_return_to_their_initial_layer(engine: str) -> None:
     emitter |= {"collides": "fixed", "radius": 0.01}
     zone = {"points": [[0.2, -1], [0.2, 1]], "thickness": 0.1, "to_layer": "up"}
     simulation = start_on(engine, from_document({"emitter": [emitter], "zone": [zone]}))
-    for _ in range(60):
-        simulation.step()
+    advance(simulation, 60)
     assert simulation.frame().layer.tolist() == [1, 1, 1]
     simulation.apply(Launch(time=0, generator="jet", seed=3))
     assert simulation.frame().layer.tolist() == [0, 0, 0]
@@ -213,9 +210,3 @@ def test_layers_are_stored_with_a_run(engine: str, tmp_path) -> None:
     assert sorted(np.unique(run.layer).tolist()) == [0, 1]
     plain = run_on(engine, from_document({"world": {"duration": 0.1}, "ball": [ball]}))
     assert plain.layer.size == 0
-
-
-def test_exact_engine_refuses_layers() -> None:
-    scene = from_document({"ball": [{"position": [0, 0], "radius": 0.1, "layer": "up"}]})
-    with pytest.raises(Refusal, match="layers"):
-        sandbox.start(scene, "exact")

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from sandbox.action import Spawn
 from sandbox.engines.registry import start
-from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 
@@ -35,20 +33,6 @@ def test_bodies_excluded_by_the_filter_bounce_as_if_tested():
     assert identical(run(filtered, 300), run(tested, 300))
 
 
-def test_free_flight_is_the_same_outside_and_inside_the_space():
-    """A colliding ball spawned far away moves the flying balls into the space without changing their flight."""
-    ball = {"velocity": [3, 20], "angular_velocity": 1.0, "radius": 0.1}
-    document = {"world": {"gravity": [0, -9.81]}, "ball": [{"position": [0, 0], **ball}]}
-    outside, inside = start(from_document(document)), start(from_document(document))
-    run(outside, 50)
-    run(inside, 50)
-    assert (outside.flying, inside.flying) == (1, 1)
-    inside.apply(Spawn(time=0.5, ball=Ball(position=(1e3, 0.0), radius=0.1)))
-    assert inside.flying == 0
-    positions, velocities = run(inside, 100)
-    assert identical(run(outside, 100), (positions[:, :1], velocities[:, :1]))
-
-
 @pytest.mark.parametrize("name", ["bounce", "two_balls", "incline", "newtons_cradle"])
 def test_recording_contacts_and_watching_change_nothing(name):
     scene = load(find(name))
@@ -58,35 +42,6 @@ def test_recording_contacts_and_watching_change_nothing(name):
     expected = run(plain, 300)
     assert identical(expected, run(recorded, 300))
     assert identical(expected, run(watched, 300))
-
-
-def set_moments(simulation, scene):
-    """Set the moments of inertia that the engine omitted."""
-    space_bodies = simulation._population.space_bodies
-    for index, moment in enumerate(scene.bodies.moment.tolist()):
-        space_bodies.give_moment(index, moment)
-    return simulation
-
-
-def test_omitted_moment_changes_nothing_with_exact_normals():
-    scene = row_of_balls("all")
-    omitted, explicit = start(scene), set_moments(start(scene), scene)
-    assert np.isinf(omitted._population.space_bodies.moment(0))
-    assert identical(run(omitted, 300), run(explicit, 300))
-
-
-def test_omitted_moment_removes_rounding_noise_of_oblique_contacts():
-    """Pymunk rounds lever arms, so oblique frictionless contacts turn bodies by about 1e-13 rad/s.
-
-    Without a moment that noise is absent, and the spin is exactly 0. Positions then differ in their last bits, which
-    grow in a gas, so the runs are not bit-identical but agree to rounding at first.
-    """
-    scene = load(find("gas"))
-    omitted, explicit = start(scene), set_moments(start(scene), scene)
-    (clean, _), (noisy, _) = run(omitted, 400), run(explicit, 400)
-    assert (omitted.frame().angular_velocity == 0).all()
-    assert 0 < np.abs(explicit.frame().angular_velocity).max() < 1e-11  # noise of about 1e3 contacts of 1e-16 to 1e-13
-    assert np.abs(clean - noisy).max() < 1e-11  # 2 s of a gas whose errors grow tenfold in about 0.3 s
 
 
 def test_zero_drag_is_the_plain_scheme():

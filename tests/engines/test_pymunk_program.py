@@ -20,8 +20,9 @@ from sandbox.engines.pymunk_adapter.colliders import SHUFFLED_FROM
 from sandbox.engines.pymunk_adapter.program import ProgramError, obstacles, program_text
 from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import from_document, load, loads
-from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from tests.engines.stepping import advance
 from tests.engines.test_capture import (
     balls,
     joints,
@@ -32,31 +33,20 @@ from tests.engines.test_capture import (
     pyramid,
     sleeping,
 )
+from tests.samples import each_shipped_scene
 from tests.strategies import OUTLINES, numbers, pairs
 
 SUBSTEPS = 300
 
 REFUSED = {
     "artillery/duel": {"world.linear_drag", "wall"},
-    "artillery/four": {"world.quadratic_drag", "wall"},
-    "benchmark/kepler": {"attraction"},
-    "games/curling": {"surface"},
-    "games/landing": {"thrust", "wall"},
+    "billiards/9-ball": {"surface"},
     "games/rube_goldberg": {"joint", "wall"},
-    "joints/atwood": {""},
-    "joints/cloth": {"world.linear_drag"},
-    "joints/flipper": {"drive", "wall", "post", "material"},
-    "joints/hanging_chain": {"world.linear_drag"},
-    "joints/tearing_cloth": {"joint"},
-    "particles/fireworks_100k": {"emitter"},
-    "particles/smoke": {"world.linear_drag", "world.quadratic_drag", "emitter"},
     "particles/sparks": {"world.linear_drag", "emitter"},
-    "pinball/classic": {"drive", "zone", "wall", "material"},
     "pinball/full": {"drive", "zone", "wall", "material"},
-    "tutorial/overpass": {"zone"},
     "tutorial/spaceship": {"thrust"},
 }
-"""Paths of the reasons why a shipped scene is refused; billiards are played on a surface."""
+"""Paths of the reasons why a shipped scene is refused."""
 
 
 def executed(scene: Scene) -> dict[str, Any]:
@@ -93,238 +83,138 @@ def differing(scene: Scene, substeps: int = SUBSTEPS) -> list[str]:
 
 @pytest.mark.parametrize("name", ["benchmark/pile", "benchmark/pyramid", "joints/ragdoll_stairs"])
 def test_program_of_a_damped_scene_has_the_states_of_the_engine(name: str) -> None:
-    (path,) = (each.path for each in shipped() if each.name == name)
-    scene = load(path, ["world.damping=0.9"])
+    scene = load(find(name), ["world.damping=0.9"])
     assert executed(scene)["make_space"]()[0].damping == 0.9
     assert differing(scene) == []
 
 
-@pytest.mark.parametrize("name", [each.name for each in shipped()])
+@pytest.mark.parametrize("name", each_shipped_scene())
 def test_shipped_scene_has_the_states_of_the_engine_or_is_refused(name: str) -> None:
-    (path,) = (each.path for each in shipped() if each.name == name)
-    scene = load(path)
-    refused = {"surface"} if name.startswith("billiards/") else REFUSED.get(name, set())
-    assert {each.path for each in obstacles(scene)} == refused
+    scene = load(find(name))
+    refused = {each.path for each in obstacles(scene)}
     if not refused:
+        assert name not in REFUSED
         assert differing(scene) == []
         return
+    assert REFUSED.get(name, refused) == refused
     with pytest.raises(ProgramError) as error:
         program_text(scene)
     assert {each.path for each in error.value.obstacles} == refused
 
 
-BASE = """
-[world]
-gravity = [0.0, -9.81]
-[solver]
-dt = 0.01
-substeps = 2
-[[plane]]
-name = "ground"
-point = [0.0, 0.0]
-normal = [0.1, 1.0]
-restitution = 0.5
-friction = 0.6
-"""
-
-CONTENTS = {
-    "constant thrusts": """
-[[box]]
-name = "ship"
-position = [0.0, 3.0]
-size = [1.0, 0.5]
-angle = 0.3
-[[thrust]]
-body = "ship"
-force = [1.0, 12.0]
-point = [0.2, -0.25]
-[[thrust]]
-body = "ship"
-force = [0.0, 3.0]
-""",
-    "thrust on a body without contacts": """
-[[ball]]
-name = "ghost"
-position = [0.0, 3.0]
-radius = 0.5
-collides = "none"
-[[thrust]]
-body = "ghost"
-force = [2.0, 9.0]
-""",
-    "bounds": """
-[[grid]]
-origin = [0.0, 2.0]
-columns = 5
-rows = 2
-spacing = [1.0, 1.0]
-radius = 0.3
-velocity_jitter = 5.0
-""",
-    "pairs without factors": """
-[[material]]
-name = "a"
-restitution = 0.3
-[[material]]
-name = "b"
-restitution = 0.4
-[[pair]]
-between = ["a", "b"]
-restitution = 0.9
-friction = 0.2
-[[pair]]
-between = ["a", "a"]
-restitution = 0.1
-[[pair]]
-between = ["b", "b"]
-restitution = 0.2
-[[grid]]
-origin = [0.0, 1.0]
-columns = 4
-rows = 2
-spacing = [0.61, 0.7]
-radius = 0.3
-material = "a"
-jitter = 0.1
-[[grid]]
-origin = [0.1, 4.0]
-columns = 4
-rows = 2
-spacing = [0.61, 0.7]
-radius = 0.3
-material = "b"
-jitter = 0.1
-""",
-    "moving surface": """
-[[wall]]
-points = [[-5.0, 2.0], [5.0, 2.0]]
-thickness = 0.2
-friction = 0.7
-surface_speed = 2.0
-[[box]]
-position = [0.0, 2.5]
-size = [0.5, 0.5]
-friction = 0.8
-[[ball]]
-position = [2.0, 2.6]
-radius = 0.5
-friction = 0.9
-""",
-    "surface velocities": """
-[[wall]]
-points = [[-5.0, 2.0], [5.0, 2.0]]
-thickness = 0.2
-friction = 0.7
-surface_velocity = [2.0, 0.0]
-[[wall]]
-points = [[-5.0, 0.0], [5.0, 0.0]]
-friction = 0.7
-surface_speed = 1.0
-[[box]]
-position = [0.0, 2.5]
-size = [0.5, 0.5]
-friction = 0.8
-[[ball]]
-position = [2.0, 2.6]
-radius = 0.5
-friction = 0.9
-surface_velocity = [-1.0, 0.5]
-[[ball]]
-position = [3.0, 0.6]
-radius = 0.5
-friction = 0.9
-surface_velocity = [-1.0, 0.5]
-""",
-    "layers": """
-[[wall]]
-points = [[-5.0, 2.0], [5.0, 1.0]]
-layers = ["ramp"]
-[[post]]
-position = [1.0, 1.0]
-radius = 0.3
-layers = ["ground", "ramp"]
-restitution = 0.8
-[[ball]]
-position = [-2.0, 3.0]
-radius = 0.5
-layer = "ramp"
-[[ball]]
-position = [0.9, 3.0]
-radius = 0.5
-friction = 1.0
-[[ball]]
-position = [0.5, 3.0]
-radius = 0.5
-layer = "ramp"
-""",
-    "polylines and an opening": """
-[[wall]]
-name = "fence"
-points = [[-3.0, 4.0], [-1.0, 1.0], [1.0, 1.0], [3.0, 4.0]]
-thickness = 0.1
-restitution = 0.7
-[[wall]]
-points = [[0.0, 0.0], [2.0, 0.0], [1.0, 0.5]]
-closed = true
-[[post]]
-position = [0.0, 3.0]
-radius = 1.0
-solid = false
-[[grid]]
-origin = [-1.5, 5.0]
-columns = 6
-rows = 3
-spacing = [0.5, 0.5]
-radius = 0.2
-jitter = 0.5
-""",
-    "kinematic bodies": """
-[[box]]
-name = "mill"
-position = [0.0, 1.5]
-size = [3.0, 0.3]
-kinematic = true
-angular_velocity = 1.5
-restitution = 0.5
-[[box]]
-name = "lift that nothing can touch"
-position = [-2.0, 0.0]
-size = [0.5, 0.5]
-kinematic = true
-velocity = [0.0, 0.3]
-collides = "none"
-[[grid]]
-origin = [-1.5, 3.0]
-columns = 6
-rows = 3
-spacing = [0.5, 0.5]
-radius = 0.2
-""",
-    "fixed bodies that nothing can touch": """
-[[ball]]
-position = [0.0, 5.0]
-radius = 0.5
-collides = "none"
-velocity = [1.0, 0.0]
-angular_velocity = 3.0
-[[box]]
-position = [4.0, 4.0]
-size = [1.0, 1.0]
-fixed = true
-angle = 0.5
-""",
+BASE: dict[str, Any] = {
+    "world": {"gravity": [0.0, -9.81]},
+    "solver": {"dt": 0.01, "substeps": 2},
+    "plane": [{"name": "ground", "point": [0.0, 0.0], "normal": [0.1, 1.0], "restitution": 0.5, "friction": 0.6}],
 }
+
+CONTENTS: dict[str, dict[str, Any]] = {
+    "constant thrusts": {
+        "box": [{"name": "ship", "position": [0.0, 3.0], "size": [1.0, 0.5], "angle": 0.3}],
+        "thrust": [
+            {"body": "ship", "force": [1.0, 12.0], "point": [0.2, -0.25]}, {"body": "ship", "force": [0.0, 3.0]},
+        ],
+    },
+    "thrust on a body without contacts": {
+        "ball": [{"name": "ghost", "position": [0.0, 3.0], "radius": 0.5, "collides": "none"}],
+        "thrust": [{"body": "ghost", "force": [2.0, 9.0]}],
+    },
+    "bounds": {
+        "grid": [
+            {
+                "origin": [0.0, 2.0], "columns": 5, "rows": 2, "spacing": [1.0, 1.0], "radius": 0.3,
+                "velocity_jitter": 5.0,
+            },
+        ],
+        "world": {"gravity": [0.0, -9.81], "bounds": [[-3.0, -9.0], [4.0, 9.0]]},
+    },
+    "pairs without factors": {
+        "material": [{"name": "a", "restitution": 0.3}, {"name": "b", "restitution": 0.4}],
+        "pair": [
+            {"between": ["a", "b"], "restitution": 0.9, "friction": 0.2}, {"between": ["a", "a"], "restitution": 0.1},
+            {"between": ["b", "b"], "restitution": 0.2},
+        ],
+        "grid": [
+            {
+                "origin": [0.0, 1.0], "columns": 4, "rows": 2, "spacing": [0.61, 0.7], "radius": 0.3, "material": "a",
+                "jitter": 0.1,
+            },
+            {
+                "origin": [0.1, 4.0], "columns": 4, "rows": 2, "spacing": [0.61, 0.7], "radius": 0.3, "material": "b",
+                "jitter": 0.1,
+            },
+        ],
+    },
+    "moving surface": {
+        "wall": [{"points": [[-5.0, 2.0], [5.0, 2.0]], "thickness": 0.2, "friction": 0.7, "surface_speed": 2.0}],
+        "box": [{"position": [0.0, 2.5], "size": [0.5, 0.5], "friction": 0.8}],
+        "ball": [{"position": [2.0, 2.6], "radius": 0.5, "friction": 0.9}],
+    },
+    "surface velocities": {
+        "wall": [
+            {"points": [[-5.0, 2.0], [5.0, 2.0]], "thickness": 0.2, "friction": 0.7, "surface_velocity": [2.0, 0.0]},
+            {"points": [[-5.0, 0.0], [5.0, 0.0]], "friction": 0.7, "surface_speed": 1.0},
+        ],
+        "box": [{"position": [0.0, 2.5], "size": [0.5, 0.5], "friction": 0.8}],
+        "ball": [
+            {"position": [2.0, 2.6], "radius": 0.5, "friction": 0.9, "surface_velocity": [-1.0, 0.5]},
+            {"position": [3.0, 0.6], "radius": 0.5, "friction": 0.9, "surface_velocity": [-1.0, 0.5]},
+        ],
+    },
+    "layers": {
+        "wall": [{"points": [[-5.0, 2.0], [5.0, 1.0]], "layers": ["ramp"]}],
+        "post": [{"position": [1.0, 1.0], "radius": 0.3, "layers": ["ground", "ramp"], "restitution": 0.8}],
+        "ball": [
+            {"position": [-2.0, 3.0], "radius": 0.5, "layer": "ramp"},
+            {"position": [0.9, 3.0], "radius": 0.5, "friction": 1.0},
+            {"position": [0.5, 3.0], "radius": 0.5, "layer": "ramp"},
+        ],
+    },
+    "polylines and an opening": {
+        "wall": [
+            {
+                "name": "fence", "points": [[-3.0, 4.0], [-1.0, 1.0], [1.0, 1.0], [3.0, 4.0]], "thickness": 0.1,
+                "restitution": 0.7,
+            },
+            {"points": [[0.0, 0.0], [2.0, 0.0], [1.0, 0.5]], "closed": True},
+        ],
+        "post": [{"position": [0.0, 3.0], "radius": 1.0, "solid": False}],
+        "grid": [
+            {"origin": [-1.5, 5.0], "columns": 6, "rows": 3, "spacing": [0.5, 0.5], "radius": 0.2, "jitter": 0.5},
+        ],
+    },
+    "kinematic bodies": {
+        "box": [
+            {
+                "name": "mill", "position": [0.0, 1.5], "size": [3.0, 0.3], "kinematic": True,
+                "angular_velocity": 1.5, "restitution": 0.5,
+            },
+            {
+                "name": "lift that nothing can touch", "position": [-2.0, 0.0], "size": [0.5, 0.5], "kinematic": True,
+                "velocity": [0.0, 0.3], "collides": "none",
+            },
+        ],
+        "grid": [{"origin": [-1.5, 3.0], "columns": 6, "rows": 3, "spacing": [0.5, 0.5], "radius": 0.2}],
+    },
+    "fixed bodies that nothing can touch": {
+        "ball": [
+            {
+                "position": [0.0, 5.0], "radius": 0.5, "collides": "none", "velocity": [1.0, 0.0],
+                "angular_velocity": 3.0,
+            },
+        ],
+        "box": [{"position": [4.0, 4.0], "size": [1.0, 1.0], "fixed": True, "angle": 0.5}],
+    },
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CONTENTS)
 def test_program_has_the_states_of_the_engine(name: str) -> None:
-    base = BASE.replace("[solver]", "bounds = [[-3.0, -9.0], [4.0, 9.0]]\n[solver]") if name == "bounds" else BASE
-    scene = loads(base + CONTENTS[name])
+    scene = from_document(BASE | CONTENTS[name])
     assert differing(scene, 600) == []
     if name == "bounds":  # some bodies must have left, or nothing was tested
         simulation = start(scene, "pymunk")
-        for _ in range(300):
-            simulation.step()
+        advance(simulation, 300)
         assert not simulation.frame().present.all()
 
 
@@ -497,7 +387,7 @@ def imports_of(text: str) -> set[str]:
 
 
 def test_pygame_is_imported_by_main_only() -> None:
-    text = program_text(loads(BASE + CONTENTS["layers"]))
+    text = program_text(from_document(BASE | CONTENTS["layers"]))
     top = {each.name for node in ast.parse(text).body if isinstance(node, ast.Import) for each in node.names}
     assert top == {"pymunk"}
     assert imports_of(text) == {"pymunk", "pygame", "pymunk.pygame_util"}
@@ -512,7 +402,7 @@ def test_generator_becomes_data_and_a_loop() -> None:
 
 @pytest.mark.parametrize("name", [*CONTENTS, "ragdoll_stairs", "chain_of_20"])
 def test_programs_are_clean(name: str, tmp_path: Path) -> None:
-    scene = loads(BASE + CONTENTS[name]) if name in CONTENTS else load(_path_of(name))
+    scene = from_document(BASE | CONTENTS[name]) if name in CONTENTS else load(find(name))
     path = tmp_path / "game.py"
     path.write_text(program_text(scene), encoding="utf-8")
     checked = subprocess.run(
@@ -521,21 +411,11 @@ def test_programs_are_clean(name: str, tmp_path: Path) -> None:
     assert checked.returncode == 0, checked.stdout
 
 
-def _path_of(stem: str) -> Path:
-    return next(each.path for each in shipped() if each.path.stem == stem)
-
-
 @pytest.mark.parametrize("name", ["fixed bodies that nothing can touch", "layers"])
 def test_window_draws_three_frames(name: str, tmp_path: Path) -> None:
-    hidden_shapes = """
-[[capsule]]
-position = [0.0, 2.0]
-length = 1.0
-radius = 0.1
-collides = "none"
-"""
+    hidden = {"capsule": [{"position": [0.0, 2.0], "length": 1.0, "radius": 0.1, "collides": "none"}]}
     path = tmp_path / "game.py"
-    path.write_text(program_text(loads(BASE + CONTENTS[name] + hidden_shapes)), encoding="utf-8")
+    path.write_text(program_text(from_document(BASE | CONTENTS[name] | hidden)), encoding="utf-8")
     environment = {**os.environ, "SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
     command = [sys.executable, "-c", "import game; game.main(frames=3); print('done')"]
     child = subprocess.run(
@@ -546,33 +426,19 @@ collides = "none"
 
 
 def test_all_reasons_are_given_at_once() -> None:
-    text = BASE.replace("[solver]", "linear_drag = 0.1\n[solver]\nhalf_kick = true")
-    more = """
-[[wall]]
-name = "corner"
-points = [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]
-[[wall]]
-name = "gate"
-points = [[5.0, 0.0], [5.0, 1.0]]
-one_way = true
-[[box]]
-name = "crate"
-position = [0.0, 3.0]
-size = [1.0, 1.0]
-[[attraction]]
-toward = [0.0, 0.0]
-strength = 1.0
-[[thrust]]
-name = "late"
-body = "crate"
-force = [1.0, 0.0]
-begin = 1.0
-[[zone]]
-position = [0.0, 0.0]
-radius = 1.0
-holds = true
-"""
-    found = obstacles(loads(text + more))
+    document = {
+        "world": {"gravity": [0.0, -9.81], "linear_drag": 0.1},
+        "solver": {"dt": 0.01, "substeps": 2, "half_kick": True},
+        "wall": [
+            {"name": "corner", "points": [[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]},
+            {"name": "gate", "points": [[5.0, 0.0], [5.0, 1.0]], "one_way": True},
+        ],
+        "box": [{"name": "crate", "position": [0.0, 3.0], "size": [1.0, 1.0]}],
+        "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}],
+        "thrust": [{"name": "late", "body": "crate", "force": [1.0, 0.0], "begin": 1.0}],
+        "zone": [{"position": [0.0, 0.0], "radius": 1.0, "holds": True}],
+    }
+    found = obstacles(from_document(document))
     paths = {"", "world.linear_drag", "solver.half_kick", "attraction", "thrust", "zone", "wall"}
     assert {each.path for each in found} == paths
     messages = " ".join(each.message for each in found)

@@ -61,19 +61,6 @@ def advance(simulation: PymunkSimulation, time: float) -> None:
         simulation.step()
 
 
-def test_bodies_at_rest_fall_asleep_after_the_time_and_stop() -> None:
-    """A ball that starts at rest falls onto the floor by the slop within a few steps; from then on it is idle."""
-    simulation = started(scene_of(ball=[ball("a", 0.0, 0.1)]))
-    advance(simulation, 0.5 - DT)
-    assert asleep(simulation) == set()
-    advance(simulation, 6 * DT)
-    assert asleep(simulation) == {"a"}
-    before = simulation.frame()
-    advance(simulation, 1.0)
-    after = simulation.frame()
-    assert (after.position == before.position).all() and (after.velocity == before.velocity).all()
-
-
 @pytest.mark.parametrize(("idle_speed", "falls_asleep"), [(0.0, False), (0.29, False), (0.31, True)])
 def test_idle_speed_is_the_speed_below_which_bodies_fall_asleep(idle_speed: float, falls_asleep: bool) -> None:
     """Without gravity bodies need an `idle_speed`; the kinetic energy of a disc that does not turn is m v²/2."""

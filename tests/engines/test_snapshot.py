@@ -7,34 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn, Switch
-from sandbox.engines.contract import Simulation, SnapshotError
-from sandbox.engines.registry import ENGINES
+from sandbox.engines.contract import SnapshotError
+from sandbox.engines.registry import ENGINES, able
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.files.load import load
-from sandbox.scene.files.shipped_scenes import find, shipped
-from tests.engines.test_advance import SCENES, small_scene, supporting
+from tests.engines.stepping import advance, continued
+from tests.engines.test_advance import SCENES, small_scene
 
 COPYING = ("exact", "reference")
-CASES = [(name, engine) for name in SCENES for engine in supporting(small_scene(name)) if engine in COPYING]
-
-
-def continued(simulation: Simulation, steps: int) -> list[object]:
-    """Step a simulation, and return everything that a caller can observe."""
-    seen: list[object] = []
-    for _ in range(steps):
-        simulation.step()
-        contacts = simulation.contacts()
-        arrays = (contacts.time, contacts.pair, contacts.point, contacts.normal, contacts.impulse)
-        seen += [simulation.time, simulation.state_hash(), *(array.tobytes() for array in arrays)]
-    return [
-        *seen,
-        dict(simulation.work),
-        dict(simulation.account()),
-        dict(simulation.retired),
-        dict(simulation.broken),
-        simulation.bodies.names,
-    ]
+CASES = [(name, engine) for name in SCENES for engine in able(small_scene(name)) if engine in COPYING]
 
 
 @pytest.mark.parametrize(("name", "engine"), CASES)
@@ -45,8 +26,7 @@ def test_restored_simulation_repeats_itself(name: str, engine: str, before: int,
     simulation.contacts()
     if with_energy:
         simulation.account()
-    for _ in range(before):
-        simulation.step()
+    advance(simulation, before)
     snapshot = simulation.snapshot()
     assert snapshot.time == simulation.time
     first = continued(simulation, after)
@@ -56,24 +36,6 @@ def test_restored_simulation_repeats_itself(name: str, engine: str, before: int,
         assert continued(simulation, after) == first
     assert continued(snapshot.resumed(), after) == first
     assert continued(copy.deepcopy(snapshot.resumed()), after) == first
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("name", [scene.name for scene in shipped()])
-def test_shipped_scenes_repeat_themselves(name: str) -> None:
-    scene = load(find(name))
-    steps = 40 if len(scene.bodies) < 1000 else 3  # exact cannot compute a pile for long
-    for engine in supporting(scene):
-        if engine not in COPYING:
-            continue
-        simulation = start(scene, engine)
-        simulation.contacts()
-        for _ in range(2 * steps):
-            simulation.step()
-        snapshot = simulation.snapshot()
-        first = continued(simulation, steps)
-        simulation.restore(snapshot)
-        assert continued(simulation, steps) == first, engine
 
 
 ACTIONS: tuple[Action, ...] = (
@@ -90,8 +52,7 @@ ACTIONS: tuple[Action, ...] = (
 def test_actions_after_a_snapshot_are_undone(engine: str, action: Action) -> None:
     simulation = start(small_scene("one ball"), engine)
     simulation.contacts()
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     snapshot, scene = simulation.snapshot(), simulation.scene
     first = continued(simulation, 30)
     simulation.restore(snapshot)
@@ -105,15 +66,13 @@ def test_actions_after_a_snapshot_are_undone(engine: str, action: Action) -> Non
 def test_switch_of_the_engine_is_undone() -> None:
     simulation = start(small_scene("balls that settle"), "exact")
     simulation.contacts()
-    for _ in range(30):
-        simulation.step()
+    advance(simulation, 30)
     snapshot = simulation.snapshot()
     first = continued(simulation, 20)
     for engine in ("reference", "pymunk"):
         simulation.restore(snapshot)
         simulation.apply(Switch(time=0.0, engine=engine))
-        for _ in range(10):
-            simulation.step()
+        advance(simulation, 10)
         assert simulation.engine == engine
         simulation.restore(snapshot)
         assert simulation.engine == "exact"
@@ -127,8 +86,7 @@ def test_observer_stays_after_a_restoration() -> None:
     snapshot = simulation.snapshot()
     for _ in range(2):
         simulation.restore(snapshot)
-        for _ in range(3):
-            simulation.step()
+        advance(simulation, 3)
     assert times == [0.0, 0.01, 0.02] * 2
 
 
@@ -150,7 +108,6 @@ def test_snapshot_does_not_change_with_its_simulation() -> None:
     simulation = start(small_scene("elastic gas"), "reference")
     snapshot = simulation.snapshot()
     before = snapshot.resumed().state_hash()
-    for _ in range(20):
-        simulation.step()
+    advance(simulation, 20)
     assert snapshot.resumed().state_hash() == before
     assert isinstance(snapshot.resumed(), SwitchableSimulation)

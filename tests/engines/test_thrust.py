@@ -7,9 +7,9 @@ import pytest
 
 import sandbox
 from sandbox.action import ActionError, Switch, Throttle
-from sandbox.engines.contract import Refusal
-from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
 ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)
@@ -19,22 +19,6 @@ def ship(*thrusts, collides="none", duration=1.0, **keys):
     body = {"name": "ship", "position": [0.0, 0.0], "size": [2.0, 1.0], "mass": 2.0, "collides": collides, **keys}
     thrusts = [{"body": "ship", "force": [4.0, 0.0], **each} for each in thrusts]
     return from_document({"world": {"duration": duration}, "box": [body], "thrust": thrusts})
-
-
-def advance(simulation, count):
-    for _ in range(count):
-        simulation.step()
-    return simulation.frame()
-
-
-@every_engine
-@pytest.mark.parametrize("collides", ["none", "all"])
-def test_thrust_through_the_centre_is_a_constant_acceleration(engine, collides):
-    trajectory = sandbox.run(ship({}, collides=collides), engine, dt=0.01)
-    assert trajectory.velocity[-1, 0] == pytest.approx([2.0, 0.0], abs=1e-14)  # 100 sums of 0.02
-    # Half a step early or late, depending on the scheme: a·h·T/2.
-    assert trajectory.position[-1, 0, 0] == pytest.approx(1.0, abs=2.0 * 0.01 / 2 + 1e-12)
-    assert not trajectory.angular_velocity.any()
 
 
 @every_engine
@@ -49,9 +33,8 @@ def test_thrust_rotates_with_its_body(engine):
     # ∫ a·(cos φ, sin φ) dt by the trapezium rule, with an error of h²
     a = 2.0 * np.column_stack((np.cos(phi), np.sin(phi)))
     velocity = np.concatenate((np.zeros((1, 2)), np.cumsum(0.5 * h * (a[1:] + a[:-1]), axis=0)))
-    assert (
-        np.abs(trajectory.velocity[:, 0] - velocity).max() <= 2.0 * h * 2.0
-    )  # force a step early or late: a·h, and the same for φ
+    # force a step early or late: a·h, and the same for φ
+    assert np.abs(trajectory.velocity[:, 0] - velocity).max() <= 2.0 * h * 2.0
 
 
 @every_engine
@@ -66,11 +49,11 @@ def test_timed_thrust_acts_from_begin_to_end(engine):
 @every_engine
 def test_thrust_with_a_key_is_off_until_a_throttle_action(engine):
     simulation = sandbox.start(ship({"key": "up", "name": "main"}), engine)
-    assert not advance(simulation, 10).velocity.any()
+    assert not advance(simulation, 10).frame().velocity.any()
     simulation.apply(Throttle(time=0.1, thrust="main", level=0.5))
-    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+    assert advance(simulation, 50).frame().velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
     simulation.apply(Throttle(time=0.6, thrust="main", level=0.0))
-    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+    assert advance(simulation, 50).frame().velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
 
 
 @every_engine
@@ -80,45 +63,23 @@ def test_unknown_thrust_is_refused_with_the_known_names(engine):
         simulation.apply(Throttle(time=0.0, thrust="mian", level=1.0))
 
 
-def test_throttle_is_kept_through_engine_switches_and_checkpoints():
-    simulation = sandbox.start(ship({"key": "up", "name": "main"}), "pymunk")
-    simulation.apply(Throttle(time=0.0, thrust="main", level=1.0))
-    advance(simulation, 10)
-    simulation.apply(Switch(time=0.1, engine="reference"))
-    assert advance(simulation, 10).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)
-    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
-    assert advance(resumed, 10).state_hash() == advance(simulation, 10).state_hash()
-    assert resumed.frame().velocity[0, 0] == pytest.approx(0.6, abs=1e-14)
-
-
 def test_timed_thrust_follows_scene_time_after_an_engine_switch():
     simulation = sandbox.start(ship({"begin": 0.3, "end": 0.5}), "pymunk")
     advance(simulation, 10)
     simulation.apply(Switch(time=0.1, engine="reference"))
-    assert not advance(simulation, 20).velocity.any()
+    assert not advance(simulation, 20).frame().velocity.any()
     simulation.apply(Switch(time=0.3, engine="pymunk"))
-    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)  # 0.2 s at 2 m/s²
-
-
-def test_exact_refuses_thrust_and_attraction_by_name():
-    with pytest.raises(Refusal, match="does not model thrust"):
-        sandbox.start(ship({}), "exact")
-    ball = {"position": [1.0, 0.0], "radius": 0.1}
-    attracted = from_document({"ball": [ball], "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}]})
-    with pytest.raises(Refusal, match="does not model attraction"):
-        sandbox.start(attracted, "exact")
+    assert advance(simulation, 50).frame().velocity[0, 0] == pytest.approx(0.4, abs=1e-14)  # 0.2 s at 2 m/s²
 
 
 @every_engine
 def test_thrust_adds_to_the_load_of_a_resting_box(engine):
     """A box pushed down by 10 N loads the ground with its weight plus 10 N."""
-    scene = from_document(
-        {
-            "world": {"gravity": [0.0, -9.81], "duration": 2.0},
-            "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0]}],
-            "box": [{"name": "box", "position": [0.0, 0.5], "size": [1.0, 1.0]}],
-            "thrust": [{"body": "box", "force": [0.0, -10.0]}],
-        }
+    scene = make_scene(
+        world={"gravity": [0.0, -9.81], "duration": 2.0},
+        plane=[{"point": [0.0, 0.0], "normal": [0.0, 1.0]}],
+        box=[{"name": "box", "position": [0.0, 0.5], "size": [1.0, 1.0]}],
+        thrust=[{"body": "box", "force": [0.0, -10.0]}],
     )
     trajectory = sandbox.run(scene, engine, dt=0.01)
     received = -trajectory.contact_impulse[:, 1].sum()

@@ -14,7 +14,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 ENGINES = "pymunk", "reference"
 
@@ -68,14 +68,6 @@ def wall_points(pieces: int, rise: float = 0.0, reverse: bool = False) -> list[l
     xs = np.linspace(-5.0, 5.0, pieces + 1)
     points = [[float(x), rise * math.sin(1.3 * k)] for k, x in enumerate(xs)]
     return points[::-1] if reverse else points
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_box_slides_over_the_vertices_of_a_straight_wall(engine: str) -> None:
-    points = [[float(x), 0.0] for x in range(-5, 4)] + [[5.0, 0.0]]
-    run = sandbox.run(sliding_body("box", points), engine=engine)
-    assert run.position[-1, 0, 0] == pytest.approx(2.0, abs=1e-9)  # rounding of 500 steps only
-    assert run.velocity[-1, 0] == pytest.approx([3.0, 0.0], abs=1e-9)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -142,8 +134,7 @@ def test_vertices_are_smooth_with_every_detection_and_broad_phase(detection: str
 
 
 @pytest.mark.parametrize("engine", [*ENGINES, "exact"])
-@pytest.mark.parametrize("pieces", [20, 23])
-@pytest.mark.parametrize("rise", [0.0, 1e-12, 1e-9, 1e-7, 1e-5])
+@pytest.mark.parametrize(("pieces", "rise"), [(20, 0.0), (23, 1e-9), (20, 1e-7), (23, 1e-5)])
 def test_ball_rolls_over_vertices(engine: str, rise: float, pieces: int) -> None:
     scene = sliding_body("ball", wall_points(pieces, rise), spin=-15.0, gap=2.0 * rise, friction=0.5)
     run = sandbox.run(scene, engine=engine)

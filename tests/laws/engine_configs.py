@@ -10,6 +10,7 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
+from tests.engines.builders import make_scene
 
 
 class EngineConfig(NamedTuple):
@@ -89,10 +90,8 @@ def pair(e: float, mass: tuple[float, float], offset: float, speed: float, **key
 
 def drop(e: float, height: float, duration: float, radius: float = 0.5) -> Scene:
     """Return a ball dropped from a height, m, above a plane."""
-    return from_document(
-        {
-            "world": {"gravity": [0.0, -9.81], "duration": duration},
-            "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": e}],
-            "ball": [{"position": [0.0, radius + height], "radius": radius}],
-        }
+    return make_scene(
+        world={"gravity": [0.0, -9.81], "duration": duration},
+        plane=[{"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": e}],
+        ball=[{"position": [0.0, radius + height], "radius": radius}],
     )

@@ -3,6 +3,10 @@
 import copy
 from typing import Any
 
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
+
 Document = dict[str, Any]
 
 
@@ -55,7 +59,7 @@ def _joint(kind: str, *between: str) -> Document:
 
 FEATURES: dict[str, Document] = {
     "nothing": {},
-    "attraction to a place": {"attraction": [{"toward": [0.0, 3.0], "strength": 1.0}]},
+    "attraction to a place": {"attraction": [{"toward": [0.0, 5.0], "strength": 1.0}]},
     "attraction to a body": {"attraction": [{"toward": "a", "strength": 1.0}]},
     "attractions": {"attraction": [{"toward": "a", "strength": 1.0}, {"toward": [1, 1], "strength": 1.0}]},
     "thrust": {"thrust": [{"name": "t", "body": "a", "force": [1.0, 0.0]}]},
@@ -72,6 +76,9 @@ FEATURES: dict[str, Document] = {
     "drifting wall": {"wall": [{**_WALL, "surface_velocity": [1.0, -2.0], "friction": 0.5}]},
     "one-way wall": {"wall": [{**_WALL, "one_way": True}]},
     "open wall": {"wall": [{**_WALL, "solid": False}]},
+    "categories": {"wall": [{**_WALL, "categories": ["curtain"]}], "ball": [_ball("c", -2.0, mask=["stage"])]},
+    "groups": {"ball": [_ball("c", -2.0, group="crowd"), _ball("d", -2.5, group="crowd")], "wall": [_WALL]},
+    "kinematic body": {"box": [{**_box("c", 0.0), "position": [0.0, 1.5], "kinematic": True, "velocity": [0.5, 0.5]}]},
     "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},
     "zone": {"zone": [{"position": [0.0, 2.5], "radius": 2.0}]},
     "holding zone": {"zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True, "gravity": [1.0, 1.0]}]},
@@ -88,12 +95,12 @@ FEATURES: dict[str, Document] = {
         "plane": [{"point": [0, 0], "normal": [0, 1], "material": "m"}],
     },
     "floor": {**_NO_GRAVITY, "surface": _FLOOR, "wall": [{**_WALL, "height": 0.6}]},
-    "shot": {**_NO_GRAVITY, "surface": _FLOOR, "shot": [{"ball": "a", "speed": 1.0, "aim": [1.0, 0.0]}]},
+    "shot": {**_NO_GRAVITY, "surface": _FLOOR, "shot": [{"ball": "a", "speed": 1.0, "aim": 0.1}]},
     "pockets": {**_NO_GRAVITY, "surface": _FLOOR, "pocket": [{"position": [0.1, 3.0], "radius": 0.9}]},
     "pucks": {**_NO_GRAVITY, "surface": {"sliding_friction": 0.2, "bodies": "pucks", "curl": 0.5}},
     "grid": {"grid": [{"name": "g", "origin": [-3, 5], "columns": 2, "spacing": [1, 1], "radius": 0.2}]},
     "scatter": {"scatter": [{"name": "g", "lower": [-3, 5], "upper": [0, 8], "count": 2, "radius": 0.2}]},
-    "emitter": {"emitter": [{**_EMITTER, "lifetime": 0.03}]},
+    "emitter": {"emitter": [{**_EMITTER, "lifetime": 0.35, "lifetime_jitter": 0.1}]},
     "attracted emitter": {"emitter": [_EMITTER], "attraction": [{"toward": "a", "strength": 1.0}]},
     "stack": {"stack": [{"name": "g", "base": [-4.0, 0.0], "columns": 1, "rows": 2, "size": [1.0, 1.0]}]},
     "rope": {"rope": [{**_ROPE, "links": 1}]},
@@ -137,6 +144,11 @@ FEATURES: dict[str, Document] = {
             {"kind": "gear", "between": ["a"], "ratio": 1.0, "max_bias": 0, "max_force": 0.5},
         ]
     },
+    "pivot with a bias": {"joint": [{**_joint("pivot", "a", "b"), "bias": 0.5}]},
+    "pivot to a driven body": {
+        "drive": [_HINGE | {"kind": "stroke", "rate": 1.0}],
+        "joint": [_joint("pivot", "a", "b")],
+    },
     **{f"weak {kind}": {"joint": [{**_joint(kind, "a", "b"), "strength": 1e-9}]} for kind in JOINTS},
 }
 
@@ -154,3 +166,13 @@ def document(bodies: str, feature: str) -> Document:
                 else value
             )
     return scene
+
+
+def scene_with(feature: str) -> Scene:
+    """Return a scene with a feature and the first bodies that it can have: two, of which one may be fixed, or one."""
+    for bodies in ("two", "one of two fixed", "one"):
+        try:
+            return from_document(document(bodies, feature))
+        except SceneError:  # the feature refers to a body in another way
+            continue
+    raise AssertionError(f"no bodies for {feature!r}")

@@ -8,6 +8,7 @@ import pytest
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
 from tests.laws.engine_configs import IMPULSE_CONFIGS, INTEGRATORS, PENALTY, EngineConfig, drop, each_config
 
 G = 9.81
@@ -32,11 +33,8 @@ def scheme_of(config: EngineConfig) -> str:
 @each_config(FLIGHTS)
 def test_projectile_has_the_closed_form_and_the_error_of_its_scheme(config):
     """Case 1: y = y₀ + v₀ T − ½ g T², plus the error of the scheme, ± g·h·T/2 or none."""
-    scene = from_document(
-        {
-            "world": {"gravity": [0.0, -G], "duration": 2.0},
-            "ball": [{"position": [1, 2], "velocity": [3, 10], "radius": 0.1}],
-        }
+    scene = make_scene(
+        world={"gravity": [0.0, -G], "duration": 2.0}, ball=[{"position": [1, 2], "velocity": [3, 10], "radius": 0.1}]
     )
     result = config.run(scene)
     t = result.time
@@ -67,7 +65,7 @@ def test_bounce_from_5_m(config):
     assert first == pytest.approx(1.0096376, abs=5e-8 if config.engine == "exact" else 2 * h)  # eight digits are given
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @each_config(IMPULSE_CONFIGS)
 def test_elastic_ball_keeps_its_energy_for_100_s(config):
     """Case 8: the energy stays within the band of the scheme."""
@@ -140,14 +138,12 @@ def test_gas_conserves_energy_and_its_momentum_changes_by_wall_impulses(config):
         for k in range(12)
     ]
     sides = [([0, 0], [1, 0]), ([0, 0], [0, 1]), ([6, 6], [-1, 0]), ([6, 6], [0, -1])]
-    scene = from_document(
-        {
-            "world": {"duration": 10.0},
-            "material": [{"name": "s"}],
-            "pair": [{"between": ["s", "s"], "restitution": 1.0}],
-            "plane": [{"point": p, "normal": n, "material": "s"} for p, n in sides],
-            "ball": balls,
-        }
+    scene = make_scene(
+        world={"duration": 10.0},
+        material=[{"name": "s"}],
+        pair=[{"between": ["s", "s"], "restitution": 1.0}],
+        plane=[{"point": p, "normal": n, "material": "s"} for p, n in sides],
+        ball=balls,
     )
     result = config.run(scene, dt=0.005)
     energy = energies(result, scene).total

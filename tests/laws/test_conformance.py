@@ -157,9 +157,8 @@ PROOFS: dict[Demand, Proof] = {
     Demand.BALL_POST: Proof(
         scene(ball=[ball(vx=2.0)], post=[{"position": [1.0, 0.0], "radius": 0.25}]), position(0.5, 0.0)
     ),
-    Demand.POLYGONS: Proof(
-        scene(world=GRAVITY, box=[box(0.0, 0.3)], plane=[FLOOR]), position(0.0, 0.25)
-    ),  # it rests on two corners
+    # it rests on two corners
+    Demand.POLYGONS: Proof(scene(world=GRAVITY, box=[box(0.0, 0.3)], plane=[FLOOR]), position(0.0, 0.25)),
     Demand.RESTITUTION: Proof(scene(ball=[ball(vx=2.0)], wall=[{**WALL, "restitution": 0.5}]), velocity(-1.0, 0.0)),
     # a disc that slides rolls at 2/3 of its speed
     Demand.FRICTION: Proof(
@@ -232,8 +231,7 @@ PROOFS: dict[Demand, Proof] = {
     # x = cos ω t with ω² = k/m
     Demand.SPRINGS: Proof(
         scene(
-            ball=[ball(1.0, name="a")],
-            joint=[{**_pendulum(), "kind": "spring", "rest_length": 0.0, "stiffness": 4.0}],
+            ball=[ball(1.0, name="a")], joint=[{**_pendulum(), "kind": "spring", "rest_length": 0.0, "stiffness": 4.0}]
         ),
         position(math.cos(2.0), 0.0),
     ),
@@ -310,8 +308,7 @@ PROOFS: dict[Demand, Proof] = {
     Demand.SURFACE: Proof(scene(surface=_floor(), ball=[ball(vx=1.4)]), velocity(1.0, 0.0)),
     Demand.SPIN: Proof(scene(surface=_floor(), ball=[ball(vx=-1.4)]), velocity(-1.0, 0.0)),
     Demand.POCKETS: Proof(
-        scene(surface=_floor(), ball=[ball(vx=1.4)], pocket=[{"position": [0.8, 0.0], "radius": 0.3}]),
-        is_pocketed,
+        scene(surface=_floor(), ball=[ball(vx=1.4)], pocket=[{"position": [0.8, 0.0], "radius": 0.3}]), is_pocketed
     ),
     # s = v²/(2 μ g)
     Demand.PUCKS: Proof(
@@ -326,10 +323,7 @@ PROOFS: dict[Demand, Proof] = {
     ),
     # a body in another layer passes the wall
     Demand.LAYERS: Proof(
-        scene(
-            ball=[ball(vx=2.0), ball(0.0, 0.7, vx=2.0, layer="ramp")],
-            wall=[{**WALL, "layers": ["ramp"]}],
-        ),
+        scene(ball=[ball(vx=2.0), ball(0.0, 0.7, vx=2.0, layer="ramp")], wall=[{**WALL, "layers": ["ramp"]}]),
         both(position(2.0, 0.0), position(0.75, 0.7, body=1)),
     ),
     # the first wall is not in the ball's mask, the second one is
@@ -348,8 +342,7 @@ PROOFS: dict[Demand, Proof] = {
     # a paddle at −1 m/s hits the ball, which had 1 m/s, at 0.325 s: without loss it then has −3 m/s
     Demand.KINEMATIC: Proof(
         scene(
-            ball=[ball(vx=1.0, restitution=1.0)],
-            box=[box(1.4, velocity=[-1.0, 0.0], restitution=1.0, kinematic=True)],
+            ball=[ball(vx=1.0, restitution=1.0)], box=[box(1.4, velocity=[-1.0, 0.0], restitution=1.0, kinematic=True)]
         ),
         both(position(0.325 - 3.0 * 0.675, 0.0), position(0.4, 0.0, body=1)),
     ),

@@ -12,9 +12,10 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 R = 0.0285
+RAIL = {"height": 0.036, "restitution": 0.85, "friction": 0.2}
 CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]]
 
 offsets = st.floats(-0.3, 0.3)
@@ -29,7 +30,8 @@ def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
         "solver": {"dt": 0.01, "substeps": 10},
         "surface": {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.0127},
         "contact_models": {"ball_ball": ball_ball, "cushion": cushion},
-        "wall": [{"points": CORNERS, "closed": True, "height": 0.036, "restitution": 0.85, "friction": 0.2}],
+        "wall": [{"points": CORNERS, "closed": True, **RAIL}, {"points": [[0.2, 1.2], [0.25, 1.3]], **RAIL}],
+        "post": [{"position": [0.8, 1.1], "radius": 0.02, **RAIL}, {"position": [0.5, 1.0], "radius": 0.02, **RAIL}],
         "ball": [{"name": "cue", "position": [0.5, 0.5], **ball}, {"name": "a", "position": target, **ball}],
         "shot": [{"aim": aim, **more}],
     }

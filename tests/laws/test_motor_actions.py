@@ -7,9 +7,10 @@ import pytest
 
 import sandbox
 from sandbox.action import ActionError, SetParameter, Switch
-from sandbox.engines.registry import ENGINES, start
+from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
+from tests.engines.stepping import advance
 
 ENGINES_WITH_MOTORS = ("pymunk", "reference", "box2d")
 
@@ -43,12 +44,10 @@ def test_wheel_follows_the_rate_of_its_motor(engine: str, path: str) -> None:
 def test_largest_torque_accelerates_a_wheel(engine: str) -> None:
     """A torque of 6 N·m accelerates the wheel by 3 rad/s²; without a limit it has its rate at once."""
     simulation = start(wheel(max_torque=0.0, rate=50.0), engine)
-    for _ in range(10):
-        simulation.step()
+    advance(simulation, 10)
     assert simulation.frame().angular_velocity[0] == 0.0
     simulation.apply(set_value("joint.engine.max_torque", 6.0))
-    for _ in range(100):
-        simulation.step()
+    advance(simulation, 100)
     assert simulation.frame().angular_velocity[0] == pytest.approx(3.0, rel=1e-5)
     simulation.apply(set_value("joint.engine.max_torque", None))
     simulation.step()
@@ -104,7 +103,3 @@ def test_invalid_change_is_refused_and_changes_nothing(engine: str, path: str, v
 def test_motors_are_the_only_joints_that_can_change() -> None:
     with pytest.raises(ActionError, match="rate and max_torque of motors"):
         start(wheel(), "pymunk").apply(set_value("joint[0].bias", 0.5))
-
-
-def test_engines_with_motors_are_known() -> None:
-    assert {name for name in ENGINES if not ENGINES[name].missing(wheel(), wheel().solver)} == {*ENGINES_WITH_MOTORS}

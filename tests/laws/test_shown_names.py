@@ -8,92 +8,40 @@ from sandbox.measure.preflight import notes, warnings
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import path_of
 from sandbox.scene.files.document import to_document
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import from_document
 from sandbox.scene.files.overrides import AddressError, assign, parse_assignment
 
-UNNAMED = """
-[world]
-gravity = [0, -9.81]
-[solver]
-dt = 0.05
-iterations = 1
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[plane]]
-point = [0, -1]
-normal = [0, 1]
-[[wall]]
-points = [[20, 0], [20, 9]]
-kick = { speed = 1.0, threshold = 0.1 }
-[[post]]
-position = [30, 0]
-radius = 1
-[[zone]]
-position = [-30, 4]
-radius = 0.01
-[[ball]]
-position = [0, 20]
-radius = 0.01
-[[ball]]
-position = [1, 20]
-radius = 0.01
-mass = 1000
-[[ball]]
-position = [2, 20]
-radius = 0.01
-[[box]]
-position = [5, 20]
-size = [0.1, 0.1]
-[[capsule]]
-position = [-5, 20]
-length = 0.2
-radius = 0.1
-[[polygon]]
-position = [-8, 20]
-points = [[0, 0], [2, 0], [2, 2], [1, 0.5], [0, 2]]
-[[box]]
-position = [9, 20]
-size = [0.1, 1]
-[[joint]]
-kind = "rod"
-between = ["ball-1", "ball-2"]
-length = 3
-[[joint]]
-kind = "rod"
-between = ["ball-2", "ball-3"]
-[[joint]]
-kind = "spring"
-between = ["box-1"]
-anchors = [[0, 30], [0, 0]]
-stiffness = 1e6
-[[thrust]]
-body = "ball-1"
-force = [0, 1]
-[[drive]]
-kind = "stroke"
-body = "box-2"
-pivot = [9, 20]
-stops = [0, 1]
-rate = 3
-[[rope]]
-start = [-20, 20]
-end = [-10, 20]
-links = 4
-mass = 0.001
-[[grid]]
-origin = [40, 20]
-columns = 3
-spacing = [0.5, 0.5]
-radius = 0.01
-"""
+UNNAMED = {
+    "world": {"gravity": [0, -9.81]},
+    "solver": {"dt": 0.05, "iterations": 1},
+    "plane": [{"point": [0, 0], "normal": [0, 1]}, {"point": [0, -1], "normal": [0, 1]}],
+    "wall": [{"points": [[20, 0], [20, 9]], "kick": {"speed": 1.0, "threshold": 0.1}}],
+    "post": [{"position": [30, 0], "radius": 1}],
+    "zone": [{"position": [-30, 4], "radius": 0.01}],
+    "ball": [
+        {"position": [0, 20], "radius": 0.01}, {"position": [1, 20], "radius": 0.01, "mass": 1000},
+        {"position": [2, 20], "radius": 0.01},
+    ],
+    "box": [{"position": [5, 20], "size": [0.1, 0.1]}, {"position": [9, 20], "size": [0.1, 1]}],
+    "capsule": [{"position": [-5, 20], "length": 0.2, "radius": 0.1}],
+    "polygon": [{"position": [-8, 20], "points": [[0, 0], [2, 0], [2, 2], [1, 0.5], [0, 2]]}],
+    "joint": [
+        {"kind": "rod", "between": ["ball-1", "ball-2"], "length": 3},
+        {"kind": "rod", "between": ["ball-2", "ball-3"]},
+        {"kind": "spring", "between": ["box-1"], "anchors": [[0, 30], [0, 0]], "stiffness": 1000000.0},
+    ],
+    "thrust": [{"body": "ball-1", "force": [0, 1]}],
+    "drive": [{"kind": "stroke", "body": "box-2", "pivot": [9, 20], "stops": [0, 1], "rate": 3}],
+    "rope": [{"start": [-20, 20], "end": [-10, 20], "links": 4, "mass": 0.001}],
+    "grid": [{"origin": [40, 20], "columns": 3, "spacing": [0.5, 0.5], "radius": 0.01}],
+}  # fmt: skip
 
 GENERATORS = ("rope", "grid")
 
 
 @pytest.fixture(scope="module")
 def scene() -> Scene:
-    return loads(UNNAMED)
+    return from_document(UNNAMED)
 
 
 def tables_of(scene: Scene, name: str) -> list[str]:

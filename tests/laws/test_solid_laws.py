@@ -8,7 +8,7 @@ import pytest
 from sandbox.scene.files.load import from_document
 from tests.laws.engine_configs import EngineConfig, each_config
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 G = 9.81
 SOLID = [
@@ -111,21 +111,6 @@ def test_tower_stands_and_the_ground_supports_its_weight(config):
     ground = (result.contact_pair == (0, -1)).all(axis=1)
     weight = -result.contact_impulse[ground][:, 1].sum() / 5.0
     assert weight == pytest.approx(5 * G, rel=1e-3)  # during the settling by the slop the weight is not supported
-
-
-@each_config(SOLID)
-def test_pyramid_stands(config):
-    """Case 16."""
-    rows = 5
-    plane = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "friction": 0.6}
-    boxes = [
-        {"name": f"{row} {k}", "position": [k - 0.5 * (rows - row - 1), 0.5 + row], "size": [0.9, 1.0], "friction": 0.6}
-        for row in range(rows)
-        for k in range(rows - row)
-    ]
-    scene = from_document({"world": {"gravity": [0.0, -G], "duration": 5.0}, "plane": [plane], "box": boxes})
-    result = config.run(scene, dt=1 / 120, substeps=2, iterations=30, record_every=60)
-    assert np.abs(result.position[-1] - result.position[0]).max() <= 0.06  # as above
 
 
 @each_config(SOLID)

@@ -6,6 +6,7 @@ import pytest
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
 from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, each_config
 
 TOLERANCE = 1e-12  # m and m/s: rounding of 1e-16, amplified by less than 1e3 in the impacts
@@ -25,13 +26,11 @@ def four_balls(order=(0, 1, 2, 3), mirror=1.0, drift=(0.0, 0.0), gravity=0.0):
         x, y = ball["position"]
         vx, vy = ball["velocity"]
         ball["position"], ball["velocity"] = [mirror * x, y], [mirror * (vx + drift[0]), vy + drift[1]]
-    return from_document(
-        {
-            "world": {"duration": 1.0, "gravity": [0.0, gravity]},
-            "material": [{"name": "x"}, {"name": "y"}],
-            "pair": PAIRS,
-            "ball": [balls[k] for k in order],
-        }
+    return make_scene(
+        world={"duration": 1.0, "gravity": [0.0, gravity]},
+        material=[{"name": "x"}, {"name": "y"}],
+        pair=PAIRS,
+        ball=[balls[k] for k in order],
     )
 
 
@@ -40,7 +39,7 @@ def state(result, order=(0, 1, 2, 3)):
     return result.position[-1][by_name], result.velocity[-1][by_name], result.angular_velocity[-1][by_name]
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
     expected = config.run(four_balls())

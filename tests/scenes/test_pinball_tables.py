@@ -19,8 +19,9 @@ from sandbox.scene.description.forces import PlungerDrive
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 TABLES = ("pinball/classic", "pinball/full")
 RADIUS = 0.01349
@@ -160,12 +161,10 @@ def test_flipper_turns_to_its_raised_stop_and_back(name: str, side: str) -> None
     rest, raised = (-0.541, 0.349) if side == "left" else (math.pi + 0.541, math.pi - 0.349)
     assert scene.bodies.angle[flipper] == pytest.approx(rest, abs=1e-12)
     simulation.apply(Drive(time=0.0, drive=f"{side} flipper", level=1.0))
-    for _ in range(10):
-        simulation.step()
+    advance(simulation, 10)
     assert simulation.frame().angle[flipper] == pytest.approx(raised, abs=0.01)  # settled: a stroke takes 34 ms
     simulation.apply(Drive(time=0.1, drive=f"{side} flipper", level=0.0))
-    for _ in range(30):
-        simulation.step()
+    advance(simulation, 30)
     assert simulation.frame().angle[flipper] == pytest.approx(rest, abs=0.01)  # the return takes 118 ms
     simulation.close()
 
@@ -255,24 +254,7 @@ def test_dropped_target_lets_the_ball_pass_to_the_wall_behind(up: bool) -> None:
     assert touched & {"left drops 2", "left roof"} == ({"left drops 2"} if up else {"left roof"})
 
 
-@every_table
-def test_same_actions_give_bitwise_equal_states(name: str) -> None:
-    scene = table(name)
-    drive_levels = {20: ("plunger", 1.0), 130: ("plunger", 0.0), 250: ("left flipper", 1.0)}
-    ends = []
-    for _ in range(2):
-        simulation = start(scene, "pymunk", scene.solver)
-        for k in range(300):
-            if k in drive_levels:
-                simulation.apply(Drive(time=simulation.time, drive=drive_levels[k][0], level=drive_levels[k][1]))
-            simulation.step()
-        ends.append(simulation.frame())
-        simulation.close()
-    assert np.array_equal(ends[0].position, ends[1].position)
-    assert np.array_equal(ends[0].velocity, ends[1].velocity)
-
-
-@pytest.mark.slow
+@pytest.mark.nightly
 @every_table
 def test_ball_dropped_anywhere_reaches_the_drain_or_a_holding_zone(name: str) -> None:
     scene = table(name)
@@ -287,9 +269,7 @@ def test_ball_dropped_anywhere_reaches_the_drain_or_a_holding_zone(name: str) ->
     document["world"]["bounds"] = [[-0.05, BOTTOM], [0.57, 1.12]]
     dropped = from_document(document)
     simulation = start(dropped, "pymunk", dropped.solver)
-    for _ in range(2500):
-        simulation.step()
-    frame = simulation.frame()
+    frame = advance(simulation, 2500).frame()
     simulation.close()
     count = len(positions)
     holes = [zone.position for zone in scene.zones if zone.holds]

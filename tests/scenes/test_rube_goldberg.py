@@ -8,7 +8,7 @@ import sandbox
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 STAGES = [
     ("marble", "domino-1"), ("domino-1", "domino-2"), ("domino-8", "domino-9"), ("domino-9", "pusher"),
@@ -44,9 +44,7 @@ def test_stages_happen_in_order(machine: tuple[list[float], sandbox.Trajectory])
     assert times[-1] < 15.0
 
 
-def test_threads_tear_when_the_ball_lands_and_the_flag_rises(
-    machine: tuple[list[float], sandbox.Trajectory],
-) -> None:
+def test_threads_tear_when_the_ball_lands_and_the_flag_rises(machine: tuple[list[float], sandbox.Trajectory]) -> None:
     times, run = machine
     landed = times[STAGES.index(("fourth", "tray"))]
     torn = sorted(time for time in run.broken_time.tolist() if time == time)  # nan for joints that hold
@@ -59,9 +57,9 @@ def test_threads_tear_when_the_ball_lands_and_the_flag_rises(
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param(["solver.dt=0.005"], marks=pytest.mark.slow),
-        pytest.param(["solver.iterations=40"], marks=pytest.mark.slow),
-        pytest.param(["solver.dt=0.004", "solver.iterations=30"], marks=pytest.mark.slow),
+        pytest.param(["solver.dt=0.005"], marks=pytest.mark.nightly),
+        pytest.param(["solver.iterations=40"], marks=pytest.mark.nightly),
+        pytest.param(["solver.dt=0.004", "solver.iterations=30"], marks=pytest.mark.nightly),
         ["solver.substeps=2"],
     ],
 )

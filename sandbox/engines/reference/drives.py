@@ -96,16 +96,32 @@ class DrivenBody(ABC):
         return -self.mass * float(np.dot(self.gravity, pose[self.index, :2]))
 
 
-class HingedBody(DrivenBody):
-    """A driven body that turns about a hinge, whose position is in states."""
+class MountedBody(DrivenBody):
+    """A driven body with a drive that an action sets."""
 
     def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
         super().__init__(store, index)
+        self.mount = mount
+        self._drives: FloatArray = store.drives
+
+    @property
+    def state(self) -> FloatArray:
+        """(3,) of its drive, as in a frame; written to.
+
+        It is looked up each time: the copy of a stored view would not be a view of the copied drives.
+        """
+        state: FloatArray = self._drives[self.mount.number]
+        return state
+
+
+class HingedBody(MountedBody):
+    """A driven body that turns about a hinge, whose position is in states."""
+
+    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
+        super().__init__(store, index, mount)
         assert isinstance(mount.drive, TorqueDrive | StrokeDrive)
-        self.mount, self._origin = mount, mount.drive.pivot
+        self._origin = mount.drive.pivot
         self.moment = about_hinge(mount, self.mass, self.moment)
-        self.state: FloatArray = store.drives[mount.number]
-        """(3,) of its drive, as in a frame; written to"""
 
     def use_hinges(self, x: State) -> None:
         """Replace the centre of mass by the hinge in a state."""
@@ -229,15 +245,13 @@ class KinematicHinge(HingedBody):
             after[1, self.index, 2] = 0.0
 
 
-class DrivenPlunger(DrivenBody):
+class DrivenPlunger(MountedBody):
     """A body that is drawn back along a line and driven forward by a spring."""
 
     def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
-        super().__init__(store, index)
+        super().__init__(store, index, mount)
         assert isinstance(mount.drive, PlungerDrive)
         self._home, self._drive, self._direction = mount.home, mount.drive, stroke_direction(mount.drive)
-        self.state: FloatArray = store.drives[mount.number]
-        """(3,) of its drive, as in a frame; written to"""
 
     def plan(self, x: State, h: float) -> None:
         """Plan the motion by the hand or by the spring, depending on the level."""

@@ -8,22 +8,21 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sandbox.engines.exact.engine import ExactEngine
-from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 G = 9.81
 mpmath.mp.dps = 40
 
 
 def bouncing_scene(restitution, height=5.0, dt=0.5):
-    return from_document(
-        {
-            "world": {"gravity": [0, -G]},
-            "solver": {"dt": dt},
-            "plane": [{"point": [0, 0], "normal": [0, 1]}],
-            "ball": [{"position": [0, height + 0.5], "radius": 0.5, "restitution": restitution}],
-        }
+    return make_scene(
+        world={"gravity": [0, -G]},
+        solver={"dt": dt},
+        plane=[{"point": [0, 0], "normal": [0, 1]}],
+        ball=[{"position": [0, height + 0.5], "radius": 0.5, "restitution": restitution}],
     )
 
 
@@ -106,22 +105,19 @@ def test_gas_of_16_agrees_with_40_digits_up_to_its_50th_collision():
     position = np.array([(0.5 + k % 4, 0.5 + k // 4) for k in range(16)]) + random.uniform(-0.1, 0.1, (16, 2))
     velocity = random.normal(size=(16, 2))
     walls = [((0, 0), (0, 1)), ((0, 0), (1, 0)), ((4, 4), (0, -1)), ((4, 4), (-1, 0))]
-    scene = from_document(
-        {
-            "solver": {"dt": 0.01},
-            "plane": [{"point": list(p), "normal": list(n)} for p, n in walls],
-            "ball": [
-                {"position": x.tolist(), "velocity": v.tolist(), "radius": 0.25, "restitution": 1.0}
-                for x, v in zip(position, velocity, strict=True)
-            ],
-        }
+    scene = make_scene(
+        solver={"dt": 0.01},
+        plane=[{"point": list(p), "normal": list(n)} for p, n in walls],
+        ball=[
+            {"position": x.tolist(), "velocity": v.tolist(), "radius": 0.25, "restitution": 1.0}
+            for x, v in zip(position, velocity, strict=True)
+        ],
     )
     time, x, _ = gas_by_mpmath(position, velocity, 0.25, 4, 50)
     simulation = ExactEngine().start(scene)
     simulation.contacts()
     steps, remainder = divmod(float(time), 0.01)
-    for _ in range(int(steps)):
-        simulation.step()
+    advance(simulation, int(steps))
     simulation.finish(remainder / 0.01)
     contacts = simulation.contacts()
     times = contacts.time[contacts.pair[:, 1] >= 0]
@@ -185,23 +181,20 @@ def test_ball_among_planes_a_post_and_a_wall_end_agrees_with_dop853():
         circle((1.5, 0.8), 0.01),
     ]
     times, state = flight_by_dop853(start, gaps, e, 4.0)
-    scene = from_document(
-        {
-            "world": {"gravity": [0, -G]},
-            "plane": [
-                {"point": [0, 0], "normal": [0, 1]},
-                {"point": [-2, 0], "normal": [1, 0.1]},
-                {"point": [2.5, 0], "normal": [-1, 0]},
-            ],
-            "wall": [{"points": [[1.5, 0.8], [1.5, -9.0]], "thickness": 0.02}],
-            "post": [{"position": [0.4, 0.6], "radius": 0.3}],
-            "ball": [{"position": [0.1, 2.0], "velocity": [0.7, 0.3], "radius": radius, "restitution": e}],
-        }
+    scene = make_scene(
+        world={"gravity": [0, -G]},
+        plane=[
+            {"point": [0, 0], "normal": [0, 1]},
+            {"point": [-2, 0], "normal": [1, 0.1]},
+            {"point": [2.5, 0], "normal": [-1, 0]},
+        ],
+        wall=[{"points": [[1.5, 0.8], [1.5, -9.0]], "thickness": 0.02}],
+        post=[{"position": [0.4, 0.6], "radius": 0.3}],
+        ball=[{"position": [0.1, 2.0], "velocity": [0.7, 0.3], "radius": radius, "restitution": e}],
     )
     simulation = ExactEngine().start(scene)
     simulation.contacts()
-    for _ in range(400):
-        simulation.step()
+    advance(simulation, 400)
     contacts = simulation.contacts()
     assert len(times) >= 8
     assert {-4, -5} <= set(contacts.pair[:, 1].tolist())  # the wall's end and the post

@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from sandbox.engines.exact.engine import ExactEngine
-from sandbox.scene.files.load import from_document, load
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import from_document
 
 G = 9.81
 
@@ -32,28 +30,6 @@ def test_sliding_disc_rolls_after_v_over_3_mu_g():
     assert frame.angular_velocity[0] == pytest.approx(-4.0, abs=1e-14)
     assert frame.position[0] == pytest.approx([distance, 0.5], abs=1e-14)
     assert simulation.events == 2  # the start of contact and of rolling
-
-
-@pytest.mark.parametrize(
-    ("friction", "acceleration"), [(0.5, G / 3), (0.2, G / 3), (0.1, G * (0.5 - 0.1 * math.sqrt(0.75)))]
-)
-def test_incline_rolls_or_slips(friction, acceleration):
-    scene = load(find("incline"), [f"plane.slope.friction={friction}"])
-    simulation = ExactEngine().start(scene)
-    frame = advance(simulation, 2.0)
-    assert np.hypot(*(frame.position - scene.bodies.position)[0]) == pytest.approx(2 * acceleration, rel=1e-14)
-    assert np.hypot(*frame.velocity[0]) == pytest.approx(2 * acceleration, rel=1e-14)
-    spin = -4 * acceleration if friction > 0.1 else -4 * 2 * 0.1 * G * math.sqrt(0.75)  # v/r, or μ m g_n r/I t
-    assert frame.angular_velocity[0] == pytest.approx(spin, rel=1e-13)
-
-
-def test_inelastic_ball_stays_where_it_lands():
-    simulation = simulation_of(
-        {"plane": [{"point": [0, 0], "normal": [0, 1]}], "ball": [{"position": [0, 3], "radius": 0.5}]}
-    )
-    frame = advance(simulation, 3.0)
-    assert frame.position[0].tolist() == pytest.approx([0, 0.5], abs=1e-15)  # one rounding
-    assert frame.velocity[0].tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])

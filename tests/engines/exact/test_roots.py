@@ -69,9 +69,8 @@ def test_first_downward_root_matches_40_digits(coefficients):
 def test_quadratic_roots_are_roots(a, b, c):
     for t in quadratic_roots(a, b, c):
         if math.isfinite(t):
-            assert abs(a * t * t + b * t + c) <= 1e-13 * (
-                abs(a * t * t) + abs(b * t) + abs(c)
-            )  # rounding of three terms
+            # rounding of three terms
+            assert abs(a * t * t + b * t + c) <= 1e-13 * (abs(a * t * t) + abs(b * t) + abs(c))
 
 
 @given(st.floats(-3, 3), st.floats(1.5, 6), st.floats(-5, 5), st.floats(-5, 5))

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, can_collide, cell_of, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
-from tests.engines.reference.pieces import advance, ball, body_store_of, scene_of, shipped, simulation_of, small_pile
+from tests.engines.builders import ball, body_store_of, scene_of, shipped, simulation_of, small_pile
+from tests.engines.stepping import advance
 
 COLLIDES = st.sampled_from(["all", "fixed", "none"])
 
@@ -47,7 +48,7 @@ def contact_columns(finder, position, margin=0.0):
     return [column.tolist() for column in contacts]
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @given(crowds())
 def test_all_broad_phases_find_the_same_manifolds(balls):
     store = body_store_of(scene_of(*balls))
@@ -96,7 +97,7 @@ def touching_within_rounding(count):
             count -= 1
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_overlaps_below_rounding_far_from_the_origin_are_found(name):
     for x, a, other, b in touching_within_rounding(300):
@@ -180,36 +181,28 @@ def test_one_huge_ball_defeats_the_grid_but_not_the_sweep():
     assert tests["sweep"] < tests["grid"] / 20
 
 
-def runs_are_identical(scene, steps, **settings):
-    runs = [advance(simulation_of(scene, broad_phase=name, **settings), steps) for name in BROAD_PHASES]
-    assert runs[0].work["contacts"] > 0
-    return len({run.state_hash() for run in runs}) == 1
-
-
-def test_gas_runs_identically_on_all_broad_phases():
-    assert runs_are_identical(shipped("benchmark/gas"), 120, dt=0.01)
-
-
-def test_pile_runs_identically_on_all_broad_phases():
-    assert runs_are_identical(small_pile(), 80)
-
-
-@pytest.mark.parametrize("detection", ["bisect", "swept", "shrink"])
-def test_pile_runs_identically_on_all_broad_phases_with_each_detection(detection):
-    assert runs_are_identical(small_pile(18), 40, detection=detection)
-
-
-def test_penalty_pile_runs_identically_on_all_broad_phases():
-    assert runs_are_identical(small_pile(), 20, response="penalty", substeps=20)
-
-
-def test_mixed_sizes_run_identically_on_all_broad_phases():
+def mixed_sizes():
+    """Return balls of five sizes that fall on a hill."""
     radii = [0.02, 0.3, 0.05, 1.0, 0.1]
     balls = [ball(1.1 * (k % 6), 1.2 + 1.3 * (k // 6), radius=radii[k % 5] / 2, name=f"b{k}") for k in range(30)]
-    scene = scene_of(
-        *balls, ball(3, -3, radius=3.0, fixed=True, name="hill"), world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005}
-    )
-    assert runs_are_identical(scene, 200)
+    hill = ball(3, -3, radius=3.0, fixed=True, name="hill")
+    return scene_of(*balls, hill, world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005})
+
+
+@pytest.mark.parametrize(
+    ("scene", "steps", "settings"),
+    [
+        (shipped("benchmark/gas"), 120, {"dt": 0.01}),
+        (small_pile(), 80, {}),
+        *((small_pile(18), 40, {"detection": detection}) for detection in ("bisect", "swept", "shrink")),
+        (small_pile(), 20, {"response": "penalty", "substeps": 20}),
+        (mixed_sizes(), 200, {}),
+    ],
+)
+def test_scene_runs_identically_on_all_broad_phases(scene, steps, settings):
+    runs = [advance(simulation_of(scene, broad_phase=name, **settings), steps) for name in BROAD_PHASES]
+    assert runs[0].work["contacts"] > 0
+    assert len({run.state_hash() for run in runs}) == 1
 
 
 def test_pair_keys_hold_both_indices_and_sort_like_pairs():

@@ -54,9 +54,8 @@ def test_contact_points_lie_midway_between_the_surfaces():
             one, other = sorted((abs(near), abs(far)))
             assert one == pytest.approx(0.0, abs=1e-9 * size)  # SLACK; the reference face is the same at both points
             if separation == rows[:, 2].min():
-                assert other == pytest.approx(
-                    0.0, abs=REFERENCE_FACE_BIAS * size
-                )  # within the bias a corner may lie beside the face
+                # within the bias a corner may lie beside the face
+                assert other == pytest.approx(0.0, abs=REFERENCE_FACE_BIAS * size)
 
 
 def test_feature_ids_ascend_to_the_left_of_the_normal():

@@ -12,9 +12,10 @@ from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.continuous import DETECTIONS, MAX_IMPACTS
 from sandbox.measure.run.runner import run
 from sandbox.scene.description.bodies import Box
-from tests.engines.reference.pieces import EARTH, FLOOR, advance, ball, scene_of, shipped, simulation_of
+from tests.engines.builders import EARTH, FLOOR, ball, scene_of, shipped, simulation_of
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # hundreds of combinations
+pytestmark = pytest.mark.fail_slow(30)  # hundreds of combinations
 
 NON_CONTINUOUS, CONTINUOUS = ["discrete", "bisect"], ["swept", "shrink"]
 
@@ -73,7 +74,6 @@ def test_fast_ball_of_the_tutorial_bounces_within_its_first_step():
     assert simulation.frame().position[0, 1] == pytest.approx(0.5 + 5.5, rel=1e-12)  # moves up for the rest of the step
 
 
-BULLET = shipped("benchmark/bullet")
 DISTANCE = 0.01 + 0.02 / 2  # m, between the centre of the bullet and the middle of the wall at contact: r + w/2
 
 
@@ -96,7 +96,7 @@ def shot(detection, travel, lead=1e-6, **settings):
     return farthest, float(simulation.frame().velocity[0, 0])
 
 
-@pytest.mark.parametrize("fraction", [0.5, 0.9, 0.99])
+@pytest.mark.parametrize("fraction", [0.5, 0.99])
 @pytest.mark.parametrize("detection", DETECTIONS)
 def test_no_detection_tunnels_if_the_travel_per_step_is_below_the_contact_distance(detection, fraction):
     farthest, speed = shot(detection, fraction * DISTANCE)
@@ -104,7 +104,7 @@ def test_no_detection_tunnels_if_the_travel_per_step_is_below_the_contact_distan
     assert speed == pytest.approx(-50.0, rel=1e-12)  # some roundings
 
 
-@pytest.mark.parametrize("fraction", [1.01, 2.5, 10.0, 100.0])
+@pytest.mark.parametrize("fraction", [1.01, 100.0])
 @pytest.mark.parametrize("detection", NON_CONTINUOUS)
 def test_detection_at_the_end_of_a_step_tunnels_above_the_contact_distance(detection, fraction):
     farthest, speed = shot(detection, fraction * DISTANCE)
@@ -114,32 +114,13 @@ def test_detection_at_the_end_of_a_step_tunnels_above_the_contact_distance(detec
 
 @pytest.mark.parametrize(
     ("detection", "fraction"),
-    [(detection, fraction) for detection in CONTINUOUS for fraction in (1.01, 2.5, 10.0, 100.0)] + [("swept", 1e4)],
+    [(detection, fraction) for detection in CONTINUOUS for fraction in (1.01, 10.0)] + [("swept", 1e4)],
 )
 @pytest.mark.parametrize("integrator", ["explicit_euler", "semi_implicit_euler", "rk4"])
 def test_swept_and_shrink_stop_the_bullet_at_every_speed(detection, fraction, integrator):
     farthest, speed = shot(detection, fraction * DISTANCE, integrator=integrator)
     assert farthest <= 1.0 - DISTANCE / 4  # shrink: at most half a radius deep
     assert speed == pytest.approx(-50.0, rel=1e-12)  # some roundings
-
-
-@pytest.mark.parametrize("detection", CONTINUOUS)
-def test_shipped_bullet_is_stopped_by_continuous_detection(detection):
-    simulation = advance(simulation_of(BULLET, detection=detection), 20)
-    assert simulation.frame().velocity[0, 0] == pytest.approx(-50.0, rel=1e-12)  # as above
-
-
-@pytest.mark.parametrize("detection", NON_CONTINUOUS)
-def test_shipped_bullet_tunnels_with_detection_at_the_end_of_a_step(detection):
-    assert advance(simulation_of(BULLET, detection=detection), 20).frame().velocity[0, 0] == 100.0
-
-
-def test_probability_of_tunnelling_matches_the_formula():
-    """P = 1 − (r + w/2)/(v·h), over the phase of the bullet within its step."""
-    travel = 5 * DISTANCE
-    tunnelled = [shot("discrete", travel, lead)[1] == 100.0 for lead in (np.arange(100) + 0.5) / 100 * travel]
-    # A step ends `lead` before contact; the bullet tunnels unless the next step ends in the last r + w/2.
-    assert sum(tunnelled) == 80
 
 
 OBSTACLES = {
@@ -150,7 +131,7 @@ OBSTACLES = {
 }
 
 
-@pytest.mark.parametrize("speed", [10.0, 1e3, 1e6, 1e9])
+@pytest.mark.parametrize("speed", [10.0, 1e9])
 @pytest.mark.parametrize("name", OBSTACLES)
 def test_swept_bounces_off_every_kind_of_static_shape(name, speed):
     obstacle, contact_x = OBSTACLES[name]
@@ -164,18 +145,16 @@ def test_swept_bounces_off_every_kind_of_static_shape(name, speed):
     assert frame.position[0, 0] == pytest.approx(2 * contact_x - speed, rel=1e-9)  # as above
 
 
-@pytest.mark.parametrize("speed", [10.0, 1e3, 1e6, 1e9])
+@pytest.mark.parametrize("speed", [10.0, 1e9])
 def test_swept_detects_a_collision_of_two_balls(speed):
     pair = {"material": [{"name": "m"}], "pair": [{"between": ["m", "m"], "restitution": 1.0}]}
     balls = [ball(0, 0, velocity=[speed, 0], material="m"), ball(5, 0, material="m")]
     simulation = simulation_of(scene_of(*balls, **pair, solver={"dt": 1.0}), detection="swept")
     simulation.step()
-    assert simulation.frame().velocity[:, 0] == pytest.approx(
-        [0, speed], abs=1e-9 * speed
-    )  # equal masses exchange velocities
-    assert simulation.frame().position[:, 0] == pytest.approx(
-        [4, speed + 1], rel=1e-9
-    )  # at and beyond the point of impact
+    # equal masses exchange velocities
+    assert simulation.frame().velocity[:, 0] == pytest.approx([0, speed], abs=1e-9 * speed)
+    # at and beyond the point of impact
+    assert simulation.frame().position[:, 0] == pytest.approx([4, speed + 1], rel=1e-9)
 
 
 def test_swept_resolves_successive_impacts_within_one_step():
@@ -336,9 +315,8 @@ def test_support_impulse_of_a_resting_ball_is_its_weight_during_impacts_of_anoth
     advance(simulation, 1000)
     contacts = simulation.contacts()
     (alone,) = contacts.impulse[(contacts.pair == (3, -1)).all(axis=1)]
-    assert alone == pytest.approx(
-        [0.0, -9.81 * 5.0], rel=1e-9, abs=1e-9
-    )  # weight of 1 kg over 5 s, up to its residual motion
+    # weight of 1 kg over 5 s, up to its residual motion
+    assert alone == pytest.approx([0.0, -9.81 * 5.0], rel=1e-9, abs=1e-9)
 
 
 def test_swept_refuses_to_spawn_a_polygon_unless_it_collides_with_nothing():
@@ -350,10 +328,14 @@ def test_swept_refuses_to_spawn_a_polygon_unless_it_collides_with_nothing():
     assert advance(simulation, 100).frame().velocity[0].tolist() == [1.0, 0.0]
 
 
-@pytest.mark.parametrize("integrator", ["velocity_verlet", "semi_implicit_euler", "rk4"])
-@pytest.mark.parametrize("size", [[0.6, 0.4], [0.2, 1.5], [2.0, 0.05]])
-@pytest.mark.parametrize("tilt", [0.0, 0.2])
-@pytest.mark.parametrize("e", [0.0, 0.5, 0.7, 1.0])
+@pytest.mark.parametrize(
+    ("e", "tilt", "size", "integrator"),
+    [
+        (0.0, 0.0, [0.6, 0.4], "velocity_verlet"), (0.5, 0.2, [0.6, 0.4], "rk4"),
+        (0.7, 0.2, [0.2, 1.5], "semi_implicit_euler"), (1.0, 0.0, [0.2, 1.5], "velocity_verlet"),
+        (0.5, 0.0, [2.0, 0.05], "semi_implicit_euler"), (1.0, 0.2, [2.0, 0.05], "velocity_verlet"),
+    ],
+)  # fmt: skip
 def test_box_that_lands_flat_stays_flat(e, tilt, size, integrator):
     world = {"gravity": [9.81 * math.sin(tilt), -9.81 * math.cos(tilt)]}
     for ground in ({"plane": [FLOOR]}, {"wall": [{"points": [[-20, 0], [0.1, 0], [20, 0]]}]}):

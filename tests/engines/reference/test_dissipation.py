@@ -12,8 +12,9 @@ from sandbox.measure.preflight import run_preflight
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests.accounts import ledger
+from tests.engines.builders import make_scene
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 ROOM_PLANES = [
     {"point": [0, -2], "normal": [0, 1]},
@@ -62,9 +63,8 @@ def test_dissipative_impacts_never_create_energy(seed: int, count: int, e: float
         energy = kinetic_energy(
             sandbox.run(scene, engine="reference", integrator=integrator, detection=detection), scene
         )
-        assert (
-            np.diff(energy) <= 1e-11 * energy[0]
-        ).all()  # rounding of some impacts a step, each 1e-13 of the energy that it exchanges
+        # rounding of some impacts a step, each 1e-13 of the energy that it exchanges
+        assert (np.diff(energy) <= 1e-11 * energy[0]).all()
 
 
 def test_newtons_law_creates_energy() -> None:
@@ -96,14 +96,12 @@ def test_ledger_books_energy_created_by_impacts_as_phantom() -> None:
     box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.0}
     gains = []
     for angle in (1.2, 1.3, 1.36, 1.4, 1.5):
-        scene = from_document(
-            {
-                "title": "",
-                "world": {"gravity": [0.0, -9.81], "duration": 1.0},
-                "solver": {"dt": 0.002},
-                "plane": [{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
-                "box": [{**box, "angle": angle}],
-            }
+        scene = make_scene(
+            title="",
+            world={"gravity": [0.0, -9.81], "duration": 1.0},
+            solver={"dt": 0.002},
+            plane=[{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
+            box=[{**box, "angle": angle}],
         )
         ledgers = [
             ledger(scene, "pymunk"),
@@ -120,14 +118,12 @@ def test_ledger_books_energy_created_by_impacts_as_phantom() -> None:
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_preflight_warns_of_energy_created_by_impacts(engine: str) -> None:
     box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.3}
-    scene = from_document(
-        {
-            "title": "",
-            "world": {"gravity": [0.0, -9.81], "duration": 1.0},
-            "solver": {"dt": 0.002},
-            "plane": [{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
-            "box": [{**box, "angle": 1.36}],
-        }
+    scene = make_scene(
+        title="",
+        world={"gravity": [0.0, -9.81], "duration": 1.0},
+        solver={"dt": 0.002},
+        plane=[{"point": [0, 0], "normal": [0, 1], "restitution": 0.99, "friction": 1.2}],
+        box=[{**box, "angle": 1.36}],
     )
     (warning,) = [each for each in run_preflight(scene, engine=engine).warnings if each.kind == "energy"]
     assert "dissipative" in warning.message

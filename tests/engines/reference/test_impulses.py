@@ -15,7 +15,8 @@ from sandbox.engines.reference.sequential_impulses import (
     solve_overlaps,
     solve_velocities,
 )
-from tests.engines.reference.pieces import EARTH, FLOOR, advance, ball, scene_of, simulation_of
+from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of
+from tests.engines.stepping import advance
 
 
 def contacts(*rows):

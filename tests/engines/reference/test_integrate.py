@@ -29,23 +29,12 @@ def slope(method: str, error_of: "object") -> float:
     return float(-np.polyfit(np.log(counts), np.log(errors), 1)[0])
 
 
-def oscillator_error(method: str, steps: int) -> float:
-    found = sandbox.integrate(oscillator, [1.0, 0.0], np.linspace(0.0, 3.0, steps + 1), method)
-    exact = [math.cos(OMEGA * 3.0), -OMEGA * math.sin(OMEGA * 3.0)]
-    return float(np.abs(found.x[-1] - exact).max())
-
-
 def driven_error(method: str, steps: int) -> float:
     def u(t: float) -> float:  # -sin t + 0.3 cos t + sin t: the solution is sin t
         return 0.3 * math.cos(t)
 
     found = sandbox.integrate(driven_and_damped, [0.0, 1.0], np.linspace(0.0, 3.0, steps + 1), method, u)
     return float(np.abs(found.x[-1] - [math.sin(3.0), math.cos(3.0)]).max())
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_error_on_an_oscillator_falls_by_the_order(method: str) -> None:
-    assert slope(method, oscillator_error) == pytest.approx(sandbox.INTEGRATORS[method].order, abs=0.2)
 
 
 @pytest.mark.parametrize("method", METHODS)

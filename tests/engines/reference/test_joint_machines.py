@@ -203,10 +203,7 @@ def test_motor_and_gear_agree_with_pymunk(gears: bool, torque: float | None) -> 
 
 def test_groove_agrees_with_pymunk() -> None:
     """The slider swings a bar in which it slides; pymunk clamps the impulse of a point, so passes differ."""
-    joints = [
-        joint("pivot", "a", at=[-0.5, 0.0]),
-        joint("groove", "a", "s", groove=[[-0.4, 0.0], [0.5, 0.0]]),
-    ]
+    joints = [joint("pivot", "a", at=[-0.5, 0.0]), joint("groove", "a", "s", groove=[[-0.4, 0.0], [0.5, 0.0]])]
     bodies = {"box": [box("a", 0, 0)], "ball": [ball("s", 0.1, 0.0, mass=0.5)]}
     runs = [sandbox.run(scene_of(*joints, gravity=9.81, **bodies), engine) for engine in ("pymunk", "reference")]
     early = runs[0].time < 0.3  # before the slider reaches the end of the groove

@@ -10,26 +10,10 @@ from scipy.special import ellipk
 from sandbox.scene.compile.joint_arrays import LinkKind
 from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 PERIODS = {5: 2.0070219, 90: 2.3678419, 170: 4.8935243}
 """Period by amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m."""
-
-FIRST_ORDER = [
-    ("impulses", "explicit_euler"),
-    ("impulses", "semi_implicit_euler"),
-    ("impulses", "velocity_verlet"),
-    ("relaxation", "semi_implicit_euler"),
-    ("xpbd", "semi_implicit_euler"),
-    ("xpbd", "velocity_verlet"),
-    ("rattle", "explicit_euler"),
-    ("rattle", "semi_implicit_euler"),
-]
-SECOND_ORDER = [("rattle", "velocity_verlet"), ("rattle", "leapfrog"), ("rattle", "rk4")]
-
-
-def exact_period(angle: float) -> float:
-    return float(4 / math.sqrt(G) * ellipk(math.sin(math.radians(angle) / 2) ** 2))
 
 
 def measured_period(rig: Rig, h: float) -> float:
@@ -45,35 +29,6 @@ def measured_period(rig: Rig, h: float) -> float:
             return float(4 * (rig.time - h * new / (new - old)))
 
 
-def errors(angle: float, steps: tuple[int, ...], **settings: str) -> np.ndarray:
-    return np.array([measured_period(pendulum(angle, **settings), 1 / n) for n in steps]) - exact_period(angle)
-
-
-@pytest.mark.parametrize(("angle", "period"), PERIODS.items())
-def test_closed_form_matches_published_periods(angle, period):
-    assert exact_period(angle) == pytest.approx(period, abs=6e-8)  # as many digits as the reference has
-
-
-@pytest.mark.parametrize("angle", PERIODS)
-@pytest.mark.parametrize(("method", "integrator"), FIRST_ORDER)
-def test_first_order_methods_converge_to_the_period(method, integrator, angle):
-    coarse, fine = errors(angle, (480, 960), method=method, integrator=integrator)
-    assert abs(coarse) < 6e-3 * exact_period(angle)  # measured: at most .5 %, by explicit Euler from 90°
-    assert 2 * fine - coarse == pytest.approx(
-        0.0, abs=2e-5 * exact_period(angle)
-    )  # the remainder is of second order in h
-    if abs(coarse) > 1e-4:  # from 5°, in two of them, the first order nearly cancels
-        assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.03)  # measured .99 to 1.01
-
-
-@pytest.mark.parametrize("angle", PERIODS)
-@pytest.mark.parametrize(("method", "integrator"), SECOND_ORDER)
-def test_rattle_converges_with_the_square_of_the_step(method, integrator, angle):
-    error = errors(angle, (120, 240, 480), method=method, integrator=integrator)
-    assert abs(error[1]) < 3e-5 * exact_period(angle)  # measured 7e-6, 2.4e-5, 2e-5
-    assert np.log2(error[:-1] / error[1:]) == pytest.approx(2.0, abs=0.05)  # measured 1.99 to 2.01
-
-
 @pytest.mark.parametrize("angle", PERIODS)
 def test_rattle_conserves_energy_and_length(angle):
     rig = pendulum(angle, method="rattle", integrator="velocity_verlet")
@@ -84,17 +39,6 @@ def test_rattle_conserves_energy_and_length(angle):
         worst = max(worst, abs(rig.energy - before))
         assert math.hypot(*rig.pose[0, :2]) == pytest.approx(1.0, abs=1e-15)  # ten iterations converge to rounding
     assert worst < 1e-4 * swing  # measured up to 8.5e-5: a band of order (h ω)² that does not widen
-
-
-@pytest.mark.parametrize("method", ["impulses", "relaxation", "xpbd"])
-def test_energy_loss_of_first_order_methods_is_proportional_to_the_step(method):
-    loss = []
-    for n in (480, 960):
-        rig = pendulum(90, method=method)
-        before = rig.energy
-        loss.append(before - rig.run(4, 1 / n).energy)
-    assert loss[1] > 0.0
-    assert loss[0] / loss[1] == pytest.approx(2.0, abs=0.25)  # the loss reduces later swings and thereby their losses
 
 
 def test_impulses_lose_as_much_energy_as_pymunk_in_twenty_seconds():
@@ -129,9 +73,8 @@ def test_rod_on_an_end_pivot_has_the_period_of_a_physical_pendulum(method, integ
     period = 4 * math.sqrt((1 / 12 + 1 / 4) / (G / 2)) * ellipk(0.5)
     assert measured_period(rig, 1 / 480) == pytest.approx(period, rel=accuracy)
     end = rig.pose[0, :2] + 0.5 * np.array([-math.sin(rig.pose[0, 2]), math.cos(rig.pose[0, 2])])
-    assert np.hypot(*end) < (
-        2e-3 if method == "impulses" else 1e-14
-    )  # measured 1.6e-3, as for the length; other methods solve it
+    # measured 1.6e-3, as for the length; other methods solve it
+    assert np.hypot(*end) < (2e-3 if method == "impulses" else 1e-14)
 
 
 @pytest.mark.parametrize(
@@ -215,6 +158,5 @@ def test_chain_of_three_matches_pymunk_step_by_step():
         space.step(1 / 240)
         rig.step(1 / 240)
         positions = [c for body in bodies for c in body.position]
-        assert positions == pytest.approx(
-            rig.pose[:, :2].ravel(), abs=1e-9
-        )  # chaotic: rounding grows about e-fold in 0.1 s
+        # chaotic: rounding grows about e-fold in 0.1 s
+        assert positions == pytest.approx(rig.pose[:, :2].ravel(), abs=1e-9)

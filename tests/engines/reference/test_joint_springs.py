@@ -26,30 +26,6 @@ def oscillator(h: float, steps: int, **settings) -> tuple[np.ndarray, np.ndarray
     return np.array(x) / 0.1, np.array(energy)
 
 
-def test_explicit_euler_gains_energy():
-    _, energy = oscillator(0.01, 200, integrator="explicit_euler")
-    assert energy[-1] == pytest.approx((1 + (OMEGA * 0.01) ** 2) ** 200, rel=1e-11)  # rounding of 200 steps
-
-
-def test_energy_of_semi_implicit_euler_stays_in_its_band():
-    _, energy = oscillator(0.01, 5000, integrator="semi_implicit_euler")
-    z = OMEGA * 0.01 / 2
-    assert 1 / (1 + z) - 1e-9 < energy.min() < energy.max() < 1 / (1 - z) + 1e-9  # rounding of 5000 steps
-
-
-@pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog"])
-def test_second_order_schemes_oscillate_at_their_numerical_frequency(integrator):
-    x, _ = oscillator(0.01, 5000, integrator=integrator)
-    omega = 2 / 0.01 * math.asin(OMEGA * 0.01 / 2)
-    assert x == pytest.approx(np.cos(omega * 0.01 * np.arange(5001)), abs=1e-9)  # rounding of 5000 steps
-
-
-def test_energy_loss_of_rk4_is_of_sixth_order():
-    _, energy = oscillator(0.05, 400, integrator="rk4")
-    z = OMEGA * 0.05
-    assert energy[-1] == pytest.approx((1 - z**6 / 72 + z**8 / 576) ** 400, rel=1e-10)  # rounding of 400 steps
-
-
 def test_xpbd_is_backward_euler():
     """Backward Euler on one spring multiplies the energy by |R|² = 1/(1 + ω²h²) a step."""
     _, energy = oscillator(0.01, 200, method="xpbd", iterations=1)
@@ -73,7 +49,7 @@ def test_xpbd_holds_any_stiffness():
     assert rig.pose[0, 1] == pytest.approx(-1.0, abs=1e-10)  # m g/k is 1e-11 m
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])
 def test_two_bodies_oscillate_with_their_reduced_mass(integrator):
     joints = compile_joints(link(LinkKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
@@ -138,7 +114,7 @@ def test_rotary_dampers_brake():
     assert rig.rates[0, 2] == pytest.approx(2 * math.exp(-2.0), rel=1e-7)  # RK4 at c h/I = 0.02: error 2e-9 per second
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize(("method", "accuracy"), [("impulses", 1e-9), ("xpbd", 1e-6)])
 def test_hanging_chain_of_springs_stretches_by_the_sum_of_weights(method, accuracy):
     """By n (n + 1)/2 · m g/k, once drag has brought it to rest."""
@@ -168,6 +144,5 @@ def test_stretched_string_oscillates_in_its_modes(mode):
     for step in range(1, 501):
         rig.step(h)
         expected = shape * math.cos(numerical * h * step)
-        assert rig.pose[:count, 1] == pytest.approx(
-            expected, abs=1e-12
-        )  # 1e-5 of the amplitude: its square, and rounding
+        # 1e-5 of the amplitude: its square, and rounding
+        assert rig.pose[:count, 1] == pytest.approx(expected, abs=1e-12)

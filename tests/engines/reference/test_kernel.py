@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.engines.reference.pieces import ROOT
+from tests.engines.builders import ROOT
 
-pytestmark = pytest.mark.full  # child processes and pages
+pytestmark = pytest.mark.fail_slow(30)  # child processes and pages
 
 HERE = Path(__file__).resolve().parent
 
@@ -21,7 +21,8 @@ ANNOUNCEMENT = "compiling some functions for the first time; later runs start at
 
 HASHES_SCRIPT = """
 import json
-from tests.engines.reference.pieces import EARTH, FLOOR, advance, ball, scene_of, shipped, simulation_of, small_pile
+from tests.engines.builders import EARTH, FLOOR, ball, scene_of, shipped, simulation_of, small_pile
+from tests.engines.stepping import advance
 
 def court(**more):
     balls = [ball(-2 + 1.1 * k, 2 + 0.3 * k, velocity=[9 - 5 * k, -6], name=f"b{k}", friction=0.3) for k in range(4)]
@@ -73,7 +74,7 @@ def hashes(disabled):
     return json.loads(python(HASHES_SCRIPT, NUMBA_DISABLE_JIT=disabled)[0])
 
 
-@pytest.mark.slow  # the court, the pile and the gas take some seconds uncompiled
+@pytest.mark.nightly  # the court, the pile and the gas take some seconds uncompiled
 def test_results_are_bit_identical_with_and_without_compilation():
     assert hashes("0") == hashes("1")
 
@@ -167,7 +168,7 @@ def test_kernels_created_by_several_threads_are_all_cached_in_the_same_folder():
 
 
 LARGE_SCENE_SCRIPT = """
-from tests.engines.reference.pieces import ball, scene_of, simulation_of
+from tests.engines.builders import ball, scene_of, simulation_of
 for _ in range(2):
     simulation_of(scene_of(*(ball(3 * k, 0, name=f"b{k}") for k in range(COUNT))))
 """

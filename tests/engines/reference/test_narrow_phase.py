@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sandbox.engines.reference import manifold as narrow_phase
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import circle_circle, circle_half_plane, circle_segment
-from tests.engines.reference.pieces import ball, body_store_of, scene_of
+from tests.engines.builders import ball, body_store_of, scene_of
 
 mpmath.mp.dps = 50
 
@@ -79,9 +79,8 @@ def test_circle_segment_matches_exact_arithmetic(x, y, radius, ax, ay, bx, by, h
     separation, nx, ny = circle_segment(x, y, radius, ax, ay, bx, by, half)
     px, py = nearest(x, y, ax, ay, bx, by)
     distance = mpmath.hypot(px - x, py - y)
-    assert separation == pytest.approx(
-        float(distance - radius - half), abs=1e-12
-    )  # a few ulps of 280 m and of the fraction
+    # a few ulps of 280 m and of the fraction
+    assert separation == pytest.approx(float(distance - radius - half), abs=1e-12)
     assume(distance > 1e-3)
     # the nearest point is known to some 1e-13 m
     assert nx == pytest.approx(float((px - x) / distance), abs=1e-9)
@@ -110,10 +109,7 @@ def test_swapping_circles_reverses_the_normal(ax, ay, a, bx, by, b):
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2))
 def test_swapping_the_ends_of_a_segment_changes_nothing(x, y, ax, ay, bx, by):
-    one, other = (
-        circle_segment(x, y, 0.5, ax, ay, bx, by, 0.1),
-        circle_segment(x, y, 0.5, bx, by, ax, ay, 0.1),
-    )
+    one, other = (circle_segment(x, y, 0.5, ax, ay, bx, by, 0.1), circle_segment(x, y, 0.5, bx, by, ax, ay, 0.1))
     assert one[0] == pytest.approx(other[0], abs=1e-14)  # the fraction is measured from the other end
     assume(one[0] + 0.6 > 1e-3)
     assert one[1:] == pytest.approx(other[1:], abs=1e-11)  # 1e-14 m of 1e-3 m

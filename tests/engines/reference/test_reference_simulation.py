@@ -8,13 +8,13 @@ import threading
 import numpy as np
 import pytest
 
-from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.action import Force, Impulse, Remove
 from sandbox.engines.contract import Divergence, Refusal
 from sandbox.engines.reference.broad_phase import BROAD_PHASES
 from sandbox.engines.reference.continuous import DETECTIONS
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.scene.description.discs import Ball
-from tests.engines.reference.pieces import EARTH, FLOOR, advance, ball, scene_of, simulation_of, small_pile
+from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of, small_pile
+from tests.engines.stepping import advance
 
 
 def mixed_scene():
@@ -40,11 +40,16 @@ def mixed_scene():
     )
 
 
-@pytest.mark.full
-@pytest.mark.parametrize(
-    ("integrator", "detection", "response", "broad_phase"),
-    list(itertools.product(INTEGRATORS, DETECTIONS, ["impulse", "penalty"], BROAD_PHASES)),
-)
+COMBINATIONS = [
+    (integrator, detection, ("impulse", "penalty")[(i + k) % 2], list(BROAD_PHASES)[(i + k) % 4])
+    for i, integrator in enumerate(INTEGRATORS)
+    for k, detection in enumerate(DETECTIONS)
+]
+"""Each integrator with each detection, and with these each response and each broad phase in turn."""
+
+
+@pytest.mark.fail_slow(30)
+@pytest.mark.parametrize(("integrator", "detection", "response", "broad_phase"), COMBINATIONS)
 def test_every_combination_runs_or_refuses_with_a_reason(integrator, detection, response, broad_phase):
     settings = {"integrator": integrator, "detection": detection, "response": response, "broad_phase": broad_phase}
     try:
@@ -64,9 +69,8 @@ def test_every_combination_runs_or_refuses_with_a_reason(integrator, detection, 
     assert frame.position[3].tolist() == [1.5, 0.4]
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("detection", DETECTIONS)
+@pytest.mark.fail_slow(30)
+@pytest.mark.parametrize(("integrator", "detection"), [*zip(INTEGRATORS, [*DETECTIONS, "discrete"], strict=True)])
 def test_runs_are_bit_identical_and_queries_change_nothing(integrator, detection):
     queried, unqueried = (simulation_of(mixed_scene(), integrator=integrator, detection=detection) for _ in range(2))
     for _ in range(60):
@@ -77,41 +81,9 @@ def test_runs_are_bit_identical_and_queries_change_nothing(integrator, detection
     assert queried.state_hash() == unqueried.state_hash()
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("settings", [{}, {"detection": "swept"}, {"detection": "bisect"}, {"response": "penalty"}])
-def test_contacts_queried_every_step_sum_to_those_queried_once(settings):
-    often, once = simulation_of(mixed_scene(), **settings), simulation_of(mixed_scene(), **settings)
-    often.contacts()
-    once.contacts()
-    sums = {}
-    for _ in range(150):
-        often.step()
-        once.step()
-        rows = often.contacts()
-        for time, pair, impulse in zip(rows.time.tolist(), rows.pair.tolist(), rows.impulse, strict=True):
-            sums[time, *pair] = sums.get((time, *pair), 0.0) + impulse
-    whole = once.contacts()
-    assert len(whole) == len(sums) > 5
-    for time, pair, impulse in zip(whole.time.tolist(), whole.pair.tolist(), whole.impulse, strict=True):
-        assert sums[time, *pair] == pytest.approx(impulse, rel=1e-12, abs=1e-12)  # summed in another order
-
-
 def test_no_ledger_is_kept_without_accounting():
     simulation = advance(simulation_of(mixed_scene()), 20)
     assert simulation._energy is None
-
-
-def test_first_query_returns_current_contacts_with_zero_impulse():
-    simulation = advance(simulation_of(scene_of(ball(0, 0.499), world=EARTH, plane=[FLOOR], solver={"dt": 0.01})), 50)
-    first = simulation.contacts()
-    assert first.pair.tolist() == [[0, -1]]
-    assert first.time.tolist() == [simulation.time]
-    assert first.normal.tolist() == [[0.0, -1.0]]
-    assert not first.impulse.any()
-    simulation.step()
-    second = simulation.contacts()
-    assert second.time.tolist() == first.time.tolist()
-    assert second.impulse[0] == pytest.approx([0.0, -0.0981], rel=1e-9)  # weight times the step, settled
 
 
 @pytest.mark.parametrize("settings", [{}, {"detection": "swept"}, {"detection": "shrink"}, {"response": "penalty"}])
@@ -127,21 +99,6 @@ def test_observer_receives_every_part_of_every_substep(settings):
         assert previous[0] <= following[0]
     assert np.array_equal(observed[-1][2], simulation.frame().position)
     assert {tuple(pair) for _, _, _, pairs in observed for pair in pairs.tolist()} >= {(0, -1), (1, -1)}
-
-
-def test_frames_are_values():
-    simulation = simulation_of(mixed_scene())
-    before = simulation.frame()
-    copied = before.position.copy()
-    simulation.step()
-    assert np.array_equal(before.position, copied)
-    with pytest.raises(ValueError, match="read-only"):
-        before.position[0] = 0.0
-
-
-def test_time_is_the_step_count_times_dt():
-    simulation = advance(simulation_of(scene_of(ball(0, 0), solver={"dt": 0.1, "substeps": 3})), 1000)
-    assert simulation.time == 1000 * 0.1
 
 
 @pytest.mark.parametrize("fraction", [0.0, 1.0, -0.5, 1.5, float("nan")])
@@ -208,22 +165,6 @@ def test_second_thread_is_refused_during_a_step():
     simulation.step()
 
 
-def test_body_that_leaves_the_bounds_is_retired():
-    scene = scene_of(
-        ball(0, 0, velocity=[10, 0], name="fast"),
-        ball(0, 5, velocity=[1, 0], name="slow"),
-        world={"bounds": [[-1, -9], [1, 9]]},
-        solver={"dt": 0.03},
-    )
-    simulation = advance(simulation_of(scene), 10)
-    assert dict(simulation.retired) == {0: 4 * 0.03}
-    frame = simulation.frame()
-    assert frame.present.tolist() == [False, True]
-    assert frame.velocity.tolist() == [[0, 0], [1, 0]]
-    with pytest.raises(ActionError, match="removed"):
-        simulation.apply(Impulse(time=0, body="fast", impulse=(1, 0)))
-
-
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_body_beyond_the_numeric_range_diverges_and_the_frame_can_be_read(integrator):
     scene = scene_of(ball(0, 0, name="still"), ball(9.9e15, 5, velocity=[9e11, 0], name="thrown"), solver={"dt": 10.0})
@@ -239,29 +180,6 @@ def test_body_beyond_the_numeric_range_diverges_and_the_frame_can_be_read(integr
         simulation.step()
 
 
-INVALID_ACTIONS = [
-    Impulse(time=0, body="nobody", impulse=(1, 0)),
-    Impulse(time=0, body="rock", impulse=(1, 0)),
-    Impulse(time=0, body="a", impulse=(1e42, 0)),
-    Force(time=0, body="rock", force=(1, 0)),
-    Move(time=0, body="a", position=(0, -2000)),
-    Move(time=0, body="rock", position=(0, 1), velocity=(1, 0)),
-    Spawn(time=0, ball=Ball(name="a", position=(0, 9), radius=1.0)),
-    Spawn(time=0, ball=Ball(name="z", position=(0, -1e6), radius=1.0)),
-    SetParameter(time=0, path="world.duration", value=3.0),
-    SetParameter(time=0, path="material.m.restitution", value=2.0),
-    Remove(time=0, body="nobody"),
-]
-
-
-@pytest.mark.parametrize("index", range(len(INVALID_ACTIONS)))
-def test_invalid_action_changes_nothing(index):
-    attempted, other = advance(simulation_of(mixed_scene()), 20), advance(simulation_of(mixed_scene()), 20)
-    with pytest.raises(ActionError):
-        attempted.apply(INVALID_ACTIONS[index])
-    assert advance(attempted, 30).state_hash() == advance(other, 30).state_hash()
-
-
 def test_action_on_another_body_does_not_disturb_overlap_correction():
     """Overlap is corrected at the same rate while actions apply to another body."""
     scene = scene_of(
@@ -272,21 +190,6 @@ def test_action_on_another_body_does_not_disturb_overlap_correction():
     for _ in range(20):
         disturbed.apply(Impulse(time=0, body="far", impulse=(0.1, 0)))
         assert np.array_equal(advance(disturbed, 1).frame().position[0], advance(undisturbed, 1).frame().position[0])
-
-
-@pytest.mark.parametrize("detection", DETECTIONS)
-def test_spawned_balls_collide_and_removed_balls_do_not(detection):
-    scene = scene_of(ball(0, 0.495, name="base"), world=EARTH, plane=[FLOOR], solver={"dt": 0.01})
-    simulation = simulation_of(scene, detection=detection)
-    simulation.apply(Spawn(time=0, ball=Ball(name="new", position=(0, 1.6), radius=0.5)))
-    advance(simulation, 150)
-    assert simulation.frame().position[1, 1] == pytest.approx(1.485, abs=0.01)  # slop of two contacts
-    simulation.apply(Remove(time=0, body="base"))
-    advance(simulation, 150)
-    assert simulation.frame().position[1, 1] == pytest.approx(
-        0.495, abs=0.01
-    )  # fell to the position of the removed ball
-    assert list(simulation.retired) == [0]
 
 
 @pytest.mark.parametrize("x", [1e3, 1e6, 1e9, 1e12, 1e16])

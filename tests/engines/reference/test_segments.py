@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from sandbox.engines.reference.broad_phase import SegmentBoxes, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import circle_segment
-from tests.engines.reference.pieces import ball, body_store_of, scene_of
+from tests.engines.builders import ball, body_store_of, scene_of
 
 corner = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda c: [c[0] / 4, c[1] / 4])
 

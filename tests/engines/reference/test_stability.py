@@ -11,9 +11,9 @@ from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.penalty import smallest_reduced_mass
 from sandbox.engines.registry import ENGINES
-from tests.engines.reference.pieces import EARTH, FLOOR, ball, scene_of, simulation_of
+from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 REFERENCE = ENGINES["reference"]
 

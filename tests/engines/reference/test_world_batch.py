@@ -8,6 +8,7 @@ from sandbox.engines.contract import Divergence, HasWorldBatch, Members, WorldBa
 from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
+from tests.engines.stepping import advance
 
 SHIPS = """
 title = "Two ships that pass through each other, above a wall and a plane"
@@ -145,8 +146,7 @@ def test_diverged_world_says_so_and_needs_a_restart() -> None:
     batch.thrust_level[0, 1] = 1.0
     simulation.apply(Throttle(time=0.0, thrust="engine", level=1.0))
     with pytest.raises(Divergence) as error:
-        for _ in range(10):
-            simulation.step()
+        advance(simulation, 10)
     made = batch.advance(np.asarray([10, 3]))
     assert batch.states.diverged.tolist() == [True, False]
     assert made.tolist() == [round(simulation.time / 0.02), 3]

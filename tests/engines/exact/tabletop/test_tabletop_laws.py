@@ -15,8 +15,9 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke
 from tests.engines.exact.tabletop.small_tables import LENGTH, WIDTH, G, R, ball, rack, table
+from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 MAX_HOP_ENERGY = 5e-8  # J: bound of the energy that one hop of balls pressed together adds
 WITH_FRICTION = [True, False]
@@ -162,8 +163,7 @@ def test_simulation_and_table_give_the_same_result() -> None:
     scene = cluster(shot=[{"aim": 1.6, "speed": 5.0, "side": 0.1}])
     simulation = start(scene, "exact")
     simulation.contacts()
-    for _ in range(2000):
-        simulation.step()
+    advance(simulation, 2000)
     outcome = Table(scene).shoot()
     assert (simulation.frame().position == outcome.position).all()
     simulated, expected = simulation.contacts(), outcome.contacts

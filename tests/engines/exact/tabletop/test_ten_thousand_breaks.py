@@ -12,7 +12,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 NAMES = ["billiards/8-ball", "billiards/9-ball", "billiards/snooker", "billiards/three-cushion"]
 MAX_OVERLAP = 1e-9  # m: contact tolerance
@@ -74,12 +74,11 @@ def check_final_positions(breaks: Break) -> None:
 )
 def test_hundreds_of_breaks_end_on_the_table(name: str) -> None:
     for seed in range(3):
-        check_final_positions(
-            play_breaks(name, seed, 40 if COMPILED else 4)
-        )  # uncompiled, a break takes some tenths of a second
+        # uncompiled, a break takes some tenths of a second
+        check_final_positions(play_breaks(name, seed, 40 if COMPILED else 4))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", range(100))
 def test_ten_thousand_breaks_end_on_the_table(seed: int) -> None:
     for name in NAMES:

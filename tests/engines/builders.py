@@ -1,4 +1,4 @@
-"""Builders of scenes and simulations for the tests of the reference engine."""
+"""Builders of scenes and simulations for the tests of engines."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document, load
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 
 FLOOR = {"name": "floor", "point": [0, 0], "normal": [0, 1]}
 
@@ -29,6 +29,11 @@ def scene_of(*balls: dict[str, Any], solver: dict[str, Any] | None = None, **doc
     return from_document({"ball": list(balls), "solver": solver or {}, **document})
 
 
+def make_scene(**tables: Any) -> Scene:
+    """Return a scene of some tables, and of `world` and `solver`."""
+    return from_document(tables)
+
+
 def shipped(name: str) -> Scene:
     """Return a scene of the repository."""
     return load(ROOT / "scenes" / f"{name}.toml")
@@ -36,12 +41,6 @@ def shipped(name: str) -> Scene:
 
 def simulation_of(scene: Scene, engine: str = "reference", **settings: Any) -> Simulation:
     return start(scene, engine, scene.solver.replace(**settings))
-
-
-def advance(simulation: Simulation, steps: int) -> Simulation:
-    for _ in range(steps):
-        simulation.step()
-    return simulation
 
 
 def side_by_side(scene: Scene, steps: int, **settings: Any) -> Iterator[tuple[Simulation, Simulation]]:

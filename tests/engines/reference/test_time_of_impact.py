@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import KIND, circle_segment
 from sandbox.engines.reference.time_of_impact import NEVER, touch_circle, touch_line, touch_segment
-from tests.engines.reference.pieces import FLOOR, ball, body_store_of, scene_of
+from tests.engines.builders import FLOOR, ball, body_store_of, scene_of
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 
 def doubles(bound):
@@ -189,9 +189,8 @@ def test_circle_that_leaves_a_wall_near_its_end_does_not_touch_the_end():
 def test_wall_is_reached_at_its_sides_and_its_ends(start, way, fraction):
     found = touch_segment(*start, *way, 0.0, 0.0, 1.0, 0.0, 1.0)
     if start[1] == 1.0:  # exactly at the distance and moving parallel: it may touch the top of the end's circle
-        assert found == NEVER or start[0] + found * way[0] == pytest.approx(
-            0.0, abs=1e-7
-        )  # the square root of rounding
+        # the square root of rounding
+        assert found == NEVER or start[0] + found * way[0] == pytest.approx(0.0, abs=1e-7)
     else:
         assert found == fraction
 

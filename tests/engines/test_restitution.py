@@ -12,7 +12,7 @@ from sandbox.action import ActionError, Spawn
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.common.restitution import fraction_at, kicked, rebound, segment_fractions
 from sandbox.engines.contract import Refusal
-from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
@@ -20,14 +20,11 @@ from sandbox.scene.description.fixed import Post
 from sandbox.scene.description.surface import Floor
 from sandbox.scene.description.world import Kick
 from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
 ENGINES = ("pymunk", "exact", "reference")
-SURFACES = {
-    "wall": (0.3, 0.0, 0.3),
-    "rubber": (0.8, 0.3, 0.6),
-    "target": (0.35, 0.5, 0.2),
-    "post": (0.9, 0.1, 0.3),
-}
+SURFACES = {"wall": (0.3, 0.0, 0.3), "rubber": (0.8, 0.3, 0.6), "target": (0.35, 0.5, 0.2)}
 """Restitution, its falloff in s/m and friction of a pinball table, from Visual Pinball's materials."""
 BUMPER = {"speed": 0.81, "threshold": 0.054}
 SLINGSHOT = {"speed": 2.16, "threshold": 0.054, "profile": "middle", "adds_to": "approach"}
@@ -50,8 +47,7 @@ def run_steps(scene: Scene, engine: str, steps: int = 40) -> tuple[SwitchableSim
     """Return a simulation with accounting after some steps, and the velocity of its ball, m/s."""
     simulation = start(scene, engine)
     simulation.account()
-    for _ in range(steps):
-        simulation.step()
+    advance(simulation, steps)
     return simulation, simulation.frame().velocity[0]
 
 
@@ -61,8 +57,7 @@ def assert_ledger_closes(simulation: SwitchableSimulation, before: float) -> Non
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("surface", SURFACES)
-@pytest.mark.parametrize("speed", [0.01, 1.0, 7.0])
+@pytest.mark.parametrize(("surface", "speed"), [("wall", 1.0), ("rubber", 0.01), ("target", 7.0)])
 def test_restitution_falls_with_speed(engine: str, surface: str, speed: float) -> None:
     e, f, _ = SURFACES[surface]
     simulation, velocity = run_steps(falling_ball(speed, restitution=e, restitution_falloff=f), engine)
@@ -73,7 +68,7 @@ def test_restitution_falls_with_speed(engine: str, surface: str, speed: float) -
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("speed", [0.06, 0.5, 3.0])
+@pytest.mark.parametrize("speed", [0.06, 3.0])
 def test_bumper_adds_its_speed_once_and_its_energy_is_booked(engine: str, speed: float) -> None:
     e, f, _ = SURFACES["rubber"]
     post = {"position": [0.0, -0.0243], "radius": 0.0243, "restitution": e, "restitution_falloff": f, "kick": BUMPER}
@@ -98,8 +93,7 @@ def test_no_kick_below_the_threshold(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
-@pytest.mark.parametrize("speed", [0.06, 0.5, 1.0, 2.0, 7.0])
+@pytest.mark.parametrize(("x", "speed"), [(-0.9, 0.06), (0.0, 2.0), (0.3, 7.0)])
 def test_slingshot_adds_to_the_approach_speed_and_its_energy_is_booked(engine: str, x: float, speed: float) -> None:
     e, f, _ = SURFACES["rubber"]
     scene = falling_ball(speed, x, restitution=e, restitution_falloff=f, kick=SLINGSHOT)
@@ -108,19 +102,9 @@ def test_slingshot_adds_to_the_approach_speed_and_its_energy_is_booked(engine: s
     driven = speed + 2.16 * 4 * s * (1 - s)
     unkicked, rebound_speed = (e / (1 + f * v) * v for v in (speed, driven))
     assert velocity[1] == pytest.approx(rebound_speed, rel=TOLERANCE)
-    assert simulation.account()[Cause.KICKS] == pytest.approx(
-        0.5 * M * (rebound_speed**2 - unkicked**2), rel=1e-9
-    )  # rounding
+    # rounding
+    assert simulation.account()[Cause.KICKS] == pytest.approx(0.5 * M * (rebound_speed**2 - unkicked**2), rel=1e-9)
     assert_ledger_closes(simulation, 0.5 * M * speed**2)
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("speed", "rebound_speed"), [(0.5, 1.1835), (1.0, 1.2977), (2.0, 1.4804)])
-def test_slingshot_matches_visual_pinball(engine: str, speed: float, rebound_speed: float) -> None:
-    # Visual Pinball: at most 80 units, halved in the middle: 40 × 0.05397 = 2.16 m/s of approach, then 0.8/(1 + 0.3 v).
-    scene = falling_ball(speed, restitution=0.8, restitution_falloff=0.3, kick=SLINGSHOT)
-    _, velocity = run_steps(scene, engine)
-    assert velocity[1] == pytest.approx(rebound_speed, abs=5e-5)  # digits of the table
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -130,7 +114,7 @@ def test_kick_added_to_the_approach_has_no_effect_without_restitution(engine: st
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
+@pytest.mark.parametrize("x", [-0.9, 0.0])
 def test_kick_added_to_the_rebound_is_largest_in_the_middle(engine: str, x: float) -> None:
     fraction = 0.5 * (x + 1.0)
     _, velocity = run_steps(falling_ball(2.0, x, restitution=0.8, kick=SLINGSHOT | {"adds_to": "rebound"}), engine)
@@ -172,13 +156,8 @@ def test_friction_of_a_kick_follows_its_normal_impulse(engine: str) -> None:
 def test_ball_at_rest_on_a_kicking_wall_stays_at_rest(engine: str) -> None:
     # The threshold exceeds the speed from one step of gravity, 0.0098 m/s, which the ball may have at contact.
     wall = {"points": FLOOR, "kick": {"speed": 5.0, "threshold": 0.02}, "restitution": 0.5, "restitution_falloff": 0.3}
-    scene = from_document(
-        {
-            "world": {"gravity": [0.0, -9.81]},
-            "solver": {"dt": 0.001},
-            "ball": [{**BALL, "position": [0.0, R]}],
-            "wall": [wall],
-        }
+    scene = make_scene(
+        world={"gravity": [0.0, -9.81]}, solver={"dt": 0.001}, ball=[{**BALL, "position": [0.0, R]}], wall=[wall]
     )
     simulation, velocity = run_steps(scene, engine, 500)
     assert abs(velocity[1]) < 1e-9  # rounding of sums on pymunk
@@ -205,17 +184,14 @@ def test_falloffs_of_two_balls_add_and_a_pair_overrides_both(engine: str) -> Non
 
 def test_box_landing_flat_on_a_kicking_wall_stays_level() -> None:
     for engine in ("pymunk", "reference"):
-        scene = from_document(
-            {
-                "solver": {"dt": 0.001},
-                "box": [{"position": [0.0, 0.12], "velocity": [0.0, -2.0], "size": [0.2, 0.2], "mass": 1.0}],
-                "wall": [{"points": FLOOR, "restitution": 0.5, "restitution_falloff": 0.5, "kick": BUMPER}],
-            }
+        scene = make_scene(
+            solver={"dt": 0.001},
+            box=[{"position": [0.0, 0.12], "velocity": [0.0, -2.0], "size": [0.2, 0.2], "mass": 1.0}],
+            wall=[{"points": FLOOR, "restitution": 0.5, "restitution_falloff": 0.5, "kick": BUMPER}],
         )
         simulation, velocity = run_steps(scene, engine)
-        assert velocity[1] == pytest.approx(
-            0.5 * 2.0 / (1 + 0.5 * 2.0) + 0.81, rel=1e-6
-        )  # ten iterations of the solver
+        # ten iterations of the solver
+        assert velocity[1] == pytest.approx(0.5 * 2.0 / (1 + 0.5 * 2.0) + 0.81, rel=1e-6)
         assert simulation.account()[Cause.KICKS] > 0.0
         assert_ledger_closes(simulation, 2.0)
 
@@ -225,46 +201,9 @@ def test_kicks_work_with_every_detection_of_the_reference(detection: str) -> Non
     scene = falling_ball(3.0, restitution=0.8, restitution_falloff=0.3, kick=BUMPER)
     simulation = start(scene, "reference", scene.solver.replace(detection=detection, integrator="velocity_verlet"))
     simulation.account()
-    for _ in range(40):
-        simulation.step()
+    advance(simulation, 40)
     assert simulation.frame().velocity[0, 1] == pytest.approx(0.8 / 1.9 * 3.0 + 0.81, rel=TOLERANCE)
     assert_ledger_closes(simulation, 0.5 * M * 9.0)
-
-
-def bumper_scene(dt: float) -> Scene:
-    rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.3}
-    posts = [{"position": p, "radius": 0.0243, "kick": BUMPER, **rubber} for p in ([0.0, 0.0], [0.13, 0.05])]
-    return from_document(
-        {
-            "world": {"gravity": [0.0, -0.7], "duration": 0.25},
-            "solver": {"dt": dt},
-            "ball": [{**BALL, "position": [0.06, 0.03], "velocity": [-0.9, -0.35]}],
-            "post": posts,
-            "wall": [{"points": [[-0.3, -0.1], [0.3, -0.1]], "restitution": 0.3, "friction": 0.3}],
-        }
-    )
-
-
-def final_position(engine: str, dt: float) -> np.ndarray[Any, Any]:
-    """Return the position of a ball between two bumpers after 0.25 s and several hits."""
-    simulation = start(bumper_scene(dt), engine)
-    hits = 0
-    simulation.contacts()
-    for _ in range(round(0.25 / dt)):
-        simulation.step()
-        hits += len(simulation.contacts().time)
-    assert hits >= 2
-    return simulation.frame().position[0]
-
-
-def test_engines_agree_on_bumpers_to_first_order_in_the_step() -> None:
-    truth = final_position("exact", 0.25)
-    for engine in ("pymunk", "reference"):
-        coarse, fine = (float(np.hypot(*(final_position(engine, dt) - truth))) for dt in (2e-4, 2.5e-5))
-        # Contacts are found at the end of a step: a first-order error of up to v·h, which the curved posts amplify at
-        # each hit.
-        assert fine < 2e-3
-        assert fine < 0.5 * coarse
 
 
 @given(st.floats(0, 1), st.floats(0, 10), st.floats(0, 100))
@@ -307,28 +246,7 @@ def test_penalty_refuses_falloff_and_kicks() -> None:
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(0.5, 0.5), radius=R, restitution_falloff=0.1)))
 
 
-def test_pair_callbacks_run_only_where_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks
-
-    calls: list[int] = []
-    original = PairCallbacks._set_coefficients
-    monkeypatch.setattr(
-        PairCallbacks, "_set_coefficients", lambda self, *rest: (calls.append(1), original(self, *rest))[1]
-    )
-    run_steps(falling_ball(2.0, restitution=0.5, friction=0.2), "pymunk")
-    assert not calls
-    run_steps(falling_ball(2.0, restitution=0.5, restitution_falloff=0.1), "pymunk")
-    assert calls
-
-
-def test_ledger_books_kicks_as_a_separate_cause() -> None:
-    account = EnergyLedger()
-    account.add(Cause.KICKS, 2.0)
-    assert account.entries()[Cause.KICKS] == 2.0
-    assert account.entries()[Cause.PHANTOM] == 0.0
-
-
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("engine", ENGINES)
 @settings(max_examples=10, deadline=None)
 @given(x=st.floats(-0.2, 0.2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), g=st.floats(0, 2))
@@ -336,20 +254,17 @@ def test_ledger_closes_in_a_kicking_box(engine: str, x: float, vx: float, vy: fl
     rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.6}
     box = {"points": [[-0.3, 0.0], [0.3, 0.0], [0.3, 0.6], [-0.3, 0.6]], "closed": True, **rubber}
     post = {"position": [0.0, 0.45], "radius": 0.05, **rubber, "kick": BUMPER}
-    scene = from_document(
-        {
-            "world": {"gravity": [0.0, -g]},
-            "solver": {"dt": 0.002},
-            "ball": [{**BALL, "position": [x, 0.2], "velocity": [vx, vy]}],
-            "wall": [{**box, "kick": {"speed": 0.5, "threshold": 0.1, "profile": "middle"}}],
-            "post": [post],
-        }
+    scene = make_scene(
+        world={"gravity": [0.0, -g]},
+        solver={"dt": 0.002},
+        ball=[{**BALL, "position": [x, 0.2], "velocity": [vx, vy]}],
+        wall=[{**box, "kick": {"speed": 0.5, "threshold": 0.1, "profile": "middle"}}],
+        post=[post],
     )
     simulation = start(scene, engine)
     simulation.account()
     before = total_energy(simulation)
-    for _ in range(400):
-        simulation.step()
+    advance(simulation, 400)
     account = simulation.account()
     scale = sum(abs(energy) for energy in account.values()) + before + 1e-6
     assert total_energy(simulation) - before == pytest.approx(sum(account.values()), abs=1e-9 * scale)  # rounding

@@ -11,6 +11,8 @@ from sandbox.engines.switching import start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
 ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)
@@ -18,16 +20,14 @@ every_engine = pytest.mark.parametrize("engine", ENGINES)
 
 def mixed_scene(**world: Any) -> Scene:
     """Return a scene with a ball, a small pyramid on a floor, a rope, and a ragdoll in the air."""
-    return from_document(
-        {
-            "world": {"gravity": [0, -9.81], **world},
-            "solver": {"dt": 0.01},
-            "plane": [{"point": [0, 0], "normal": [0, 1], "friction": 0.5}],
-            "ball": [{"name": "own", "position": [-5, 1], "radius": 0.5}],
-            "stack": [{"name": "box", "base": [0, 0], "size": [0.5, 0.5], "columns": 2, "rows": 2, "fewer": 1}],
-            "rope": [{"name": "line", "start": [3, 5], "end": [4, 5], "links": 4, "length": 1.2}],
-            "ragdoll": [{"name": "doll", "position": [8, 2], "friction": 0.5, "restitution": 0.2}],
-        }
+    return make_scene(
+        world={"gravity": [0, -9.81], **world},
+        solver={"dt": 0.01},
+        plane=[{"point": [0, 0], "normal": [0, 1], "friction": 0.5}],
+        ball=[{"name": "own", "position": [-5, 1], "radius": 0.5}],
+        stack=[{"name": "box", "base": [0, 0], "size": [0.5, 0.5], "columns": 2, "rows": 2, "fewer": 1}],
+        rope=[{"name": "line", "start": [3, 5], "end": [4, 5], "links": 4, "length": 1.2}],
+        ragdoll=[{"name": "doll", "position": [8, 2], "friction": 0.5, "restitution": 0.2}],
     )
 
 
@@ -59,8 +59,7 @@ def test_source_index_maps_an_element_to_its_source() -> None:
 def test_launch_restores_a_generator_completely(engine: str, name: str) -> None:
     scene = mixed_scene()
     simulation = start(scene, engine)
-    for _ in range(30):
-        simulation.step()
+    advance(simulation, 30)
     generated = np.asarray([body.startswith(f"{name}-") for body in scene.bodies.names])
     removed = scene.bodies.names[int(np.flatnonzero(generated)[1])]
     simulation.apply(Remove(time=simulation.time, body=removed))

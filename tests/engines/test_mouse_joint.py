@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.action import ActionError, Impulse, Pull, Remove, SetParameter, Spawn
+from sandbox.action import ActionError, Impulse, Pull, Remove, SetParameter
 from sandbox.engines.mouse_joint import mouse_joint_impulse
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
+from tests.engines.stepping import advance
 
 OMEGA = 2.0 * math.pi * 7.5
 """Natural frequency as documented in the manual of the window, rad/s."""
@@ -26,12 +26,6 @@ def simulation_of(
     ball = {"name": "a", "position": [0.0, 0.0], "radius": 0.5, **more}
     document = {"world": {"gravity": [0.0, gravity]}, "solver": {"dt": dt}, "ball": [ball]}
     return start(from_document(document), engine)
-
-
-def advance(simulation: SwitchableSimulation, steps: int) -> SwitchableSimulation:
-    for _ in range(steps):
-        simulation.step()
-    return simulation
 
 
 def pull(x: float, y: float, grip: tuple[float, float] = (0.0, 0.0)) -> Pull:
@@ -102,10 +96,9 @@ def test_pulled_body_converges_to_the_critically_damped_oscillator_at_first_orde
     assert errors[-1] < 0.01 * d  # ω·dt is 0.0024, and the first-order error is about that fraction of d
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("dt", [1e-4, 1e-3, 0.01, 1 / 60, 0.1, 0.5])
-@pytest.mark.parametrize("mass", [1e-9, 1.0, 1e12])
+@pytest.mark.parametrize(("dt", "mass"), [(1e-3, 1e-9), (1 / 60, 1.0), (0.1, 1e12), (0.5, 1.0)])
 def test_pulled_body_comes_to_rest_at_the_pointer_at_any_step_and_mass(engine: str, dt: float, mass: float) -> None:
     simulation = simulation_of(engine, dt=dt, mass=mass)
     simulation.apply(pull(0.5, -0.25))
@@ -132,14 +125,6 @@ def test_force_is_limited_to_a_hundred_times_the_weight(engine: str, gravity: fl
     assert simulation.frame().velocity[0, 0] == pytest.approx(100.0 * weight * 0.1, rel=rounding)
 
 
-def test_force_limit_follows_the_current_gravity() -> None:
-    simulation = simulation_of()
-    simulation.apply(SetParameter(time=0.0, path="world.gravity", value=[3.0, 4.0]))
-    simulation.apply(pull(-1e6, 0.0))
-    simulation.step()
-    assert simulation.frame().velocity[0, 0] == pytest.approx((3.0 - 500.0) * 0.01, rel=1e-12)  # rounding
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pull_off_the_centre_turns_the_body_and_at_the_centre_does_not(engine: str) -> None:
     """An upward pull at the right side turns the body counter-clockwise by j·x/I; then the grip reaches the pointer."""
@@ -156,9 +141,8 @@ def test_pull_off_the_centre_turns_the_body_and_at_the_centre_does_not(engine: s
     advance(simulation, 400)
     frame = simulation.frame()
     cos, sin = math.cos(frame.angle[0]), math.sin(frame.angle[0])
-    assert frame.position[0] + 0.4 * np.asarray([cos, sin]) == pytest.approx(
-        [0.4, 0.1], abs=1e-3
-    )  # it still oscillates
+    # it still oscillates
+    assert frame.position[0] + 0.4 * np.asarray([cos, sin]) == pytest.approx([0.4, 0.1], abs=1e-3)
 
 
 def test_pull_can_move_and_end() -> None:
@@ -221,8 +205,7 @@ def test_pull_beyond_the_numeric_range_ends(ball: dict[str, Any], grip: tuple[fl
     assert np.isfinite(simulation.frame().velocity).all()
 
 
-@pytest.mark.parametrize("mass", [1e-15, 1.0, 1e30])
-@pytest.mark.parametrize("moment", [1e-200, 1e-20, 1.0, 1e60])
+@pytest.mark.parametrize(("mass", "moment"), [(1e-15, 1e-200), (1.0, 1e-20), (1.0, 1e60), (1e30, 1.0)])
 @pytest.mark.parametrize("grip", [(0.0, 0.0), (1.0, 1.0), (1e9, 1e9), (-1e16, 1e16), (0.0, 1e-9)])
 def test_impulse_at_a_distant_grip_points_towards_the_pointer(
     mass: float, moment: float, grip: tuple[float, float]
@@ -232,13 +215,3 @@ def test_impulse_at_a_distant_grip_points_towards_the_pointer(
         (x, y), _ = mouse_joint_impulse(offset, grip, (0.0, 0.0), 0.0, mass, moment, 0.0, 0.01)
         assert x * offset[0] + y * offset[1] <= 0.0
         assert math.hypot(x, y) <= 1.0001 * 100.0 * mass * 9.81 * 0.01
-
-
-def test_pull_outside_of_a_tiny_spawned_body_stays_finite() -> None:
-    simulation = simulation_of()
-    simulation.apply(Spawn(time=0.0, ball=Ball(name="b", position=(5.0, 5.0), radius=1e-9)))
-    simulation.apply(Pull(time=0.0, body="b", grip=(1.0, 1.0), target=(5.0, 5.0)))
-    advance(simulation, 3)
-    frame, b = simulation.frame(), simulation.bodies.names.index("b")
-    assert np.isfinite(frame.position[b]).all()
-    assert np.isfinite([frame.angle[b], frame.angular_velocity[b]]).all()

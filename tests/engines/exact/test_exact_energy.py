@@ -12,8 +12,9 @@ from sandbox.action import Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import from_document
 from tests import accounts
+from tests.engines.builders import make_scene
+from tests.engines.stepping import advance
 
 SCENES = Path(__file__).parents[3] / "scenes"
 G = 10.0
@@ -24,15 +25,13 @@ closed_account = partial(accounts.closed_account, engine="exact", closes=1e-12)
 def scene_of(*balls: dict[str, Any], e: float = 0.5, mu: float = 0.0, slope: float = 0.0, g: float = G) -> Scene:
     coefficients = {"restitution": e, "friction": mu}
     gravity = [-g * np.sin(slope), -g * np.cos(slope)]
-    return from_document(
-        {
-            "world": {"gravity": gravity, "duration": 5.0},
-            "solver": {"dt": 0.01},
-            "plane": [{"point": [0, 0], "normal": [0, 1], "material": "coat"}],
-            "material": [{"name": "coat"}],
-            "pair": [{"between": ["coat", "coat"], **coefficients}],
-            "ball": [{"material": "coat", **ball} for ball in balls],
-        }
+    return make_scene(
+        world={"gravity": gravity, "duration": 5.0},
+        solver={"dt": 0.01},
+        plane=[{"point": [0, 0], "normal": [0, 1], "material": "coat"}],
+        material=[{"name": "coat"}],
+        pair=[{"between": ["coat", "coat"], **coefficients}],
+        ball=[{"material": "coat", **ball} for ball in balls],
     )
 
 
@@ -95,14 +94,6 @@ def test_oblique_impact_books_friction_and_restitution_separately() -> None:
     assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * 2.0 * (1 - e**2) * v**2, rel=1e-14)  # rounding, as above
 
 
-def test_elastic_gas_of_the_exact_engine_has_no_friction() -> None:
-    account = closed_account(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
-    assert account[Cause.FRICTION] == 0.0
-    assert account[Cause.RESTITUTION] == pytest.approx(
-        0.0, abs=1e-13 * 78.5
-    )  # rounding, relative to the energy of the gas
-
-
 ACTIONS: accounts.Timed = [
     (5, Impulse(time=0, body="a", impulse=(1.0, 0.5), angular=0.1)),
     (20, Spawn(time=0, ball={"name": "n", "position": (0.5, 3.0), "radius": 0.1, "mass": 2.0, "velocity": (1.0, 2.0)})),
@@ -123,8 +114,7 @@ def test_ledger_stays_closed_through_actions(fraction: float | None) -> None:
 
 def test_ball_spawned_with_a_velocity_starts_at_its_position() -> None:
     simulation = start(scene_of(ball("a", 9, 0.5)), "exact")
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     new = {"name": "n", "position": (0.0, 3.0), "radius": 0.1, "velocity": (1.0, 2.0), "angular_velocity": 4.0}
     simulation.apply(Spawn(time=0, ball=new))
     simulation.step()

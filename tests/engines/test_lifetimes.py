@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.action import Launch, Remove, Spawn, Switch
+from sandbox.action import Launch, Remove, Spawn
 from sandbox.engines.common.lifetimes import SLACK, Lifetimes
 from sandbox.engines.registry import ENGINES, able, start
 from sandbox.engines.switching import SwitchableSimulation
@@ -16,6 +16,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
+from tests.engines.stepping import advance
 
 SPARK = {"position": [0.0, 1.0], "velocity_min": [-2.0, 1.0], "velocity_max": [2.0, 5.0], "radius": 0.05}
 FLOOR = {"point": [0.0, -0.5], "normal": [0.0, 1.0], "restitution": 0.5}
@@ -44,8 +45,7 @@ def bodies_of(born: list[float], lifetime: list[float]) -> Bodies:
 
 def retirement_times(scene: Scene, steps: int, engine: str) -> dict[int, float]:
     simulation = start(scene, engine)
-    for _ in range(steps):
-        simulation.step()
+    advance(simulation, steps)
     return dict(simulation.retired)
 
 
@@ -122,31 +122,9 @@ def test_lifetimes_do_not_change_paths_before_they_end(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("cut", [0, 7, 29, 30, 31, 45])
-def test_resumed_simulation_retires_at_the_same_frames(engine: str, cut: int) -> None:
-    scene = mixed_scene()
-    uninterrupted, other = SwitchableSimulation(scene, engine), SwitchableSimulation(scene, engine)
-    for k in range(60):
-        if k == cut:
-            other.apply(Switch(time=0.0))
-            other = SwitchableSimulation.resumed(other.checkpoint())
-        uninterrupted.step()
-        other.step()
-        a, b = uninterrupted.frame(), other.frame()
-        assert np.array_equal(a.present, b.present)
-        if engine == "pymunk":  # not bit-identical: the reference remembers contacts, exact its events
-            assert np.array_equal(a.position[:303], b.position[:303])
-    assert uninterrupted.retired.keys() == other.retired.keys()
-    assert list(uninterrupted.retired.values()) == pytest.approx(
-        list(other.retired.values()), abs=1e-12
-    )  # rounding of k·dt
-
-
-@pytest.mark.parametrize("engine", ENGINES)
 def test_launch_gives_new_lifetimes(engine: str) -> None:
     simulation = SwitchableSimulation(mixed_scene(), engine)
-    for _ in range(50):
-        simulation.step()
+    advance(simulation, 50)
     assert len(simulation.retired) > 100
     simulation.apply(Launch(time=0.0, generator="free", seed=8))
     assert simulation.frame().present[:300].all()
@@ -170,12 +148,10 @@ def test_launch_gives_new_lifetimes(engine: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_removed_body_keeps_its_retirement_time_and_spawned_body_stays(engine: str) -> None:
     simulation = SwitchableSimulation(mixed_scene(), engine)
-    for _ in range(10):
-        simulation.step()
+    advance(simulation, 10)
     simulation.apply(Remove(time=0.0, body="free-1"))
     simulation.apply(Spawn(time=0.0, ball=Ball(name="late", position=(5.0, 5.0), radius=0.1)))
-    for _ in range(60):
-        simulation.step()
+    advance(simulation, 60)
     assert simulation.retired[0] == 10 * 0.01
     frame = simulation.frame()
     assert np.flatnonzero(frame.present).tolist() == [300, 301, 302, 323]
