@@ -189,12 +189,6 @@ class DrivenWindow:
         )
         return Recording.load(self.folder / line.removeprefix("session: "))
 
-    def settled_shot(self) -> Shot:
-        """Return a screenshot after all earlier input: the second file is written a frame after the first."""
-        self.session()
-        self.session()
-        return self.shot()
-
     def step_number(self) -> int:
         """Return the number of steps up to the displayed time, by the saved session."""
         session = self.session()

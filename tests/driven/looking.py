@@ -1,7 +1,6 @@
-"""Queries of screenshots: colours within regions, located by the camera and the layout of the panel."""
+"""Queries of screenshots: colours within regions, located by the camera."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pygame
@@ -16,35 +15,19 @@ CHANNEL_TOLERANCE = 6
 """Largest difference of a channel from its colour: shading and antialiasing change pixels beside an edge by more."""
 HUD = pygame.Rect(10, 10, 360, 150)
 """Region of the state display, px."""
-PICTURE = pygame.Rect(0, 0, 636, 566)
-"""Region that neither the panel nor the timeline covers, px."""
-ENGINE_ROW = pygame.Rect(12, 36, 330, 20)
 ARENA = pygame.Rect(0, 165, 636, 195)
 """Region that text does not cover either, px: the state display is above it, messages are below."""
 MESSAGES = pygame.Rect(0, 360, 636, 204)
-STEP_ROW = pygame.Rect(12, 56, 330, 20)
 
 
-class WindowLayout(NamedTuple):
-    """Rectangles of the widgets by name, px, and camera of a window that shows a scene."""
-
-    widgets: dict[str, pygame.Rect]
-    camera: Camera
-
-
-def window_layout(path: Path) -> WindowLayout:
-    """Return the layout of a window of the default size, computed from a window without a display."""
-    stage = AppState()
-    window = App(stage, size=SIZE, say=lambda _: None)
+def window_camera(path: Path) -> Camera:
+    """Return the camera of a window of the default size that shows a scene, computed without a display."""
+    state = AppState()
+    window = App(state, size=SIZE, say=lambda _: None)
     try:
-        assert stage.open(path)
+        assert state.open(path)
         window.run_frame(0.0)
-        left = SIZE[0] - window.context.gui.panel.width
-        rects = {}
-        for widget in window.context.gui.panel.widgets:
-            name = widget.parameter.key if hasattr(widget, "parameter") else widget.name
-            rects[name] = widget.rect.move(left, 0)
-        return WindowLayout(rects, window.context.camera)
+        return window.context.camera
     finally:
         window.close()
 

@@ -1,10 +1,11 @@
-"""Landing: crashes, landings and the score of fuel, on every engine that can run the scene."""
+"""Landing: rules, reference cases, and the bot, which lands, worse with less skill."""
 
 import math
 
 import pytest
 
 from sandbox.engines.registry import able
+from sandbox.engines.switching import start
 from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
 from sandbox.games.landing.bot import LandingBot
 from sandbox.games.landing.rules import (
@@ -18,47 +19,32 @@ from sandbox.games.landing.rules import (
     TANK,
     Landing,
 )
-from sandbox.games.players import ScriptedInput
+from sandbox.games.players import POLICIES, ScriptedInput
 from sandbox.measure.run.sessions import PlayedGame, play_out
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.load import dumps, load, loads
 from sandbox.scene.files.shipped_scenes import find
+from tests.toml_text import toml
 
 SCENE = load(find("landing"))
 G, ENGINE = 1.62, 5.0  # m/s², the Moon's and the engine's on 1 kg
 
-FLAT = """
-title = "Flat"
-[play]
-game = "landing"
-[world]
-gravity = [0.0, -1.62]
-duration = 30.0
-seed = 246   # a start with almost no horizontal speed: 2 mm/s
-[solver]
-dt = 0.01
-[[plane]]
-name = "pad"
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-friction = 1.0
-[[box]]
-name = "ship"
-position = [0.0, {height}]
-size = [3.0, 2.0]
-angle = {angle}
-mass = 2.0
-friction = 1.0
-[[thrust]]
-name = "engine"
-body = "ship"
-force = [0.0, 10.0]
-key = "up"
-"""
+
+def flat_text(height: float = 5.0, angle: float = 0.0) -> str:
+    return (
+        toml(title="Flat")
+        + toml("play", game="landing")
+        # the seed's start has almost no horizontal speed: 2 mm/s
+        + toml("world", gravity=[0.0, -1.62], duration=30.0, seed=246)
+        + toml("solver", dt=0.01)
+        + toml("plane", name="pad", point=[0.0, 0.0], normal=[0.0, 1.0], friction=1.0)
+        + toml("box", name="ship", position=[0.0, height], size=[3.0, 2.0], angle=angle, mass=2.0, friction=1.0)
+        + toml("thrust", name="engine", body="ship", force=[0.0, 10.0], key="up")
+    )
 
 
 def flat(height: float = 5.0, angle: float = 0.0) -> Scene:
-    return loads(FLAT.format(height=height, angle=angle))
+    return loads(flat_text(height, angle))
 
 
 def assert_free_fall_crash(game: PlayedGame, height: float) -> None:
@@ -69,7 +55,7 @@ def assert_free_fall_crash(game: PlayedGame, height: float) -> None:
     assert game.recording.duration == pytest.approx(speed / G, abs=0.03)  # s: contact within two steps
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", able(SCENE))
 def test_bot_lands_on_every_engine(engine: str) -> None:
     game = play_out(SCENE, LandingBot(1, 1.0), engine)
@@ -78,12 +64,13 @@ def test_bot_lands_on_every_engine(engine: str) -> None:
     assert game.trajectory.status == "ok"
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("seed", range(2, 5))
+@pytest.mark.fail_slow(30)
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 3, 4))])
 def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     scene = load(find("landing"), [("world.seed", seed)])
     game = play_out(scene, LandingBot(1, 1.0))
     assert game.over == LANDED
+    assert game.score > 300  # of 100 for the landing and 900 for a full tank
     displacement = game.trajectory.position[1, 0] - SCENE.bodies.position[0]  # after the first step
     assert abs(displacement[0]) <= ELSEWHERE + 0.01 * (5.0 + FASTER)  # plus the distance flown in that step
 
@@ -139,7 +126,7 @@ def test_contact_beside_the_pad_is_a_crash() -> None:
 
 @pytest.mark.parametrize("missing", ['name = "pad"', 'name = "ship"', 'key = "up"'])
 def test_scene_without_pad_ship_or_engine_is_refused(missing: str) -> None:
-    text = FLAT.format(height=5.0, angle=0.0).replace(missing, "").replace('body = "ship"', 'body = "box-1"')
+    text = flat_text().replace(missing, "").replace('body = "ship"', 'body = "box-1"')
     if missing != 'name = "ship"':
         text = text.replace('body = "box-1"', 'body = "ship"')
     scene = loads(text)
@@ -158,3 +145,53 @@ def test_panel_marks_values_that_would_be_a_crash() -> None:
     assert lines["sideways"] == "+5.0 m/s !"
     assert lines["tilt"] == "0°"
     relay.close()
+
+
+def play(seed: int, skill: float) -> PlayedGame:
+    return play_out(load(find("landing"), [("world.seed", seed)]), LandingBot(seed, skill))
+
+
+@pytest.mark.fail_slow(60)  # twenty games, 35 s on a busy computer
+def test_skill_pays() -> None:
+    """Each skill is played with the same seeds; the least skilled bot crashes in some of them."""
+    games = [[play(seed, skill) for seed in range(1, 11)] for skill in (0.0, 1.0)]
+    worst, best = (sum(game.score for game in each) for each in games)
+    assert worst < best
+    assert any(game.over != LANDED for game in games[0])
+
+
+def first_throttles(scene: Scene) -> dict[str, float]:
+    simulation, rules = start(scene), Landing(scene, scene.bodies)
+    info = StepInfo(0.0, simulation.frame(), simulation.contacts(), ())
+    return dict(LandingBot(1, 1.0).decide(info, rules))
+
+
+def test_throttles_follow_the_forces_of_the_scene() -> None:
+    """A thrust of twice the force needs half the throttle for the same acceleration."""
+    text = dumps(SCENE)
+    strong, stronger = (
+        first_throttles(loads(text.replace("force = [0.5, 0.0]", f"force = [{force}, 0.0]"))) for force in (4.0, 8.0)
+    )
+    assert 0.1 < strong["turn right"] < 1.0
+    assert stronger["turn right"] == pytest.approx(strong["turn right"] / 2.0, abs=0.011)  # levels are hundredths
+    assert stronger["engine"] == strong["engine"]
+
+
+def test_bot_is_the_skilled_player_of_landing_alone() -> None:
+    assert isinstance(POLICIES["skilled"](SCENE), LandingBot)
+    duel = load(find("duel"))
+    with pytest.raises(UnsuitableSceneError, match="landing"):
+        play_out(duel, LandingBot(1))
+
+
+@pytest.mark.parametrize("skill", [-0.1, 1.1, math.nan])
+def test_skill_out_of_range_is_refused(skill: float) -> None:
+    with pytest.raises(ValueError, match="0 to 1"):
+        LandingBot(1, skill)
+
+
+def test_rules_state_the_ship_and_the_pad() -> None:
+    rules = Landing(SCENE, SCENE.bodies)
+    assert rules.gravity == 1.62
+    assert rules.pad == (20.0, pytest.approx(2.9 + 0.3))  # middle of the wall, at its upper side
+    assert SCENE.bodies.names[rules.ship] == "ship"

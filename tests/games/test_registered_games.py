@@ -14,19 +14,14 @@ from sandbox.measure.run.sessions import play_out
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.json_schema import schema
 from sandbox.scene.files.load import dumps, load, loads
+from tests.toml_text import toml
 
-SCENE = """
-title = "Count"
-world = { gravity = [0.0, -9.81], duration = 1.0 }
-play = { game = "count-bounces" }
-plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0] }]
-
-[[ball]]
-name = "ball"
-position = [0.0, 0.5]
-radius = 0.1
-restitution = 0.8
-"""
+SCENE = toml(
+    title="Count",
+    world={"gravity": [0.0, -9.81], "duration": 1.0},
+    play={"game": "count-bounces"},
+    plane=[{"name": "floor", "point": [0.0, 0.0], "normal": [0.0, 1.0]}],
+) + toml("ball", name="ball", position=[0.0, 0.5], radius=0.1, restitution=0.8)
 
 RULES_OF_COUNT = """
 from sandbox.game_spec import GameSpec
@@ -96,14 +91,14 @@ def test_game_that_cannot_be_imported_is_reported_with_its_line(scene: Path, cap
     scene.write_text(SCENE.replace("count-bounces", "broken"))
     assert call(["check", str(scene)]) == 2
     err = capfd.readouterr().err
-    assert err.startswith(f"{scene}:4: play.game: the game 'broken' cannot be imported from bounce_counter:Missing: ")
+    assert err.startswith(f"{scene}:3: play.game: the game 'broken' cannot be imported from bounce_counter:Missing: ")
 
 
 def test_game_with_a_scene_table_is_refused_with_its_line(scene: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene.write_text(SCENE.replace("count-bounces", "tabled"))
     assert call(["check", str(scene)]) == 2
     err = capfd.readouterr().err
-    assert err.startswith(f"{scene}:4: play.game: the game 'tabled' cannot be imported from bounce_counter:TABLED: ")
+    assert err.startswith(f"{scene}:3: play.game: the game 'tabled' cannot be imported from bounce_counter:TABLED: ")
     assert "[tabled]" in err
 
 
@@ -115,7 +110,7 @@ def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
     with pytest.raises(SceneError) as caught:
         loads(SCENE.replace("count-bounces", "count"))
     (fault,) = caught.value.faults
-    assert (fault.line, fault.path) == (4, "play.game")
+    assert (fault.line, fault.path) == (3, "play.game")
     assert fault.message.endswith("'curling', 'landing', 'broken', 'count-bounces' or 'tabled', is \"count\"")
 
 

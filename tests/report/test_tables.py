@@ -15,39 +15,18 @@ from sandbox.report.table_export import CONTACTS, STATES, MissingExtraError, wri
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from tests.toml_text import toml
 
-SCENE = loads("""
-[world]
-gravity = [0.1, -9.81]
-duration = 0.5
-[[plane]]
-name = "ground, the"
-point = [0, 0]
-normal = [0.01, 1]
-[[post]]
-name = 'a "peg"'
-position = [3, 0.3]
-radius = 0.3
-[[ball]]
-name = "a"
-position = [0, 0.6]
-radius = 0.5
-restitution = 0.3
-friction = 0.5
-[[ball]]
-name = "b"
-position = [3.1, 0.9]
-radius = 0.2
-[[ball]]
-name = "c"
-position = [0.3, 1.7]
-radius = 0.5
-""")
-
-ACTIONS = (
-    Spawn(time=0.1, ball=Ball(name="late", position=(9.0, 9.0), radius=0.1)),
-    Remove(time=0.2, body="b"),
+SCENE = loads(
+    toml("world", gravity=[0.1, -9.81], duration=0.5)
+    + toml("plane", name="ground, the", point=[0, 0], normal=[0.01, 1])
+    + toml("post", name='a "peg"', position=[3, 0.3], radius=0.3)
+    + toml("ball", name="a", position=[0, 0.6], radius=0.5, restitution=0.3, friction=0.5)
+    + toml("ball", name="b", position=[3.1, 0.9], radius=0.2)
+    + toml("ball", name="c", position=[0.3, 1.7], radius=0.5)
 )
+
+ACTIONS = (Spawn(time=0.1, ball=Ball(name="late", position=(9.0, 9.0), radius=0.1)), Remove(time=0.2, body="b"))
 
 
 def recorded_run() -> Trajectory:
@@ -194,7 +173,7 @@ def test_parquet_without_its_extra_names_the_command_to_install_it(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_writing_a_table_takes_little_additional_memory(
     suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

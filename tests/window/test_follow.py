@@ -9,33 +9,20 @@ import pytest
 
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
-from sandbox.window.app_state import AppState
 from sandbox.window.camera import Camera
+from tests.toml_text import toml
 from tests.window.pressing import key, key_up, press, release
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.full  # every shipped scene
+pytestmark = pytest.mark.fail_slow(30)  # every shipped scene
 
-LEAVING = """
-title = "Leaving"
-[world]
-gravity = [0.0, -10.0]
-duration = 1.0
-[solver]
-dt = 0.01
-[[ball]]
-name = "a"
-position = [0.0, 0.0]
-velocity = [5.0, 5.0]
-radius = 0.2
-collides = "none"
-[[ball]]
-name = "b"
-position = [1.0, 0.0]
-velocity = [-5.0, 0.0]
-radius = 0.2
-collides = "none"
-"""
+LEAVING = (
+    'title = "Leaving"\n'
+    + toml("world", gravity=[0.0, -10.0], duration=1.0)
+    + toml("solver", dt=0.01)
+    + toml("ball", name="a", position=[0.0, 0.0], velocity=[5.0, 5.0], radius=0.2, collides="none")
+    + toml("ball", name="b", position=[1.0, 0.0], velocity=[-5.0, 0.0], radius=0.2, collides="none")
+)
 F, HOME = pygame.K_f, pygame.K_HOME
 
 
@@ -98,21 +85,15 @@ def test_message_is_shown_while_no_body_is_in_view(window: App) -> None:
 
 
 def test_out_of_view_message_of_fireworks_names_the_relaunch_key(tmp_path: Path) -> None:
-    window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
-    try:
-        assert window.app_state.open(find("fireworks"))
+    with open_window(find("fireworks"), tmp_path) as window:
         window.context.camera = Camera((1e6, 0.0), 10.0, (640, 480))
         window.context.is_fitted = False
         window.run_frame(0.0)
         assert "Space relaunches" in str(window.context.gui.describe_out_of_view(window.app_state))
-    finally:
-        window.close()
 
 
 def test_body_driven_by_keys_is_followed_from_the_start(tmp_path: Path) -> None:
-    window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
-    try:
-        assert window.app_state.open(find("spaceship"))
+    with open_window(find("spaceship"), tmp_path) as window:
         pygame.event.clear()
         scene = window.app_state.file
         assert scene is not None
@@ -122,8 +103,6 @@ def test_body_driven_by_keys_is_followed_from_the_start(tmp_path: Path) -> None:
         for _ in range(60):
             run_frame(window, elapsed=0.1)
             assert visible(window)[ship]
-    finally:
-        window.close()
 
 
 def test_f11_toggles_full_screen_and_restores_the_size(window: App) -> None:

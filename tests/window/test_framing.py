@@ -17,11 +17,11 @@ from sandbox.window.camera import Camera
 from sandbox.window.hit_test import overlapping_bodies, pick_body
 from sandbox.window.playback.history import MAX_TRAIL_BODIES, TRAIL_LENGTH, Trails
 from sandbox.window.view_bounds import predict_bounds, view_bounds
+from tests.samples import each_shipped_scene
 from tests.strategies import scenes
 
-pytestmark = pytest.mark.full  # every shipped scene
+pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
 
-SHIPPED = [each.name for each in shipped()]
 VIEWED = {each.name for each in shipped() if (play := load(each.path).play).view is not None or play.area is not None}
 """Scenes of games and tables, whose files state the view."""
 
@@ -41,7 +41,7 @@ def scene_of(*balls: dict[str, Any], **document: Any) -> Scene:
     return from_document({"ball": list(balls), **document})
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", each_shipped_scene())
 def test_bodies_of_shipped_scenes_are_in_view_at_the_start(name: str) -> None:
     scene = load(find(name))
     low, high = map(np.asarray, view_bounds(scene))
@@ -51,7 +51,7 @@ def test_bodies_of_shipped_scenes_are_in_view_at_the_start(name: str) -> None:
     assert inside.mean() >= (1.0 if len(inside) <= 1000 else 0.97)
 
 
-@pytest.mark.parametrize("name", [name for name in SHIPPED if name not in VIEWED])
+@pytest.mark.parametrize("name", [each for each in each_shipped_scene() if each.values[0] not in VIEWED])
 def test_bodies_of_shipped_scenes_stay_in_the_first_view(name: str) -> None:
     """Checked for the duration of the scene, at most 4,000 steps and 60,000 body-steps; diverging bodies may leave."""
     scene = load(find(name))

@@ -21,17 +21,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_neighbouring_scenes_cycle_through_the_folder(folder: Path) -> None:
-    current, names = folder / "b.toml", []
-    for _ in range(4):
-        next_one = neighbouring_scene(current, 1)
-        assert next_one is not None
-        current = next_one
-        names.append(current.name)
-    assert names == ["c.toml", "a.toml", "b.toml", "c.toml"]
-    assert neighbouring_scene(folder / "a.toml", -1) == folder / "c.toml"
-
-
 def test_neighbouring_scene_accepts_relative_paths_and_links(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     found = neighbouring_scene(Path("a.toml"), 1)

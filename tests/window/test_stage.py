@@ -16,29 +16,18 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters, turned
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
+from tests.toml_text import toml
 
-pytestmark = pytest.mark.full  # a window or a film
+pytestmark = pytest.mark.fail_slow(30)  # a window or a film
 
-GOOD = """
-title = "{name}"
-[world]
-gravity = [0.0, -9.81]
-[solver]
-dt = 0.01
-[[plane]]
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-restitution = 1.0
-[[ball]]
-name = "a"
-position = [0.0, 5.0]
-radius = 0.5
-restitution = 0.25
-[[ball]]
-name = "b"
-position = [3.0, 5.0]
-radius = 0.5
-"""
+GOOD = (
+    toml(title="{name}")
+    + toml("world", gravity=[0.0, -9.81])
+    + toml("solver", dt=0.01)
+    + toml("plane", point=[0.0, 0.0], normal=[0.0, 1.0], restitution=1.0)
+    + toml("ball", name="a", position=[0.0, 5.0], radius=0.5, restitution=0.25)
+    + toml("ball", name="b", position=[3.0, 5.0], radius=0.5)
+)
 BAD = 'title = "bad"\n\n[[ball]]\nposition = [0.0]\nradius = -1.0\n'
 OVERLAPPING = """
 [[ball]]
@@ -188,6 +177,8 @@ def test_requested_engine_is_restored_after_a_scene_that_it_refuses(folder: Path
     state = open_state(folder / "a.toml", "exact")
     state.open_neighbour(1)
     assert state.engine == "pymunk"
+    assert "exact refuses" in messages(state, "warning")
+    assert "opened with pymunk" in messages(state, "warning")
     state.restart()
     assert state.engine == "pymunk"
     state.open_neighbour(1)
@@ -216,15 +207,6 @@ def test_stored_run_pauses_at_its_end_and_restarts_when_resumed() -> None:
     step = view.step_number
     state.paused = False  # not at the end
     assert view.step_number == step
-
-
-def test_scene_refused_by_the_engine_is_opened_with_another(folder: Path) -> None:
-    (folder / "b.toml").write_text(OVERLAPPING)
-    state = open_state(folder / "a.toml", "exact")
-    state.open_neighbour(1)
-    assert live(state).engine == "pymunk"
-    assert "exact refuses" in messages(state, "warning")
-    assert "opened with pymunk" in messages(state, "warning")
 
 
 def test_next_engine_cycles_and_skips_engines_that_refuse_with_a_warning(folder: Path) -> None:

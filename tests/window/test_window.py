@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
+from PIL import Image
 
 from sandbox.action import SetParameter, Spawn
 from sandbox.window.app import App
@@ -17,44 +18,29 @@ from sandbox.window.display import NoDisplayError, open_screen
 from sandbox.window.input.keymap import Command
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
+from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.palette import SKY, WARNING, RgbColour
 from sandbox.window.ui.status import hud_status
+from tests.toml_text import toml
 from tests.window.pressing import FOCUS_LOST, key, key_up, move, press, release
 
-pytestmark = pytest.mark.full  # a window or a film
+pytestmark = pytest.mark.fail_slow(30)  # a window or a film
 
 SIZE = (900, 600)
 PICTURE = pygame.Rect(0, 165, 630, 235)
 """Region that neither text, nor the panel, nor the timeline covers, px."""
 HUD = pygame.Rect(10, 10, 360, 150)
 DT = 0.01  # s
-ROOM = """
-title = "Room"
-[world]
-duration = 5.0
-[solver]
-dt = 0.01
-[[wall]]
-points = [[-2.0, -1.5], [2.0, -1.5], [2.0, 1.5], [-2.0, 1.5]]
-closed = true
-[[ball]]
-name = "a"
-position = [-1.0, 0.0]
-radius = 0.4
-"""
-PLAY_KEYS = """
-[[emitter]]
-name = "spark"
-position = [1.0, 0.0]
-count = 3
-velocity_min = [-1.0, -1.0]
-velocity_max = [1.0, 1.0]
-radius = 0.05
-[play]
-arrows = "a"
-arrow_step = 0.25
-relaunch = "spark"
-"""
+ROOM = (
+    'title = "Room"\n'
+    + toml("world", duration=5.0)
+    + toml("solver", dt=0.01)
+    + toml("wall", points=[[-2.0, -1.5], [2.0, -1.5], [2.0, 1.5], [-2.0, 1.5]], closed=True)
+    + toml("ball", name="a", position=[-1.0, 0.0], radius=0.4)
+)
+PLAY_KEYS = toml(
+    "emitter", name="spark", position=[1.0, 0.0], count=3, velocity_min=[-1, -1], velocity_max=[1, 1], radius=0.05
+) + toml("play", arrows="a", arrow_step=0.25, relaunch="spark")
 BALL_START, TARGET = (-1.0, 0.0), (1.2, 0.2)
 
 OpenWindow = Callable[[str], App]
@@ -151,7 +137,7 @@ def test_ball_moved_while_paused_is_drawn_there_in_the_same_frame(window: App) -
     assert live(window).step_number == 0
 
 
-def test_pull_moves_the_ball_in_the_same_frame(window: App) -> None:
+def test_pull_moves_the_ball_in_the_same_frame_until_the_focus_is_lost(window: App) -> None:
     run_frame(window)
     before = live(window).frame.position[0, 0]
     run_frame(
@@ -159,12 +145,8 @@ def test_pull_moves_the_ball_in_the_same_frame(window: App) -> None:
     )
     assert live(window).frame.position[0, 0] > before
     assert [action.kind for action in live(window).session.actions] == ["pull", "pull"]
-
-
-def test_pull_ends_when_the_window_loses_focus(window: App) -> None:
-    run_frame(window, press(*on_screen(window, BALL_START)), move(*on_screen(window, TARGET), held=True), elapsed=DT)
     assert window.app_state.body_tools.is_holding
-    run_frame(window, FOCUS_LOST)
+    run_frame(window, FOCUS_LOST)  # ends it
     assert not window.app_state.body_tools.is_holding
     assert getattr(live(window).session.actions[-1], "target", 0) is None
 
@@ -305,27 +287,6 @@ def test_end_of_the_session_is_shown_until_scrubbed_back(window: App) -> None:
     assert hud_status(window.app_state, (), 60.0, None).ended is None
 
 
-def test_press_and_release_within_one_frame_only_pick(window: App) -> None:
-    start = on_screen(window, BALL_START)
-    run_frame(window, press(*start), release(*start), elapsed=DT)
-    assert not window.app_state.body_tools.is_holding
-    assert window.app_state.body_tools.picked == 0
-    assert live(window).session.actions == ()
-
-
-@pytest.mark.parametrize("frames", [1, 3, 7])
-def test_number_of_steps_depends_on_time_and_not_on_frames(window: App, frames: int) -> None:
-    for _ in range(frames):
-        run_frame(window, elapsed=0.07 / frames)
-    # 0.07 / 3 three times may fall short of 7 steps by rounding
-    assert live(window).step_number in ((7,) if frames == 1 else (6, 7))
-
-
-def test_long_frames_are_limited_to_a_tenth_of_a_second(window: App) -> None:
-    run_frame(window, elapsed=1000.0)
-    assert live(window).step_number == round(0.1 / DT)
-
-
 def test_each_step_key_makes_one_step_within_one_frame(window: App) -> None:
     strokes = [event for _ in range(5) for event in (key(pygame.K_o), key_up(pygame.K_o))]
     run_frame(window, *strokes, elapsed=1.0)
@@ -354,15 +315,6 @@ def test_picture_of_a_pause_shows_the_current_state(open_window: OpenWindow) -> 
     run_frame(window, key(pygame.K_p), key_up(pygame.K_p), elapsed=0.4 * DT)
     x, y = live(window).frame.position[0].tolist()
     assert drawn_ball(window) == pytest.approx(on_screen(window, (x, y)), abs=1.0)  # a pixel; a step is 28
-
-
-def test_held_pause_key_toggles_once(window: App) -> None:
-    run_frame(window, key(pygame.K_p))
-    for _ in range(4):
-        run_frame(window, key(pygame.K_p))
-    assert window.app_state.paused
-    run_frame(window, key_up(pygame.K_p), key(pygame.K_p))
-    assert not window.app_state.paused
 
 
 def test_panned_camera_survives_restart_and_home_resets_it(window: App) -> None:
@@ -484,3 +436,34 @@ def test_wait_message_can_be_drawn_while_the_surface_is_locked(window: App) -> N
     window.context.gui.draw_wait(window.context.surface, "compiling")
     assert (locked != before).any()
     assert (pygame.surfarray.array3d(window.context.surface) == locked).all()
+
+
+def test_digit_keys_toggle_every_overlay(open_window: OpenWindow) -> None:
+    window = open_window(ROOM + "velocity = [1.0, 0.5]\n" + PLAY_KEYS)
+    run_frame(window, elapsed=0.05)
+    window.app_state.paused = True
+    for code, name in zip("1234567890", OVERLAYS, strict=True):
+        before = set(window.context.gui.overlays)
+        for expected in (before ^ {name}, before):
+            run_frame(window, key(ord(code), unicode=code), key_up(ord(code)))
+            assert set(window.context.gui.overlays) == expected
+
+
+def test_film_is_recorded_until_it_is_stopped_or_the_window_closes(
+    open_window: OpenWindow, printed: list[str], tmp_path: Path
+) -> None:
+    window = open_window(ROOM + "velocity = [1.0, 0.5]\n")
+    for number in (1, 2):
+        run_frame(window, key(pygame.K_r, pygame.KMOD_CTRL), key_up(pygame.K_r))
+        for _ in range(4):
+            run_frame(window, elapsed=0.05)
+        if number == 1:
+            run_frame(window, key(pygame.K_r, pygame.KMOD_CTRL), key_up(pygame.K_r))
+        else:
+            window.close()
+        film = tmp_path / f"sandbox-room-{number}.gif"
+        assert printed[-1] == f"recorded: {film}"
+        with Image.open(film) as image:
+            assert image.size == SIZE
+            assert getattr(image, "n_frames", 1) > 1
+    assert not list(tmp_path.glob(".*.tmp"))

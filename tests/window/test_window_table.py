@@ -17,22 +17,15 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.ui.help import help_groups
+from tests.toml_text import toml
 from tests.window.pressing import key, key_up, move, press, release
 
-pytestmark = pytest.mark.full  # a window or a film
+pytestmark = pytest.mark.fail_slow(30)  # a window or a film
 
 SIZE = (1000, 620)
 FRAME_TIME = 1.0 / 60.0
 """s"""
-TABLE = """
-title = "Table"
-[billiards]
-table = "pool-7ft"
-game = "9-ball"
-[[shot]]
-aim = 1.5708
-speed = 4.0
-"""
+TABLE = toml(title="Table") + toml("billiards", table="pool-7ft", game="9-ball") + toml("shot", aim=1.5708, speed=4.0)
 
 
 @pytest.fixture

@@ -12,21 +12,17 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.worker import Worker
+from tests.toml_text import toml
 from tests.window.pressing import FOCUS_LOST, key, key_up, press
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.full  # a window or a film
+pytestmark = pytest.mark.fail_slow(30)  # a window or a film
 
-MOVING = """
-title = "Moving"
-[solver]
-dt = 0.01
-[[ball]]
-name = "a"
-position = [0.0, 0.0]
-velocity = [0.1, 0.0]
-radius = 0.4
-"""
+MOVING = (
+    'title = "Moving"\n'
+    + toml("solver", dt=0.01)
+    + toml("ball", name="a", position=[0.0, 0.0], velocity=[0.1, 0.0], radius=0.4)
+)
 FOCUS_GAINED = pygame.event.Event(pygame.WINDOWFOCUSGAINED)
 
 

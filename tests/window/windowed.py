@@ -1,4 +1,4 @@
-"""A window without a display that shows a scene given as text."""
+"""Scene texts, and windows without a display that show a scene."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,10 +12,11 @@ from sandbox.window.playback.live import LiveView
 
 
 @contextmanager
-def open_window(text: str, folder: Path, size: tuple[int, int] = (640, 480)) -> Iterator[App]:
-    """Open a window on a scene, and close it at the end."""
-    file = folder / "scene.toml"
-    file.write_text(text, encoding="utf-8")
+def open_window(scene: str | Path, folder: Path, size: tuple[int, int] = (640, 480)) -> Iterator[App]:
+    """Open a window on a scene, given by its text or file, and close it at the end."""
+    file = scene if isinstance(scene, Path) else folder / "scene.toml"
+    if isinstance(scene, str):
+        file.write_text(scene, encoding="utf-8")
     state = AppState()
     state.open_other(file)
     window = App(state, size=size, folder=folder, say=lambda _: None)

@@ -16,8 +16,9 @@ from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.targeting import AimSolver, FiringSolution, TargetingProblem
 from sandbox.scene.files.load import loads
 from tests.games.artillery.grounds import hills, world
+from tests.toml_text import toml
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius
@@ -42,7 +43,7 @@ def test_full_skill_hits_within_the_crater(case: tuple[Any, ...]) -> None:
     assert_hit(*case)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @settings(max_examples=60)
 @given(CASES)
 def test_full_skill_hits_from_any_position(case: tuple[Any, ...]) -> None:
@@ -64,21 +65,13 @@ def assert_hit(
     assert 0.0 < aim.speed <= 75.0
 
 
-DUEL = """
-[world]
-gravity = [0.0, -9.81]
-[terrain]
-width = 300.0
-[artillery]
-money = 0
-[[artillery.player]]
-name = "Red"
-position = 60.0
-bot = 0.75
-[[artillery.player]]
-name = "Blue"
-position = 240.0
-"""
+DUEL = (
+    toml("world", gravity=[0.0, -9.81])
+    + toml("terrain", width=300.0)
+    + toml("artillery", money=0)
+    + toml("artillery.player", name="Red", position=60.0, bot=0.75)
+    + toml("artillery.player", name="Blue", position=240.0)
+)
 
 
 def battlefield(bot: float) -> Battlefield:

@@ -16,7 +16,7 @@ from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
 from tests.games.artillery.grounds import G, flat, hills, shot, world
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 
 def range_and_time(air: World, velocity: np.ndarray) -> tuple[float, float]:
@@ -46,8 +46,7 @@ def test_range_in_vacuum() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wind", "distance", "time"),
-    [(-8.0, 103.615, 6.02594), (0.0, None, 6.02594), (5.0, None, 6.02594)],
+    ("wind", "distance", "time"), [(-8.0, 103.615, 6.02594), (0.0, None, 6.02594), (5.0, None, 6.02594)]
 )
 def test_range_with_linear_drag(wind: float, distance: float | None, time: float) -> None:
     """The landing time is the root of the height (v_y + g/k)(1 − e^−kt)/k − g t/k; x is analogous, with the wind."""

@@ -12,26 +12,15 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, loads
+from tests.toml_text import toml
 
-DUEL = """
-[world]
-gravity = [0.0, -9.81]
-seed = 5
-[terrain]
-width = 200.0
-columns = 100
-base = 8.0
-height = 30.0
-friction = 0.5
-[artillery]
-[[artillery.player]]
-name = "Red"
-position = 30.0
-[[artillery.player]]
-name = "Blue"
-position = 170.0
-bot = 0.5
-"""
+DUEL = (
+    toml("world", gravity=[0.0, -9.81], seed=5)
+    + toml("terrain", width=200.0, columns=100, base=8.0, height=30.0, friction=0.5)
+    + toml("artillery")
+    + toml("artillery.player", name="Red", position=30.0)
+    + toml("artillery.player", name="Blue", position=170.0, bot=0.5)
+)
 
 
 def columns(scene: Scene) -> tuple[float, ...]:
@@ -125,11 +114,7 @@ def test_stated_heights_are_used_as_the_ground() -> None:
     ("change", "path", "words"),
     [
         (("position = 30.0", "position = 199.5"), "artillery.player.Red.position", "between 1.5 and 198.5 m"),
-        (
-            ("position = 170.0", "position = 32.9"),
-            "artillery.player.Blue.position",
-            "is too near 'Red'",
-        ),
+        (("position = 170.0", "position = 32.9"), "artillery.player.Blue.position", "is too near 'Red'"),
         (("width = 200.0", "width = 200.0\nheights = [1.0, 2.0]"), "terrain.heights", "combined with `columns`"),
         (('name = "Blue"', 'name = "Red"'), "artillery.player.Red.name", "names must be unique"),
         (("[artillery]", "[artillery]\nwind = 5.0"), "artillery.wind", "world.linear_drag"),

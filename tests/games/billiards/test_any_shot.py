@@ -5,25 +5,21 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.billiards.rules.base import BallEvent, GameError, Ruleset, Ruling, ShotCall, Situation
 from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.rules.snooker import SnookerState, remaining
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 POCKETS = ("left", "right")
 CAROM = ("three-cushion", "straight-rail")
 
 number = st.integers(0, 40)
 event = st.tuples(st.sampled_from(("ball", "ball", "cushion", "pocket", "pocket")), number, number)
-turns = st.lists(
-    st.tuples(st.lists(event, max_size=6), number, st.booleans(), number),
-    min_size=1,
-    max_size=25,
-)
+turns = st.lists(st.tuples(st.lists(event, max_size=6), number, st.booleans(), number), min_size=1, max_size=25)
 
 
 def shot_of(rules: Ruleset[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[BallEvent, ...]:
@@ -80,7 +76,6 @@ def assert_valid_transition(rules: Ruleset[Any], before: Any, verdict: Ruling[An
 
 @pytest.mark.parametrize("players", [1, 2])
 @pytest.mark.parametrize("name", RULESETS)
-@settings(max_examples=60, deadline=None)
 @given(turns=turns, misses=st.booleans())
 def test_any_shots_give_a_valid_state(name: str, players: int, turns: list[Any], misses: bool) -> None:
     rules = RULESETS[name]
@@ -110,7 +105,6 @@ def test_any_shots_give_a_valid_state(name: str, players: int, turns: list[Any],
 
 @pytest.mark.parametrize("players", [1, 2])
 @pytest.mark.parametrize("name", RULESETS)
-@settings(max_examples=20, deadline=None)
 @given(mistakes=st.lists(st.integers(0, 2), max_size=12))
 def test_frame_of_successful_shots_with_some_mistakes_ends(name: str, players: int, mistakes: list[int]) -> None:
     """Each shot pots the ball on or makes the carom, except for some that miss, scratch or hit nothing."""

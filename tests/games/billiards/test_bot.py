@@ -13,7 +13,7 @@ from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
 from tests.games.billiards.tables_by_hand import match, match_with_balls_at, table
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
 
@@ -122,7 +122,7 @@ def test_bots_are_parsed_from_text() -> None:
         BilliardsBot(1.5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "terms"), [("9-ball", {}), ("straight-rail", {"distance": 10})])
 def test_higher_skill_wins_more_frames(name: str, terms: dict[str, int]) -> None:
     won = 0

@@ -6,75 +6,50 @@ import pytest
 
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.pool import NineBall
-from tests.games.billiards.shot_by_hand import judge, potted_lines
+from tests.games.billiards.shot_by_hand import Case, assert_case, assert_verdict, judge, potted_lines
 
 RULES = NineBall()
 START = RULES.start()
 PLAY = replace(START, opening=False, in_hand=None)
 SECOND = replace(PLAY, push_out=True)
 DRY = ("cue hits 1", "1 at rail", "2 at rail", "3 at rail", "4 at rail")
+FAIR, IN_HAND, PUSH = {"fouls": ()}, {"turn": 1, "in_hand": "anywhere", "push_out": False}, {"push_out": True}
 
-
-def test_lowest_ball_is_on_at_the_break_and_after() -> None:
-    assert RULES.legal_targets(START) == {"1"}
-    assert RULES.legal_targets(replace(PLAY, table=("9", "4", "7"))) == {"4"}
-
-
-def test_break_that_pots_a_ball_continues_with_a_push_out_option() -> None:
-    verdict = judge(RULES, START, "cue hits 1", "5 in left")
-    assert verdict.continues
-    assert verdict.points == (1, 0)
-    assert not verdict.state.opening
-    assert RULES.choices(verdict.state).push_out
-
-
-def test_fair_break_without_a_pot_passes_with_a_push_out_option() -> None:
-    verdict = judge(RULES, START, *DRY)
-    assert not verdict.fouls
-    assert verdict.state.turn == 1
-    assert RULES.choices(verdict.state).push_out
-
-
-BREAK_FOULS = {
-    "illegal break": DRY[:-1],
-    "the 2 was hit first instead of the 1": ("cue hits 2", "5 in left"),
-    "the cue ball hit no ball": ("cue at rail",),
-    "scratch": (*DRY, "cue in left"),
+CASES = {
+    "break that pots a ball": Case(
+        START, ("cue hits 1", "5 in left"), {"continues": True, "points": (1, 0), "opening": False, "push_out": True}
+    ),
+    "fair break without a pot": Case(START, DRY, FAIR | {"turn": 1, "push_out": True}),
+    "illegal break": Case(START, DRY[:-1], IN_HAND | {"fouls": ("illegal break",)}),
+    "wrong ball on the break": Case(
+        START, ("cue hits 2", "5 in left"), IN_HAND | {"fouls": ("the 2 was hit first instead of the 1",)}
+    ),
+    "no ball on the break": Case(START, "cue at rail", IN_HAND | {"fouls": ("the cue ball hit no ball",)}),
+    "scratch on the break": Case(START, (*DRY, "cue in left"), IN_HAND | {"fouls": ("scratch",)}),
+    "nine on the break": Case(START, (*DRY, "9 in left"), {"over": True, "winner": 0}),
+    "nine by a combination": Case(PLAY, ("cue hits 1", "1 hits 9", "9 in left"), {"winner": 0}),
+    "nine on a foul is spotted": Case(
+        PLAY,
+        ("cue hits 9", "9 in left"),
+        {"fouls": ("the 9 was hit first instead of the 1",), "over": False, "respot": ("9",), "up": "9"},
+    ),
+    "other balls on a foul stay down": Case(
+        PLAY, ("cue hits 2", "2 in left"), {"down": "2", "respot": (), "scores": (0, 0)}
+    ),
+    "any fair pot continues": Case(PLAY, ("cue hits 1", "6 in left"), {"continues": True}),
+    "no pot": Case(PLAY, ("cue hits 1", "1 at rail"), {"turn": 1, "in_hand": None}),
+    "push-out without a hit": Case(
+        SECOND, (), FAIR | {"turn": 1, "decisions": ("play", "pass"), "push_out": False}, PUSH
+    ),
+    "push-out that pots balls": Case(
+        SECOND,
+        ("cue hits 5", "5 in left", "9 in left"),
+        {"continues": False, "over": False, "turn": 1, "scores": (0, 0), "down": "5", "respot": ("9",)},
+        PUSH,
+    ),
+    "push-out that scratches": Case(SECOND, "cue in left", {"fouls": ("scratch",), "decisions": ()}, PUSH),
+    "push-out is offered once": Case(SECOND, ("cue hits 1", "1 in left"), {"push_out": False}),
 }
-
-
-@pytest.mark.parametrize("why", BREAK_FOULS)
-def test_foul_on_the_break_gives_ball_in_hand_anywhere_without_push_out(why: str) -> None:
-    verdict = judge(RULES, START, *BREAK_FOULS[why])
-    assert verdict.fouls == (why,)
-    assert (verdict.state.turn, verdict.state.in_hand) == (1, "anywhere")
-    assert not RULES.choices(verdict.state).push_out
-
-
-def test_nine_on_the_break_wins() -> None:
-    verdict = judge(RULES, START, *DRY, "9 in left")
-    assert (verdict.state.over, verdict.state.winner) == (True, 0)
-
-
-def test_nine_potted_by_a_combination_wins() -> None:
-    assert judge(RULES, PLAY, "cue hits 1", "1 hits 9", "9 in left").state.winner == 0
-
-
-def test_nine_on_a_foul_is_spotted() -> None:
-    verdict = judge(RULES, PLAY, "cue hits 9", "9 in left")
-    assert verdict.fouls
-    assert not verdict.state.over
-    assert [(each.ball, each.spots[0]) for each in verdict.respot] == [("9", "foot")]
-    assert "9" in verdict.state.table
-
-
-def test_other_balls_stay_down_on_a_foul_and_do_not_score() -> None:
-    verdict = judge(RULES, PLAY, "cue hits 2", "2 in left")
-    assert "2" not in verdict.state.table
-    assert verdict.respot == ()
-    assert verdict.state.scores == (0, 0)
-
-
 FOULS = {
     "scratch": ("cue hits 1", "1 in left", "cue in left"),
     "the cue ball hit no ball": ("cue at rail",),
@@ -83,50 +58,31 @@ FOULS = {
 }
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_verdict(name: str) -> None:
+    assert_case(RULES, CASES[name])
+
+
 @pytest.mark.parametrize("why", FOULS)
 def test_foul_gives_the_opponent_ball_in_hand_anywhere(why: str) -> None:
     verdict = judge(RULES, PLAY, *FOULS[why])
-    assert verdict.fouls == (why,)
-    assert (verdict.state.turn, verdict.state.in_hand) == (1, "anywhere")
+    assert_verdict(verdict, fouls=(why,), turn=1, in_hand="anywhere")
     assert verdict.state.fouls == (1, 0)
 
 
-def test_any_fair_pot_continues_and_no_pot_passes_the_turn() -> None:
-    assert judge(RULES, PLAY, "cue hits 1", "6 in left").continues
-    verdict = judge(RULES, PLAY, "cue hits 1", "1 at rail")
-    assert (verdict.state.turn, verdict.state.in_hand) == (1, None)
+def test_lowest_ball_is_on_at_the_break_and_after() -> None:
+    assert RULES.legal_targets(START) == {"1"}
+    assert RULES.legal_targets(replace(PLAY, table=("9", "4", "7"))) == {"4"}
 
 
-def test_push_out_needs_no_hit_and_no_rail_and_the_opponent_chooses() -> None:
-    verdict = judge(RULES, SECOND, push_out=True)
-    assert not verdict.fouls
-    assert (verdict.state.turn, verdict.state.decisions) == (1, ("play", "pass"))
-    assert RULES.decide(verdict.state, "play").state.turn == 1
-    assert RULES.decide(verdict.state, "pass").state.turn == 0
-    assert not RULES.choices(verdict.state).push_out
-
-
-def test_push_out_that_pots_balls_passes_the_turn_and_spots_the_nine() -> None:
-    verdict = judge(RULES, SECOND, "cue hits 5", "5 in left", "9 in left", push_out=True)
-    assert not verdict.continues
-    assert not verdict.state.over
-    assert verdict.state.turn == 1
-    assert verdict.state.scores == (0, 0)
-    assert "5" not in verdict.state.table
-    assert [each.ball for each in verdict.respot] == ["9"]
-
-
-def test_push_out_that_scratches_is_a_foul() -> None:
-    verdict = judge(RULES, SECOND, "cue in left", push_out=True)
-    assert verdict.fouls == ("scratch",)
-    assert verdict.state.decisions == ()
-
-
-def test_push_out_is_offered_on_the_second_shot_only() -> None:
-    for state in (START, PLAY):
+def test_push_out_is_a_choice_of_the_second_shot_and_the_opponent_decides() -> None:
+    assert RULES.choices(SECOND).push_out
+    state = judge(RULES, SECOND, push_out=True).state
+    assert [RULES.decide(state, each).state.turn for each in ("play", "pass")] == [1, 0]
+    for other in (START, PLAY, state):
+        assert not RULES.choices(other).push_out
         with pytest.raises(GameError, match="push-out"):
-            judge(RULES, state, push_out=True)
-    assert not RULES.choices(judge(RULES, SECOND, "cue hits 1", "1 in left").state).push_out
+            judge(RULES, other, push_out=True)
 
 
 def test_third_consecutive_foul_loses_after_a_warning_at_the_second() -> None:
@@ -135,19 +91,14 @@ def test_third_consecutive_foul_loses_after_a_warning_at_the_second() -> None:
         verdict = judge(RULES, state)
         assert any("one more loses" in line for line in verdict.messages) == (row == 2)
         state = judge(RULES, verdict.state, "cue hits 1", "1 at rail").state
-    verdict = judge(RULES, state)
-    assert (verdict.state.over, verdict.state.winner) == (True, 1)
-
-
-def test_fair_shot_resets_the_fouls_of_its_player_only() -> None:
-    state = replace(PLAY, fouls=(2, 2))
-    assert judge(RULES, state, "cue hits 1", "1 at rail").state.fouls == (0, 2)
+    assert_verdict(judge(RULES, state), over=True, winner=1)
+    fair = judge(RULES, replace(PLAY, fouls=(2, 2)), "cue hits 1", "1 at rail").state
+    assert fair.fouls == (0, 2)
 
 
 def test_third_foul_of_a_single_player_loses() -> None:
     state = replace(RULES.start(players=1), opening=False, fouls=(2,))
-    verdict = judge(RULES, state)
-    assert (verdict.state.over, verdict.state.winner) == (True, None)
+    assert_verdict(judge(RULES, state), over=True, winner=None)
     assert judge(RULES, replace(state, push_out=True), push_out=True).state.decisions == ()
 
 

@@ -1,104 +1,113 @@
-"""Snooker: every foul, every ending, every change of turn."""
+"""Snooker: every foul, every ending, every change of turn; free balls, touching balls, snookers."""
 
 from dataclasses import replace
 
 import pytest
 
 from sandbox.games.billiards.rules.base import GameError, Situation
-from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, SnookerState, remaining
-from tests.games.billiards.shot_by_hand import judge, potted_lines
+from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, remaining
+from tests.games.billiards.shot_by_hand import Case, assert_case, assert_verdict, judge, potted_lines
 
 RULES = Snooker()
 START = RULES.start()
 PLAY = replace(START, opening=False, in_hand=None)
 COLOUR = replace(PLAY, on="colour", table=(*REDS[1:], *COLOURS), scores=(1, 0))
+LAST_COLOUR = replace(COLOUR, table=COLOURS)
 ORDER = replace(PLAY, on="yellow", table=COLOURS)
 BLACK = replace(PLAY, on="black", table=("black",))
+MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
+FREE, FREE_YELLOW = replace(PLAY, free=True), replace(ORDER, free=True)
 SNOOKERED = Situation(snookered=True)
+RED_POTTED = ("cue hits red-1", "red-1 in left")
 
 
-def test_start_is_in_the_d_with_reds_on_and_147_points_remaining() -> None:
-    assert START.in_hand == "in the D"
-    assert RULES.legal_targets(START) == set(REDS)
-    assert remaining(START) == 147
-    assert not START.misses
-    assert not RULES.settle(START, SNOOKERED).state.free
+def called(ball: str) -> dict[str, str]:
+    return {"ball": ball}
 
 
-def test_potted_red_scores_one_stays_down_and_a_colour_is_next() -> None:
-    verdict = judge(RULES, START, "cue hits red-1", "red-1 in left")
-    assert verdict.continues
-    assert verdict.points == (1, 0)
-    assert (verdict.state.on, verdict.state.run, verdict.state.opening) == ("colour", 1, False)
-    assert RULES.legal_targets(verdict.state) == set(COLOURS)
-    assert "red-1" not in verdict.state.table
-
-
-def test_each_red_of_a_stroke_scores() -> None:
-    assert judge(RULES, PLAY, "cue hits red-1", "red-1 in left", "red-2 in right").points == (2, 0)
-
-
-@pytest.mark.parametrize("colour", COLOURS)
-def test_potted_colour_scores_its_value_is_respotted_and_red_is_next(colour: str) -> None:
-    verdict = judge(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
-    assert verdict.points == (VALUES[colour], 0)
-    assert (verdict.state.on, verdict.continues) == ("red", True)
-    assert [each.spots[0] for each in verdict.respot] == [colour]
-    assert verdict.state.table == COLOUR.table
-
-
-def test_respot_lists_the_own_spot_then_the_highest_spots() -> None:
-    (verdict,) = judge(RULES, COLOUR, "cue hits blue", "blue in left", ball="blue").respot
-    assert verdict.spots == ("blue", "black", "pink", "brown", "green", "yellow")
-
-
-def test_first_colour_hit_counts_as_nominated() -> None:
-    assert judge(RULES, COLOUR, "cue hits pink", "pink in left").points == (6, 0)
-
-
-def test_colour_after_the_last_red_is_respotted_and_yellow_is_on() -> None:
-    state = replace(PLAY, table=("red-9", *COLOURS))
-    state = judge(RULES, state, "cue hits red-9", "red-9 in left").state
-    verdict = judge(RULES, state, "cue hits black", "black in left", ball="black")
-    assert [each.ball for each in verdict.respot] == ["black"]
-    assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
-
-
-def test_missed_colour_after_the_last_red_has_yellow_on() -> None:
-    state = replace(COLOUR, table=COLOURS)
-    verdict = judge(RULES, state, "cue hits black", ball="black")
-    assert (verdict.state.turn, verdict.state.on) == (1, "yellow")
-
-
-def test_colours_in_order_stay_down() -> None:
-    verdict = judge(RULES, ORDER, "cue hits yellow", "yellow in left")
-    assert (verdict.state.on, verdict.respot) == ("green", ())
-    assert RULES.legal_targets(verdict.state) == {"green"}
-
-
-def test_stroke_without_a_pot_or_cushion_passes_the_turn_without_a_foul() -> None:
-    verdict = judge(RULES, PLAY, "cue hits red-1")
-    assert not verdict.fouls
-    assert (verdict.state.turn, verdict.state.on, verdict.state.run) == (1, "red", 0)
-
-
-def test_missed_colour_passes_with_red_on() -> None:
-    verdict = judge(RULES, COLOUR, "cue hits pink", ball="pink")
-    assert (verdict.state.turn, verdict.state.on) == (1, "red")
-
-
+CASES = {
+    "red": Case(
+        START,
+        RED_POTTED,
+        {"continues": True, "points": (1, 0), "on": "colour", "run": 1, "opening": False, "down": ("red-1",)},
+    ),
+    "two reds": Case(PLAY, (*RED_POTTED, "red-2 in right"), {"points": (2, 0)}),
+    "first colour hit counts as nominated": Case(COLOUR, ("cue hits pink", "pink in left"), {"points": (6, 0)}),
+    "colour after the last red": Case(
+        LAST_COLOUR,
+        ("cue hits black", "black in left"),
+        {"respot": ("black",), "on": "yellow", "table": COLOURS},
+        called("black"),
+    ),
+    "missed colour after the last red": Case(
+        LAST_COLOUR, "cue hits black", {"turn": 1, "on": "yellow"}, called("black")
+    ),
+    "colours in order stay down": Case(ORDER, ("cue hits yellow", "yellow in left"), {"on": "green", "respot": ()}),
+    "no pot and no cushion": Case(PLAY, "cue hits red-1", {"fouls": (), "turn": 1, "on": "red", "run": 0}),
+    "missed colour": Case(COLOUR, "cue hits pink", {"turn": 1, "on": "red"}, called("pink")),
+    "several fouls count once": Case(
+        PLAY, ("cue hits yellow", "black in left", "cue in left"), {"points": (0, 7), "in_hand": "in the D"}
+    ),
+    "foul respots colours, highest first": Case(
+        PLAY,
+        (*RED_POTTED, "blue in left", "black in right"),
+        {"scores": (0, 7), "respot": ("black", "blue"), "table": (*REDS[1:], *COLOURS)},
+    ),
+    "colour on potted on a foul": Case(
+        ORDER, ("cue hits yellow", "yellow in left", "cue in left"), {"on": "yellow", "respot": ("yellow",)}
+    ),
+    "final black": Case(
+        replace(BLACK, scores=(10, 12)),
+        ("cue hits black", "black in left"),
+        {"points": (7, 0), "over": True, "winner": 0},
+    ),
+    "foul on the final black": Case(
+        replace(BLACK, scores=(20, 12)),
+        ("cue hits black", "cue in left"),
+        {"over": True, "winner": 0, "scores": (20, 19)},
+    ),
+    "missed black": Case(replace(BLACK, scores=(20, 18)), "cue hits black", {"over": False, "turn": 1, "on": "black"}),
+    "free ball counts as a red": Case(
+        FREE,
+        ("cue hits blue", "blue in left"),
+        {"points": (1, 0), "respot": ("blue",), "on": "colour", "free": False},
+        called("blue"),
+    ),
+    "free ball and red": Case(
+        FREE, ("cue hits blue", "blue in left", "red-1 in left"), {"points": (2, 0)}, called("blue")
+    ),
+    "free ball among the colours": Case(
+        FREE_YELLOW,
+        ("cue hits black", "black in left"),
+        {"points": (2, 0), "on": "yellow", "table": COLOURS},
+        called("black"),
+    ),
+    "free ball and colour on": Case(
+        FREE_YELLOW,
+        ("cue hits black", "black in left", "yellow in left"),
+        {"points": (2, 0), "on": "green", "respot": ("black",)},
+        called("black"),
+    ),
+    "ball on by the free ball": Case(
+        FREE_YELLOW, ("cue hits black", "yellow in left"), {"points": (2, 0)}, called("black")
+    ),
+    "free ball is hit after a red": Case(FREE, "cue hits red-1", {"points": (0, 4)}, called("blue")),
+    "free ball and red together": Case(FREE, (("cue hits red-1", "cue hits blue"),), {"fouls": ()}, called("blue")),
+    "free ball is optional": Case(FREE, RED_POTTED, {"points": (1, 0)}),
+    "free ball that is not called": Case(FREE, "cue hits blue", {"points": (0, 5)}),
+}
 FOULS = [
-    (PLAY, {}, ("cue hits red-1", "cue in left"), 4, "in-off"),
+    (PLAY, {}, (*RED_POTTED[:1], "cue in left"), 4, "in-off"),
     (PLAY, {}, ("cue at rail",), 4, "the cue ball hit no ball"),
     (PLAY, {}, ("cue hits yellow",), 4, "the yellow was hit first"),
     (PLAY, {}, ("cue hits black",), 7, "the black was hit first"),
     (PLAY, {}, ("cue hits red-1", "pink in left"), 6, "the pink was potted but not on"),
     (PLAY, {}, (("cue hits red-1", "cue hits blue"),), 5, "the red-1 and the blue were hit first"),
-    (COLOUR, {"ball": "pink"}, ("cue at rail",), 6, "the cue ball hit no ball"),
-    (COLOUR, {"ball": "pink"}, ("cue hits red-2",), 6, "the red-2 was hit first"),
-    (COLOUR, {"ball": "green"}, ("cue hits green", "red-2 in left"), 4, "the red-2 was potted but not on"),
-    (COLOUR, {"ball": "green"}, ("cue hits black",), 7, "the black was hit first"),
-    (COLOUR, {"ball": "green"}, (("cue hits green", "cue hits pink"),), 6, "the green and the pink were hit first"),
+    (COLOUR, called("pink"), ("cue at rail",), 6, "the cue ball hit no ball"),
+    (COLOUR, called("pink"), ("cue hits red-2",), 6, "the red-2 was hit first"),
+    (COLOUR, called("green"), ("cue hits green", "red-2 in left"), 4, "the red-2 was potted but not on"),
+    (COLOUR, called("green"), ("cue hits black",), 7, "the black was hit first"),
+    (COLOUR, called("green"), (("cue hits green", "cue hits pink"),), 6, "the green and the pink were hit first"),
     (COLOUR, {}, ("cue hits red-2",), 7, "the red-2 was hit first"),
     (COLOUR, {}, (), 7, "the cue ball hit no ball"),
     (ORDER, {}, ("cue hits green",), 4, "the green was hit first"),
@@ -106,61 +115,50 @@ FOULS = [
 ]
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_verdict(name: str) -> None:
+    assert_case(RULES, CASES[name])
+
+
 @pytest.mark.parametrize(("state", "call", "lines", "penalty", "why"), FOULS)
-def test_foul_scores_for_the_opponent(
-    state: SnookerState, call: dict[str, str], lines: tuple[str, ...], penalty: int, why: str
-) -> None:
+def test_foul_scores_for_the_opponent(state, call, lines, penalty, why) -> None:
     verdict = judge(RULES, state, *lines, **call)
-    assert verdict.fouls == (why,)
-    assert verdict.points == (0, penalty)
-    assert verdict.state.scores == (state.scores[0], penalty)
-    assert verdict.state.turn == 1
+    scores = state.scores[0], penalty
+    assert_verdict(verdict, fouls=(why,), points=(0, penalty), scores=scores, turn=1, decisions=("play", "pass"))
     assert verdict.state.on in ("red", "yellow")
-    assert verdict.state.decisions == ("play", "pass")
 
 
-def test_several_fouls_of_a_stroke_count_once_with_the_highest_penalty() -> None:
-    verdict = judge(RULES, PLAY, "cue hits yellow", "black in left", "cue in left")
-    assert len(verdict.fouls) == 3
-    assert verdict.points == (0, 7)
-    assert verdict.state.in_hand == "in the D"
+def test_start_is_in_the_d_with_reds_on_and_147_points_remaining() -> None:
+    assert (START.in_hand, START.misses) == ("in the D", False)
+    assert RULES.legal_targets(START) == set(REDS)
+    assert remaining(START) == 147
+    assert not RULES.settle(START, SNOOKERED).state.free
+    after_red = judge(RULES, START, *RED_POTTED).state
+    assert RULES.legal_targets(after_red) == set(COLOURS)
+    assert RULES.legal_targets(judge(RULES, ORDER, "cue hits yellow", "yellow in left").state) == {"green"}
 
 
-def test_foul_scores_nothing_and_respots_only_colours_highest_first() -> None:
-    verdict = judge(RULES, PLAY, "cue hits red-1", "red-1 in left", "blue in left", "black in right")
-    assert verdict.state.scores == (0, 7)
-    assert [each.ball for each in verdict.respot] == ["black", "blue"]
-    assert verdict.state.table == (*REDS[1:], *COLOURS)
+@pytest.mark.parametrize("colour", COLOURS)
+def test_potted_colour_scores_its_value_is_respotted_and_red_is_next(colour: str) -> None:
+    verdict = judge(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
+    assert_verdict(verdict, points=(VALUES[colour], 0), on="red", continues=True, table=COLOUR.table, respot=(colour,))
+    others = ("black", "pink", "blue", "brown", "green", "yellow")
+    assert verdict.respot[0].spots == (colour, *(each for each in others if each != colour))
 
 
-def test_colour_on_potted_on_a_foul_is_respotted() -> None:
-    verdict = judge(RULES, ORDER, "cue hits yellow", "yellow in left", "cue in left")
-    assert verdict.state.on == "yellow"
-    assert [each.ball for each in verdict.respot] == ["yellow"]
-
-
-def test_red_cannot_be_nominated() -> None:
-    with pytest.raises(GameError, match="'red-2' cannot be called now"):
-        judge(RULES, COLOUR, ball="red-2")
-    with pytest.raises(GameError, match="'pink' cannot be called now"):
-        judge(RULES, PLAY, ball="pink")
-
-
-MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
+def test_only_colours_can_be_nominated_and_only_after_a_red() -> None:
+    for state, ball in ((COLOUR, "red-2"), (PLAY, "pink")):
+        with pytest.raises(GameError, match=f"'{ball}' cannot be called now"):
+            judge(RULES, state, ball=ball)
 
 
 def test_miss_can_be_replayed_from_the_same_position_and_points_stay() -> None:
     state = replace(MISS, on="colour", table=COLOUR.table, scores=(8, 0), run=8)
-    verdict = judge(RULES, state, "cue hits red-2", "red-2 in left", ball="pink")
-    assert verdict.state.decisions == ("play", "pass", "restore")
-    back = RULES.decide(verdict.state, "restore")
-    assert back.restore
-    assert back.state == replace(state, scores=(8, 6))
-
-
-def test_no_miss_without_the_rule_or_when_the_ball_on_was_hit() -> None:
-    assert "restore" not in judge(RULES, PLAY, "cue at rail").state.decisions
-    assert "restore" not in judge(RULES, MISS, "cue hits red-1", "cue in left").state.decisions
+    missed = judge(RULES, state, "cue hits red-2", "red-2 in left", ball="pink").state
+    assert missed.decisions == ("play", "pass", "restore")
+    assert_verdict(RULES.decide(missed, "restore"), restore=True, state=replace(state, scores=(8, 6)))
+    assert "restore" not in judge(RULES, PLAY, "cue at rail").state.decisions  # without the rule
+    assert "restore" not in judge(RULES, MISS, "cue hits red-1", "cue in left").state.decisions  # the ball on was hit
 
 
 # 27 points remain and the foul costs 4: a player 24 behind needs fouls after it, a player 28 behind before it.
@@ -170,33 +168,13 @@ def test_no_miss_when_a_player_needs_points_from_fouls(scores: tuple[int, int], 
     assert ("restore" in judge(RULES, state).state.decisions) == offered
 
 
-def test_final_black_potted_ends_the_frame() -> None:
-    verdict = judge(RULES, replace(BLACK, scores=(10, 12)), "cue hits black", "black in left")
-    assert verdict.points == (7, 0)
-    assert (verdict.state.over, verdict.state.winner) == (True, 0)
-
-
-def test_foul_on_the_final_black_ends_the_frame() -> None:
-    verdict = judge(RULES, replace(BLACK, scores=(20, 12)), "cue hits black", "cue in left")
-    assert (verdict.state.over, verdict.state.winner, verdict.state.scores) == (True, 0, (20, 19))
-
-
-def test_missed_black_passes_the_turn() -> None:
-    verdict = judge(RULES, replace(BLACK, scores=(20, 18)), "cue hits black")
-    assert not verdict.state.over
-    assert (verdict.state.turn, verdict.state.on) == (1, "black")
-
-
 @pytest.mark.parametrize("lines", [("cue hits black", "black in left"), ("cue in left",)])
 def test_level_scores_respot_the_black_and_the_next_score_or_foul_ends(lines: tuple[str, ...]) -> None:
     scores = (5, 12) if "black in left" in lines else (12, 5)
     verdict = judge(RULES, replace(BLACK, scores=scores), *lines)
-    state = verdict.state
-    assert not state.over
-    assert [each.ball for each in verdict.respot] == ["black"]
-    assert (state.table, state.in_hand, state.decisions) == (("black",), "in the D", ("play", "pass"))
-    assert not state.fouled
-    first = RULES.decide(state, "pass").state
+    assert_verdict(verdict, over=False, respot=("black",), table=("black",), in_hand="in the D", fouled=False)
+    assert verdict.state.decisions == ("play", "pass")
+    first = RULES.decide(verdict.state, "pass").state
     assert first.turn == 0
     assert judge(RULES, first, "cue hits black", "black in left").state.winner == 0
     assert judge(RULES, first).state.winner == 1
@@ -207,8 +185,7 @@ def test_frame_can_be_claimed_with_a_lead_of_more_than_the_black() -> None:
     close, claimable = (
         judge(RULES, replace(state, scores=(each, 10)), "cue hits pink", "pink in left").state for each in (11, 12)
     )
-    assert close.decisions == ()
-    assert claimable.decisions == ("play", "claim")
+    assert (close.decisions, claimable.decisions) == ((), ("play", "claim"))
     over = RULES.decide(claimable, "claim").state
     assert (over.over, over.winner) == (True, 0)
     assert RULES.choices(replace(over, free=True)).balls == ()
@@ -216,11 +193,56 @@ def test_frame_can_be_claimed_with_a_lead_of_more_than_the_black() -> None:
 
 def test_single_player_can_make_147_and_fouls_cost_nothing() -> None:
     state = RULES.start(players=1)
-    foul = judge(RULES, state)
-    assert (foul.state.scores, foul.state.turn, foul.state.decisions) == ((0,), 0, ())
+    assert_verdict(judge(RULES, state), scores=(0,), turn=0, decisions=())
     for red in REDS:
         state = judge(RULES, state, f"cue hits {red}", *potted_lines([red])).state
         state = judge(RULES, state, "cue hits black", *potted_lines(["black"]), ball="black").state
     for colour in COLOURS:
         state = judge(RULES, state, f"cue hits {colour}", *potted_lines([colour])).state
     assert (state.over, state.winner, state.scores) == (True, 0, (147,))
+
+
+def test_free_ball_is_given_only_when_snookered_after_a_foul_of_the_other_player() -> None:
+    fair, foul = judge(RULES, PLAY, "cue hits red-1").state, judge(RULES, PLAY).state
+    assert not RULES.settle(fair, SNOOKERED).state.free
+    assert not RULES.settle(foul, Situation()).state.free
+    free = RULES.settle(foul, SNOOKERED).state
+    assert free.free
+    assert RULES.choices(free).balls == COLOURS
+    assert RULES.legal_targets(free) == set(PLAY.table)
+    again = RULES.decide(free, "pass").state  # the offender plays again
+    assert (again.turn, again.free) == (0, False)
+    assert not RULES.settle(again, SNOOKERED).state.free
+
+
+def test_snooker_behind_the_free_ball_is_a_foul_except_on_pink_and_black() -> None:
+    state = judge(RULES, FREE, "cue hits blue", ball="blue").state
+    verdict = RULES.settle(state, Situation(snookered=True, by=("blue",)))
+    assert_verdict(verdict, points=(0, 4), scores=(0, 4), fouled=True, free=True, decisions=("play", "pass"))
+    assert not RULES.settle(state, Situation(snookered=True, by=("pink",))).fouls
+    last = replace(PLAY, on="pink", table=("pink", "black"), free=True)
+    state = judge(RULES, last, "cue hits black", ball="black").state
+    assert not RULES.settle(state, Situation(snookered=True, by=("black",))).fouls
+    state = replace(PLAY, on="blue", table=("blue", "pink", "black"), free=True)
+    state = judge(RULES, state, "cue hits pink", ball="pink").state
+    assert RULES.settle(state, Situation(snookered=True, by=("pink",))).points == (0, 5)  # of the ball on
+
+
+def test_free_ball_foul_of_a_single_player_costs_no_points() -> None:
+    state = replace(RULES.start(players=1), opening=False, free=True)
+    state = judge(RULES, state, "cue hits blue", ball="blue").state
+    verdict = RULES.settle(state, Situation(snookered=True, by=("blue",)))
+    assert verdict.fouls
+    assert verdict.state.scores == (0,)
+
+
+def test_touching_ball_counts_as_hit_if_it_is_on() -> None:
+    red = RULES.settle(PLAY, Situation(touching=("red-1",))).state
+    assert not judge(RULES, red).fouls
+    assert not judge(RULES, red, "cue hits black").fouls
+    pink = RULES.settle(COLOUR, Situation(touching=("pink",))).state
+    assert not judge(RULES, pink, ball="pink").fouls
+    assert not judge(RULES, pink).fouls
+    assert not judge(RULES, pink, "cue hits blue", "blue in left").fouls
+    assert judge(RULES, pink, ball="blue").fouls
+    assert judge(RULES, RULES.settle(PLAY, Situation(touching=("pink",))).state).fouls

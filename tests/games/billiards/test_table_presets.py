@@ -72,20 +72,6 @@ def test_balls_leave_a_table_only_into_a_pocket(name: str) -> None:
     assert np.minimum(np.abs(touched - reach), rim).max() < 3.0 * FINE  # polygons of discs, and FINE itself
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("name", POCKETED)
-def test_every_straight_path_ends_at_a_cushion_or_in_a_pocket(name: str) -> None:
-    area, walls, far = TABLES[name], unary_union(cushions(name)), 10.0  # type: ignore[index]
-    random, ended, pockets = np.random.default_rng(5), set[str](), pocket_area(name)
-    for x, y, turn in random.random((400, 3)) * (area.width, area.length, 2.0 * math.pi):
-        path = LineString([(x, y), (x + far * math.cos(turn), y + far * math.sin(turn))])
-        cushion_distance = walls.intersection(path).distance(Point(x, y)) if walls.intersects(path) else math.inf
-        pocket_distance = pockets.intersection(path).distance(Point(x, y)) if pockets.intersects(path) else math.inf
-        assert min(cushion_distance, pocket_distance) < far
-        ended.add("cushion" if cushion_distance < pocket_distance else "pocket")
-    assert ended == {"cushion", "pocket"}
-
-
 @pytest.mark.parametrize("name", POCKETED)
 def test_ball_aimed_at_the_middle_of_a_mouth_falls_without_touching_a_cushion(name: str) -> None:
     preset = TABLES[name]  # type: ignore[index]
@@ -102,14 +88,6 @@ def test_ball_aimed_at_the_middle_of_a_mouth_falls_without_touching_a_cushion(na
             far = LineString([start, start + 3.0 * (mouth - start)])
             path = LineString([start, far.intersection(disc(pocket.position, pocket.radius)).coords[0]])
             assert min(each.distance(path) for each in walls) > radius_of(name)
-
-
-@pytest.mark.parametrize("name", ["pool-7ft", "pool-8ft", "pool-9ft"])  # in snooker the ball brushes a jaw on that path
-def test_ball_aimed_at_a_pocket_from_the_middle_falls_without_touching_a_cushion(name: str) -> None:
-    middle = (TABLES[name].width / 2.0, TABLES[name].length / 2.0)  # type: ignore[index]
-    for pocket in table(name).pockets:
-        path = LineString([middle, pocket.position]).difference(disc(pocket.position, pocket.radius))
-        assert min(each.distance(path) for each in cushions(name)) > radius_of(name)
 
 
 @pytest.mark.parametrize("name", POCKETED)
@@ -130,32 +108,13 @@ def test_pockets_are_reachable_and_overlap_the_cloth_only_in_corners(name: str) 
 @pytest.mark.parametrize("name", NAMES)
 def test_tables_are_symmetric(name: str) -> None:
     scene, area = table(name), TABLES[name]  # type: ignore[index]
-    for across, along in ((True, False), (False, True), (True, True)):
-
-        def mirrored(x: float, y: float, across: bool = across, along: bool = along) -> tuple[float, float]:
-            return (area.width - x if across else x), (area.length - y if along else y)
-
-        for elements in (
-            [tuple(sorted(wall.points)) for wall in scene.walls],
-            [((*post.position, post.radius),) for post in scene.posts],
-            [((*pocket.position, pocket.radius),) for pocket in scene.pockets],
-        ):
-            images = [tuple(sorted((*mirrored(p[0], p[1]), *p[2:]) for p in points)) for points in elements]
-            # rounding of lengths of a few metres
-            assert np.allclose(
-                sorted(map(np.ravel, map(np.asarray, elements)), key=list),
-                _ordered(images, elements),
-                atol=1e-14,
-            )
-
-
-def _ordered(images: list, elements: list) -> list:  # type: ignore[type-arg]
-    """Return mirrored elements in the order of the elements that they coincide with."""
-    mirrored, whole = (
-        np.asarray([np.ravel(each) for each in images]),
-        sorted((np.ravel(each) for each in elements), key=list),
-    )
-    return [mirrored[np.argmin(np.abs(mirrored - each).sum(axis=1))] for each in whole]
+    circles = [(*each.position, each.radius) for each in (*scene.posts, *scene.pockets)]
+    ends = np.array([(*point, 0.0) for wall in scene.walls for point in wall.points] + circles)
+    for across, along in ((True, False), (False, True)):
+        mirrored = np.where((across, along, False), (area.width, area.length, 0.0) - ends, ends)
+        gaps = np.abs(ends[:, None] - mirrored[None]).max(axis=2)
+        assert gaps.min(axis=1).max() < 1e-14  # rounding of lengths of a few metres
+        assert gaps.min(axis=0).max() < 1e-14
 
 
 @pytest.mark.parametrize("name", POCKETED)

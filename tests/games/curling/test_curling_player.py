@@ -56,7 +56,7 @@ def test_aim_is_limited_to_what_the_controls_reach() -> None:
     assert CurlingAim(-9.0, -99.0, -1).limited() == (-MAX_BROOM_OFFSET, WEIGHTS[0], -1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_player_finishes_a_match() -> None:
     game = play_out(SCENE, CurlingPlayer(1))
     assert game.over is not None

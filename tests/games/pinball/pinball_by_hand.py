@@ -11,6 +11,7 @@ from sandbox.games.pinball.rules import PinballRules
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts, Frame
+from tests.toml_text import toml
 
 DT = 0.01
 MASS = 0.08
@@ -40,18 +41,11 @@ PARTS = {
 }
 """Every part except the drop targets is a post: the rules do not depend on the kind of element."""
 
-HEAD = """
-[world]
-gravity = [0.0, -0.8]
-duration = 60.0
-seed = 5
-[solver]
-dt = 0.01
-[[wall]]
-name = "frame"
-points = [[0.0, 0.0], [0.5, 0.0], [0.5, 1.0], [0.0, 1.0]]
-closed = true
-"""
+HEAD = (
+    toml("world", gravity=[0.0, -0.8], duration=60.0, seed=5)
+    + toml("solver", dt=0.01)
+    + toml("wall", name="frame", points=[[0.0, 0.0], [0.5, 0.0], [0.5, 1.0], [0.0, 1.0]], closed=True)
+)
 
 
 def table(*omitted: str, balls: int = 3, players: int = 1, restitution: float = 0.5) -> Scene:

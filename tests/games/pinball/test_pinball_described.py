@@ -212,58 +212,38 @@ def test_override_of_an_unknown_element_lists_the_known_ones(override: str, word
 
 
 @pytest.mark.parametrize(
-    ("changes", "path", "words"),
+    ("kind", "value", "path", "words"),
     [
-        ({"bumper": [{"position": [0, 0], "radios": 1.0}]}, "pinball.bumper[0].radios", "did you mean 'radius'?"),
-        ({"bumpers": []}, "pinball.bumpers", "did you mean 'bumper'?"),
-        ({"slope": 2.0}, "pinball.slope", "must be between 0 and 1.5"),
-        ({"wall": [{"points": [[0, 0]]}]}, "pinball.wall[0].points", "2 or more"),
-        ({"wall": [{"points": [[0, 0], [1]]}]}, "pinball.wall[0].points[1]", "array of 2"),
-        (
-            {"wall": [{"name": "w", "points": [[0, 0], [0.1, 0, 9], [1, 1]]}]},
-            "pinball.wall.w.points[1]",
-            "too large a radius",
-        ),
-        ({"wall": [{"points": [[0, 0], [1, 0, -1], [1, 1]]}]}, "pinball.wall[0].points[1][2]", "must not be negative"),
-        ({"wall": [{"points": [[0, 0], [1, 0]], "closed": True}]}, "pinball.wall[0].points", "at least three"),
-        ({"wall": [{"points": [[0, 0], [1, 0]], "fill": "#000000"}]}, "pinball.wall[0].fill", "closed lines"),
-        ({"standup": [{"position": [0, 0], "facing": [0, 0]}]}, "pinball.standup[0].facing", "has no direction"),
-        (
-            {"drops": [{"position": [0, 0], "facing": [1, 0], "count": 0}]},
-            "pinball.drops[0].count",
-            "must be between 1 and 20",
-        ),
-        ({"slingshot": [{"points": [[0, 0], [1, 0], [2, 0]]}]}, "pinball.slingshot[0].points", "three posts"),
-        ({"gate": [{"points": [[0, 0], [0, 0]]}]}, "pinball.gate[0].points[1]", "ends of a line"),
-        ({"ramp": [{"points": [[0, 0], [0, 0.5]], "width": 0.026}]}, "pinball.ramp[0].width", "more than 0.02698 m"),
-        (
-            {"ramp": [{"points": [[0, 0], [0, 0.1]]}]},
-            "pinball.ramp[0].climb",
-            "less than the length of the ramp, 0.1 m",
-        ),
-        (
-            {"flipper": [{"pivot": [0, 0], "length": 0.001}]},
-            "pinball.flipper[0].length",
-            "difference of `base` and `tip`",
-        ),
-        ({"flipper": [{"pivot": [0, 0], "stops": [1, 1]}]}, "pinball.flipper[0].stops", "two different angles"),
-        ({"kicker": [{"position": [0, 0]}]}, "pinball.kicker[0].out", "is required"),
-        ({"art": [{"colour": "#000000", "radius": 1.0}]}, "pinball.art[0]", "has no shape"),
-        ({"art": [{"position": [0, 0], "radius": 1.0}]}, "pinball.art[0].colour", "is required"),
-        (
-            {"art": [{"points": [[0, 0], [1, 0, 5], [1, 1]], "colour": "#000000"}]},
-            "pinball.art[0].points[1]",
-            "too large a radius",
-        ),
-        ({"wall": [{"points": [[0, 0], [0, 0]]}]}, "pinball.wall[0].points[1]", "no line is left"),
-        ({"outline": [[0, 0], [1, 0, 5], [1, 1]]}, "pinball.outline[1]", "too large a radius"),
+        ("bumper", [{"position": [0, 0], "radios": 1.0}], "[0].radios", "did you mean 'radius'?"),
+        ("wall", [{"points": [[0, 0]]}], "[0].points", "2 or more"),
+        ("wall", [{"points": [[0, 0], [1]]}], "[0].points[1]", "array of 2"),
+        ("wall", [{"name": "w", "points": [[0, 0], [0.1, 0, 9], [1, 1]]}], ".w.points[1]", "too large a radius"),
+        ("wall", [{"points": [[0, 0], [1, 0, -1], [1, 1]]}], "[0].points[1][2]", "must not be negative"),
+        ("wall", [{"points": [[0, 0], [1, 0]], "closed": True}], "[0].points", "at least three"),
+        ("wall", [{"points": [[0, 0], [1, 0]], "fill": "#000000"}], "[0].fill", "closed lines"),
+        ("standup", [{"position": [0, 0], "facing": [0, 0]}], "[0].facing", "has no direction"),
+        ("drops", [{"position": [0, 0], "facing": [1, 0], "count": 0}], "[0].count", "must be between 1 and 20"),
+        ("slingshot", [{"points": [[0, 0], [1, 0], [2, 0]]}], "[0].points", "three posts"),
+        ("gate", [{"points": [[0, 0], [0, 0]]}], "[0].points[1]", "ends of a line"),
+        ("ramp", [{"points": [[0, 0], [0, 0.5]], "width": 0.026}], "[0].width", "more than 0.02698 m"),
+        ("ramp", [{"points": [[0, 0], [0, 0.1]]}], "[0].climb", "less than the length of the ramp, 0.1 m"),
+        ("flipper", [{"pivot": [0, 0], "length": 0.001}], "[0].length", "difference of `base` and `tip`"),
+        ("flipper", [{"pivot": [0, 0], "stops": [1, 1]}], "[0].stops", "two different angles"),
+        ("kicker", [{"position": [0, 0]}], "[0].out", "is required"),
+        ("art", [{"colour": "#000000", "radius": 1.0}], "[0]", "has no shape"),
+        ("art", [{"position": [0, 0], "radius": 1.0}], "[0].colour", "is required"),
+        ("art", [{"points": [[0, 0], [1, 0, 5], [1, 1]], "colour": "#000000"}], "[0].points[1]", "too large a radius"),
+        ("wall", [{"points": [[0, 0], [0, 0]]}], "[0].points[1]", "no line is left"),
+        ("bumpers", [], "", "did you mean 'bumper'?"),
+        ("slope", 2.0, "", "must be between 0 and 1.5"),
+        ("outline", [[0, 0], [1, 0, 5], [1, 1]], "[1]", "too large a radius"),
     ],
 )
-def test_faults_have_their_path(changes: dict[str, Any], path: str, words: str) -> None:
+def test_faults_have_their_path(kind: str, value: Any, path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
-        from_document({"pinball": changes})
+        from_document({"pinball": {kind: value}})
     (fault,) = caught.value.faults
-    assert fault.path == path
+    assert fault.path == f"pinball.{kind}{path}"
     assert words in fault.message
 
 

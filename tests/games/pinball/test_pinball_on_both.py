@@ -1,24 +1,32 @@
-"""Whole tables on two engines without common physics code: flippers, plunger, gates, zones, layers and rubbers."""
+"""Whole tables on two engines without common physics code, and replay of the full table."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from sandbox.action import actions_from_json
 from sandbox.games.contract import Press
-from sandbox.games.players import ScriptedInput
+from sandbox.games.players import PlayerSpec, ScriptedInput
+from sandbox.measure.run.runner import run
 from sandbox.measure.run.sessions import play_out
+from sandbox.recording import Recording
+from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import load
 
-pytestmark = pytest.mark.full  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
-TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
+TABLES = [
+    pytest.param(path, id=path.stem, marks=[] if path.stem == "full" else [pytest.mark.nightly])
+    for path in sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
+]
 
 PLUNGE = (Press(0.2, "plunger", 1.0), Press(1.2, "plunger", 0.0))
 """A full pull and release: the ball runs up the lane, through the gate and along the arch, and down the table."""
 
 
-@pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", TABLES)
 def test_plunge_agrees_on_both_engines(path: Path) -> None:
     """Both engines use the same scheme, so they differ by rounding, 1e-16 m, which each bounce off a post amplifies.
 
@@ -37,7 +45,7 @@ def test_plunge_agrees_on_both_engines(path: Path) -> None:
     assert native.score == reference.score
 
 
-@pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", TABLES)
 def test_game_is_played_on_the_reference_engine(path: Path) -> None:
     """The course of the game is chaotic after the first hit of a flipper, so only its validity is tested."""
     played = play_out(load(path, ["world.duration=8.0"]), "skilled", "reference", audit=True)
@@ -46,3 +54,29 @@ def test_game_is_played_on_the_reference_engine(path: Path) -> None:
     assert played.score > 0
     flippers = [k for k, name in enumerate(run.names) if str(name).endswith("flipper")]
     assert all(np.ptp(run.angle[:, k]) > 0.8 for k in flippers)  # a stroke is 51°
+
+
+FULL = Path(__file__).parents[3] / "scenes" / "pinball" / "full.toml"
+
+
+def test_session_of_the_full_table_replays_to_the_same_score_and_state() -> None:
+    scene = load(FULL)
+    scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 12.0})})
+    first = run(scene, "pymunk", audit=False, bout=PlayerSpec("skilled").start_game(scene))
+    info = first.info
+    assert {"drive", "move"} <= {action["kind"] for action in info["actions"]}
+    session = Recording(
+        scene,
+        "pymunk",
+        Settings.model_validate(info["settings"]),
+        actions_from_json(json.dumps(info["actions"])),
+        float(first.time[-1]),
+        info["state_hash"],
+        presses=tuple(Press(*press) for press in info["game"]["presses"]),
+    )
+    session = Recording.from_json(session.to_json())
+    bout = PlayerSpec.from_recording(session).start_game(session.scene)
+    replayed = run(session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=bout)
+    assert replayed.info["state_hash"] == info["state_hash"]
+    assert replayed.info["game"]["score"] == info["game"]["score"] > 0
+    assert replayed.info["game"]["otherwise"] is None

@@ -1,13 +1,15 @@
-"""Switches: contacts that count as hits, by their speed of approach."""
+"""Switches: contacts that count as hits, by their speed of approach; coils: launches that vary by the seed only."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.action import Move
 from sandbox.games.contract import StepInfo
+from sandbox.games.pinball.devices import CoilVariation
 from sandbox.games.pinball.events import Switches
 from sandbox.games.pinball.playfield import Playfield
-from tests.games.pinball.pinball_by_hand import MASS, Table, contacts, table
+from tests.games.pinball.pinball_by_hand import MASS, Table, contacts, is_launch, table
 
 SCENE = table()
 BOARD = Playfield.of(SCENE, SCENE.bodies)
@@ -26,7 +28,7 @@ def hit_names(switches: Switches, *rows: tuple[float, tuple[int, int], float]) -
 @given(factor=st.floats(0.1, 10.0))
 def test_switch_closes_above_its_threshold_of_approach(name: str, threshold: float, factor: float) -> None:
     if abs(factor - 1.0) < 1e-9:
-        return
+        factor = 2.0  # at the threshold itself rounding decides
     impulse = MASS * (1.0 + 0.5) * threshold * factor  # m(1 + e)v
     assert hit_names(Switches(BOARD), (0.0, (0, index_of(name)), impulse)) == ([name] if factor > 1.0 else [])
 
@@ -69,3 +71,15 @@ def test_zones_close_without_impulse() -> None:
 def test_elements_without_a_part_are_no_switches() -> None:
     switches = Switches(BOARD)
     assert hit_names(switches, (0.0, (0, index_of("frame")), 1.0), (0.0, (0, 1), 1.0)) == []
+
+
+@given(st.integers(0, 2**63 - 1), st.floats(-5.0, 5.0), st.floats(0.1, 5.0))
+def test_launch_is_along_the_stated_velocity_and_never_faster(seed: int, x: float, y: float) -> None:
+    velocity = CoilVariation(seed, 0).throw((x, y))
+    assert is_launch(Move(time=0.0, body="a", position=(0.0, 0.0), velocity=velocity), (x, y))
+
+
+def test_coils_have_independent_random_streams() -> None:
+    velocities = {(seed, stream): CoilVariation(seed, stream).throw((0.0, 1.0)) for seed in (1, 2) for stream in (0, 1)}
+    assert len(set(velocities.values())) == 4
+    assert CoilVariation(1, 0).throw((0.0, 1.0)) == velocities[1, 0]

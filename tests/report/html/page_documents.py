@@ -17,41 +17,20 @@ from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
+from tests.toml_text import toml
 
 HOSTILE = """</script><img src="x" onerror="window.harm=1">'"&amp;"""
 """Text that ends a script element and starts its own."""
 
-SCENE = f"""
-title = '''<b id="harm">Title</b>'''
-about = '''{HOSTILE}</style><script>window.harm=1</script>'''
-
-[world]
-gravity = [0.0, -10.0]
-duration = 1.0
-
-[solver]
-dt = 0.01
-
-[[plane]]
-name = '''{HOSTILE}'''
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-
-[[wall]]
-points = [[3.0, 0.0], [3.0, 2.0]]
-thickness = 0.1
-
-[[post]]
-position = [-2.0, 0.5]
-radius = 0.2
-
-[[ball]]
-name = '''{HOSTILE} ball'''
-position = [0.0, 1.5]
-velocity = [1.0, 0.0]
-radius = 0.5
-restitution = 0.5
-"""
+SCENE = (
+    toml(title='<b id="harm">Title</b>', about=f"{HOSTILE}</style><script>window.harm=1</script>")
+    + toml("world", gravity=[0.0, -10.0], duration=1.0)
+    + toml("solver", dt=0.01)
+    + toml("plane", name=HOSTILE, point=[0.0, 0.0], normal=[0.0, 1.0])
+    + toml("wall", points=[[3.0, 0.0], [3.0, 2.0]], thickness=0.1)
+    + toml("post", position=[-2.0, 0.5], radius=0.2)
+    + toml("ball", name=f"{HOSTILE} ball", position=[0.0, 1.5], velocity=[1.0, 0.0], radius=0.5, restitution=0.5)
+)
 
 
 def point(engine: str, dt: float, error: float | None, cost: float | None, **settings: Any) -> Evaluation:

@@ -5,6 +5,7 @@ import math
 import re
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -28,7 +29,7 @@ from sandbox.report.html.page import (
     write_page,
 )
 from sandbox.report.html.replay import replay
-from sandbox.report.html.tradeoff import tradeoff_page
+from sandbox.report.html.tradeoff import error_budget, tradeoff_page
 from sandbox.report.tradeoff_plot import budget_of, pareto_of, work_points
 from sandbox.scene.files.load import loads
 from tests.report.html.page_documents import HOSTILE, SCENE, extremes_document, tradeoff_document, tradeoff_of
@@ -147,7 +148,7 @@ def test_selected_point_has_its_warnings_and_time_per_frame() -> None:
     assert ">frame" not in safe
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 def test_settings_beyond_a_frame_or_the_budget_are_marked() -> None:
     html = tradeoff_page({**tradeoff_document(), "budget": 0.05}).html()
     front = html[html.index("The Pareto front</bdi>") : html.index("Sources of error")]
@@ -177,3 +178,32 @@ def test_settings_text_is_a_valid_solver_table_of_a_scene() -> None:
     text = settings_text({"dt": 1e-4, "substeps": 2, "slop": None, "half_kick": True, "integrator": "rk4"}, "reference")
     solver = loads(f"{text}\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n", "made.toml").solver
     assert (solver.dt, solver.substeps, solver.half_kick, solver.integrator) == (1e-4, 2, True, "rk4")
+
+
+def row(model: float | None, time_step: float, left: float) -> dict[str, Any]:
+    """Return a row of the key `split` of a trade-off."""
+    return {"engine": "pymunk", "total": 1.0, "solver": 0.0, "time_step": time_step, "model": model, "left": left}
+
+
+def fractions(parts: dict[str, Any]) -> dict[str, float]:
+    """Return the width of each part, as a fraction of its bar."""
+    bars = re.findall(r'<rect[^>]*width="([0-9.e+-]+)"[^>]*class="bar (\w+)"', error_budget([parts]))
+    total = sum(float(width) for width, _ in bars)
+    return {key: float(width) / total for width, key in bars}
+
+
+def test_error_at_the_finest_step_is_that_of_the_model() -> None:
+    # Widths are written to six digits.
+    assert fractions(row(0.25, 0.75, 0.25)) == pytest.approx({"model": 0.25, "time_step": 0.75}, rel=1e-6)
+
+
+def test_error_at_the_finest_step_is_shown_if_the_model_is_unknown() -> None:
+    assert fractions(row(None, 0.75, 0.25)) == pytest.approx({"left": 0.25, "time_step": 0.75}, rel=1e-6)
+
+
+def test_zero_error_has_an_empty_bar() -> None:
+    assert fractions(row(0.0, 0.0, 0.0)) == {}
+
+
+def test_lengths_are_in_metres() -> None:
+    assert "error, m" in error_budget([row(None, 0.75, 0.25)])

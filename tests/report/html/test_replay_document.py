@@ -13,39 +13,18 @@ from sandbox.report.html.replay_data import ABSENT, decompress
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from tests.toml_text import toml
 
-pytestmark = pytest.mark.full  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
 
-FALL = """
-[world]
-gravity = [0.0, -10.0]
-duration = 1.0
-
-[solver]
-dt = 0.001
-
-[[ball]]
-name = "a"
-position = [1000000.0, 5.0]
-radius = 0.5
-
-[[box]]
-name = "b"
-position = [1000002.0, 5.0]
-size = [1.0, 2.0]
-angular_velocity = 1.0
-
-[[box]]
-name = "still"
-position = [1000001.0, -2.0]
-size = [4.0, 0.1]
-fixed = true
-
-[[joint]]
-name = "rod"
-kind = "rod"
-between = ["a", "b"]
-"""
+FALL = (
+    toml("world", gravity=[0.0, -10.0], duration=1.0)
+    + toml("solver", dt=0.001)
+    + toml("ball", name="a", position=[1000000.0, 5.0], radius=0.5)
+    + toml("box", name="b", position=[1000002.0, 5.0], size=[1.0, 2.0], angular_velocity=1.0)
+    + toml("box", name="still", position=[1000001.0, -2.0], size=[4.0, 0.1], fixed=True)
+    + toml("joint", name="rod", kind="rod", between=["a", "b"])
+)
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ from sandbox.games.billiards.view.player import Players
 from sandbox.scene.files.load import loads
 from sandbox.window.app_state import Messages, create_session
 from sandbox.window.game_host import controls_of, host_of
+from tests.toml_text import toml
 
 RADIUS = 0.028575
 """Radius of pool balls, m."""
@@ -19,16 +20,11 @@ cue = [0.5, 0.5]
 2 = [0.2, 1.5]
 """
 
-NINE = """
-title = "Nine"
-[billiards]
-table = "pool-7ft"
-game = "9-ball"
-[[shot]]
-aim = 1.5708
-speed = 4.0
-side = 0.2
-"""
+NINE = (
+    toml(title="Nine")
+    + toml("billiards", table="pool-7ft", game="9-ball")
+    + toml("shot", aim=1.5708, speed=4.0, side=0.2)
+)
 
 
 def controls_at(text: str, players: Players | None = None) -> BilliardsControls:

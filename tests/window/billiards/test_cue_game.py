@@ -12,7 +12,7 @@ from sandbox.games.billiards.view.hud import status_line
 from sandbox.measure.run.sessions import rerun
 from tests.window.billiards.seated import FREE, NINE, RADIUS, advance, controls_at, roll_out
 
-pytestmark = pytest.mark.full  # a window or a film
+pytestmark = pytest.mark.fail_slow(30)  # a window or a film
 
 
 def test_time_stops_until_the_first_stroke() -> None:
@@ -62,22 +62,6 @@ def test_prediction_does_not_change_the_table() -> None:
     assert game.live.session.simulation.state_hash() == before
 
 
-def test_miss_is_a_foul_and_gives_the_ball_in_hand() -> None:
-    table = controls_at(NINE)
-    game = table.player
-    game.shoot()
-    roll_out(table)
-    game.cue.aim, game.cue.speed = -math.pi / 2, 0.3  # away from all balls
-    shooter = game.match.turn
-    assert game.match.state.in_hand is None  # the break was legal
-    game.shoot()
-    roll_out(table)
-    assert game.match.verdict is not None
-    assert game.match.verdict.fouls
-    assert game.match.turn != shooter
-    assert game.match.state.in_hand is not None
-
-
 def test_undo_restores_the_table_while_the_balls_roll() -> None:
     table = controls_at(FREE)
     game = table.player
@@ -93,17 +77,8 @@ def test_undo_restores_the_table_while_the_balls_roll() -> None:
     assert game.live.session.simulation.state_hash() == before
     assert (game.cue.aim, game.cue.speed) == (1.4, 2.0)
     assert game.host.waiting
-
-
-def test_stroke_after_undo_replaces_it_and_replays() -> None:
-    table = controls_at(FREE)
-    game = table.player
-    game.shoot(2.0)
-    roll_out(table)
-    game.undo()
-    game.live.finish_seek()
     game.cue.aim += 0.3
-    game.shoot(1.0)
+    game.shoot(1.0)  # replaces the undone stroke
     roll_out(table)
     session = game.live.session.recording()
     (strike,) = session.actions

@@ -1,56 +1,41 @@
 """Films of stored runs: interpolated states, snapshots, and pixels at the positions of the run."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sandbox.action import Action, Move, Remove, Spawn
+from sandbox.games.players import PlayerSpec
 from sandbox.measure.run.runner import run
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
 from sandbox.window.camera import Camera
 from sandbox.window.capture.export import RunRenderer, frame_times
 from sandbox.window.capture.image_files import offscreen, rgb_pixels
 from sandbox.window.playback.recorded import CONTACT_DURATION, RecordedRun, bodies_of_run, scene_of_run
 from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.render.lamps import RADIUS
 from sandbox.window.render.palette import BACKGROUND, SKY
 from sandbox.window.view_bounds import crowd_bounds
+from tests.toml_text import toml
 
-FALL = """
-title = "Fall"
-[world]
-gravity = [0, -10]
-duration = 1.0
-[solver]
-dt = 0.1
-[[ball]]
-name = "a"
-position = [0, 0]
-velocity = [2, 0]
-angular_velocity = 3
-radius = 0.5
-[[ball]]
-name = "b"
-position = [5, 0]
-velocity = [2, 0]
-radius = 0.5
-"""
+FALL = (
+    toml(title="Fall")
+    + toml("world", gravity=[0, -10], duration=1.0)
+    + toml("solver", dt=0.1)
+    + toml("ball", name="a", position=[0, 0], velocity=[2, 0], angular_velocity=3, radius=0.5)
+    + toml("ball", name="b", position=[5, 0], velocity=[2, 0], radius=0.5)
+)
 
-BOUNCE = """
-[world]
-gravity = [0, -10]
-duration = 1.0
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[ball]]
-position = [0, 1]
-radius = 0.5
-restitution = 1
-"""
+BOUNCE = (
+    toml("world", gravity=[0, -10], duration=1.0)
+    + toml("plane", point=[0, 0], normal=[0, 1])
+    + toml("ball", position=[0, 1], radius=0.5, restitution=1)
+)
 
 
 def film_of(text: str = FALL, *actions: Action) -> RecordedRun:
@@ -287,3 +272,39 @@ def test_contacts_of_a_film_equal_those_of_its_snapshots() -> None:
         found = film.contacts(time, speed)
         assert found.time.tolist() == film.snapshot(time, frozenset(), speed).contacts.time.tolist()
         assert (first in found.time.tolist()) == (speed == 1.0)
+
+
+CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
+
+
+@pytest.fixture(scope="module")
+def stored_run() -> Trajectory:
+    scene = load(CLASSIC, ("world.duration=8.0",))
+    return run(scene, audit=False, bout=PlayerSpec("skilled").start_game(scene))
+
+
+@pytest.mark.fail_slow(30)
+def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_path: Path) -> None:
+    stored_run.save(tmp_path / "run.npz")
+    film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))
+    dark = RecordedRun(replace(stored_run, info=stored_run.info | {"game": None}))
+    time, names = next((time, names) for time, names in stored_run.info["game"]["lamps"] if names)
+    assert film.snapshot(time, frozenset()).lit == frozenset(names)
+    lamps = {part.name: part.light for part in film.scene.play.parts}
+    pictures = []
+    for each in (film, dark):
+        surface = offscreen((540, 960))
+        camera = Camera.fitting(each.bounds, (540, 960))
+        RunRenderer(each).draw(surface, camera, time, caption=False)
+        pictures.append(rgb_pixels(surface, (540, 960)).astype(int).sum(axis=2))
+    brighter = np.argwhere(pictures[0] > pictures[1])
+    assert len(brighter)
+    rows_and_columns = camera.to_screen(np.asarray([lamps[name] for name in names]))[:, ::-1]
+    distance = np.linalg.norm(brighter[:, None] - rows_and_columns[None], axis=2).min(axis=1)
+    assert distance.max() <= 6.5 * RADIUS * camera.scale + 2.0  # within the radius of the glow
+
+
+def test_invalid_lamp_records_are_an_error(stored_run: Trajectory) -> None:
+    info = stored_run.info | {"game": stored_run.info["game"] | {"lamps": [["never", 3]]}}
+    with pytest.raises(SceneError, match=r"info\.game: invalid lamp record"):
+        RecordedRun(replace(stored_run, info=info))

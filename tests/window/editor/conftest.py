@@ -1,6 +1,6 @@
 """Windows in which scenes are edited."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pygame
@@ -8,39 +8,39 @@ import pytest
 
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
-from tests.window.editor.hand import CTRL, SIZE, Hand
+from tests.window.editor.hand import SIZE, Hand, OpenOn
 
 
 @pytest.fixture
-def hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Hand]:
-    """A window without a scene, in which a new one is edited."""
+def open_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[OpenOn]:
+    """Return a function that opens a window on a scene, given by its text or file, and edits it unless told not to."""
     monkeypatch.chdir(tmp_path)
-    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
-    pygame.event.clear()
-    window.start_editing()
-    found = Hand(window)
-    found.frame()
-    yield found
-    window.close()
-
-
-@pytest.fixture
-def open_on(tmp_path: Path) -> Iterator[Callable[[str], Hand]]:
-    """Return a function that opens a window on a scene and edits it."""
     windows: list[App] = []
 
-    def edit(text: str) -> Hand:
-        path = tmp_path / "scene.toml"
-        path.write_text(text)
+    def edit(scene: str | Path | None, edits: bool = True) -> Hand:
+        path = scene
+        if isinstance(scene, str):
+            path = tmp_path / "scene.toml"
+            path.write_text(scene)
         window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
         windows.append(window)
-        assert window.app_state.open(path)
+        assert path is None or window.app_state.open(path), window.app_state.faults
         pygame.event.clear()
-        found = Hand(window)
-        found.key(pygame.K_e, CTRL)
-        found.frame()
-        return found
+        hand = Hand(window)
+        if edits:
+            window.start_editing()
+            hand.frame()
+            assert window.editing is not None
+        return hand
 
     yield edit
+    if pygame.display.get_init():
+        pygame.key.set_mods(0)
     for window in windows:
         window.close()
+
+
+@pytest.fixture
+def hand(open_on: OpenOn) -> Hand:
+    """A window without a scene, in which a new one is edited."""
+    return open_on(None)

@@ -38,6 +38,12 @@ class Hand:
         self.window = window
 
     @property
+    def path(self) -> Path:
+        """File of the edited scene."""
+        assert self.window.app_state.path is not None
+        return self.window.app_state.path
+
+    @property
     def view(self) -> EditView:
         assert self.window.editing is not None
         return self.window.editing
@@ -107,9 +113,9 @@ class Hand:
         self.frame(press(*button.center), release(*button.center))
         self.frame()
 
-    def save_as(self, path: Path) -> None:
-        """Save a new scene, typing its name."""
-        self.key(pygame.K_s, CTRL)
+    def save_as(self, path: Path, mod: int = 0) -> None:
+        """Save a new scene, typing its name; with Shift, also a scene that has a file."""
+        self.key(pygame.K_s, CTRL | mod)
         assert self.view.prompt is not None
         self.key(pygame.K_a, CTRL)
         for letter in str(path):
@@ -117,6 +123,14 @@ class Hand:
         self.key(pygame.K_RETURN)
         assert self.view.prompt is None
 
+    def messages(self) -> str:
+        """Return the messages that are shown, in one text."""
+        return " ".join(text for _, text in self.window.app_state.messages.visible())
+
     def warnings(self) -> list[str]:
         """Return the warnings that are shown."""
         return [text for level, text in self.window.context.app_state.messages.visible() if level == "warning"]
+
+
+OpenOn = Callable[..., Hand]
+"""Function that opens a window on a scene and edits it; see the fixture `open_on`."""

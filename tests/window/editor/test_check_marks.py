@@ -1,8 +1,6 @@
 """Marks of the live check in the editor: where they are, the plate, and remedies by a click."""
 
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import numpy as np
 import pygame
@@ -10,37 +8,21 @@ import pytest
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.window.app import App
-from sandbox.window.app_state import AppState
 from sandbox.window.camera import Camera
 from sandbox.window.editor.check_marks import HEADING, MORE, CheckMarks
-from sandbox.window.editor.edit_view import EditView
 from sandbox.window.editor.live_check import CheckResult, Remedy, SceneMark, check_scene
+from tests.toml_text import toml
+from tests.window.editor.hand import Hand, OpenOn
 from tests.window.pressing import key, move, press, release
 
-TEXT = """
-[world]
-gravity = [0, -9.81]
-[solver]
-dt = 0.01
-[[plane]]
-name = "ground"
-point = [0, 0]
-normal = [0, 1]
-[[wall]]
-name = "paddle"
-points = [[3, 0.5], [3, 4]]
-thickness = 0.05
-[[ball]]
-name = "bullet"
-position = [-4, 2]
-velocity = [30, 0]
-radius = 0.1
-[[ball]]
-name = "sunk"
-position = [-1.5, 0.2]
-radius = 0.4
-"""
+TEXT = (
+    toml("world", gravity=[0, -9.81])
+    + toml("solver", dt=0.01)
+    + toml("plane", name="ground", point=[0, 0], normal=[0, 1])
+    + toml("wall", name="paddle", points=[[3, 0.5], [3, 4]], thickness=0.05)
+    + toml("ball", name="bullet", position=[-4, 2], velocity=[30, 0], radius=0.1)
+    + toml("ball", name="sunk", position=[-1.5, 0.2], radius=0.4)
+)
 AREA = pygame.Rect(70, 60, 900, 560)
 BACKGROUND = (1, 2, 3)
 
@@ -263,69 +245,45 @@ def test_marks_of_elements_that_are_gone_or_out_of_sight_are_left_out(result: Ch
 # --- In the window ---------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def open_editor(tmp_path: Path) -> Iterator[Callable[[str], tuple[App, EditView]]]:
-    """Return a function that opens a window on a scene, edits it, and waits for the check."""
-    windows: list[App] = []
-
-    def edit(text: str) -> tuple[App, EditView]:
-        path = tmp_path / "scene.toml"
-        path.write_text(text)
-        window = App(AppState(), size=(1280, 720), folder=tmp_path, say=lambda _: None)
-        windows.append(window)
-        assert window.app_state.open(path)
-        pygame.event.clear()
-        window.start_editing()
-        assert window.editing is not None
-        wait_for_check(window, window.editing)
-        return window, window.editing
-
-    yield edit
-    for window in windows:
-        window.close()
-
-
-def wait_for_check(window: App, view: EditView) -> None:
+def wait_for_check(hand: Hand) -> None:
     end = time.monotonic() + 20.0
-    window.run_frame(0.02)
-    while not view.live_check.is_current:
+    hand.frame()
+    while not hand.view.live_check.is_current:
         assert time.monotonic() < end
         time.sleep(0.01)
-        window.run_frame(0.02)
-    window.run_frame(0.02)
+        hand.frame()
+    hand.frame()
 
 
-@pytest.mark.full  # a window
-def test_remedy_is_applied_to_the_draft_and_undone(open_editor: Callable[[str], tuple[App, EditView]]) -> None:
-    window, view = open_editor(TEXT)
+@pytest.mark.fail_slow(30)  # a window
+def test_remedy_is_applied_to_the_draft_and_undone(open_on: OpenOn) -> None:
+    hand = open_on(TEXT)
+    view = hand.view
+    wait_for_check(hand)
     assert view.live_check.result is not None
     mark = mark_of(view.live_check.result, "overlap")
     for target in (mark, mark.remedies[0]):
         center = view.check_marks.rects_of(target)[0].center
-        for event in (move(*center), press(*center), release(*center)):
-            pygame.event.post(event)
-        window.run_frame(0.02)
-        window.run_frame(0.02)
+        hand.frame(move(*center), press(*center), release(*center))
+        hand.frame()
     assert view.draft.scene.balls[1].position == (-1.5, 0.4)
-    wait_for_check(window, view)
+    wait_for_check(hand)
     assert view.live_check.result is not None
     assert "overlap" not in {each.kind for each in view.live_check.result.marks}
     view.editor.undo()
     assert view.draft.text == TEXT
 
 
-@pytest.mark.full  # a window
-def test_plate_leaves_the_toolbar_the_file_and_messages_free(
-    open_editor: Callable[[str], tuple[App, EditView]],
-) -> None:
-    window, view = open_editor(TEXT)
+@pytest.mark.fail_slow(30)  # a window
+def test_plate_leaves_the_toolbar_the_file_and_messages_free(open_on: OpenOn) -> None:
+    hand = open_on(TEXT)
+    view = hand.view
+    wait_for_check(hand)
     assert not view.check_marks.rect.colliderect(view.toolbar.rect)
     assert not view.check_marks.rect.colliderect(view.actions.rect)
-    assert window.context.gui.area.contains(view.check_marks.rect)
+    assert hand.window.context.gui.area.contains(view.check_marks.rect)
     assert view.editor.selection == []
     center = view.check_marks.rects_of(HEADING)[0].center
-    for event in (move(*center), press(*center), release(*center)):
-        pygame.event.post(event)
-    window.run_frame(0.02)
+    hand.frame(move(*center), press(*center), release(*center))
     assert view.check_marks.is_folded
     assert view.editor.selection == []

@@ -1,7 +1,6 @@
 """Joints, drives and properties of the editor, with events as SDL sends them; what is built is run headless."""
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +15,10 @@ from sandbox.scene.description.joints import Gear, Groove, Slide
 from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.window.app import App
-from sandbox.window.app_state import AppState
-from tests.window.editor.hand import BALL, CTRL, SIZE, Hand
+from tests.window.editor.hand import BALL, CTRL, Hand, OpenOn
 from tests.window.pressing import press, release
 
-pytestmark = pytest.mark.full  # a window
+pytestmark = pytest.mark.fail_slow(30)  # a window
 
 
 def lasting(scene: Scene, duration: float) -> Scene:
@@ -29,7 +26,7 @@ def lasting(scene: Scene, duration: float) -> Scene:
     return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
 
 
-def test_slide_keeps_its_distance_within_half_and_the_whole(open_on: Callable[[str], Hand]) -> None:
+def test_slide_keeps_its_distance_within_half_and_the_whole(open_on: OpenOn) -> None:
     hand = open_on(BALL)
     hand.key(pygame.K_6)
     hand.click((0.0, 2.0), (2.0, 2.0))
@@ -38,7 +35,7 @@ def test_slide_keeps_its_distance_within_half_and_the_whole(open_on: Callable[[s
     assert (slide.between, slide.least, slide.most) == (("a", "b"), 1.0, 2.0)
 
 
-def test_body_slides_along_a_groove(open_on: Callable[[str], Hand]) -> None:
+def test_body_slides_along_a_groove(open_on: OpenOn) -> None:
     hand = open_on("[world]\ngravity = [0, -9.81]\n" + BALL)
     hand.key(pygame.K_7)
     hand.click((0.0, 2.0), (1.0, 1.0))
@@ -51,7 +48,7 @@ def test_body_slides_along_a_groove(open_on: Callable[[str], Hand]) -> None:
     assert x > 0.3  # g sin 45° · t² / 2 · cos 45° = 0.6 m in 0.5 s, at half of g for the slope
 
 
-def test_groove_belongs_to_the_body_below(open_on: Callable[[str], Hand]) -> None:
+def test_groove_belongs_to_the_body_below(open_on: OpenOn) -> None:
     hand = open_on(
         BALL.replace(
             '[[ball]]\nname = "a"',
@@ -69,7 +66,7 @@ def test_groove_belongs_to_the_body_below(open_on: Callable[[str], Hand]) -> Non
 
 
 @pytest.mark.parametrize(("x", "sign"), [(1.5, -1.0), (3.0, 1.0)])
-def test_gears_mesh_or_are_joined_by_a_belt(open_on: Callable[[str], Hand], x: float, sign: float) -> None:
+def test_gears_mesh_or_are_joined_by_a_belt(open_on: OpenOn, x: float, sign: float) -> None:
     text = BALL.replace("[2.0, 2.0]\nradius = 0.5", f"[{x}, 2.0]\nradius = 1.0")
     hand = open_on(text.replace('name = "b"', 'name = "b"\nangular_velocity = 1.0'))
     hand.key(pygame.K_8)
@@ -97,7 +94,7 @@ def test_gears_mesh_or_are_joined_by_a_belt(open_on: Callable[[str], Hand], x: f
     ],
 )
 def test_impossible_joints_and_drives_say_what_would_be_right(
-    open_on: Callable[[str], Hand], key: int, points: list[tuple[float, float]], message: str
+    open_on: OpenOn, key: int, points: list[tuple[float, float]], message: str
 ) -> None:
     hand = open_on(BALL)
     hand.key(key)
@@ -145,7 +142,7 @@ def test_flipper_and_plunger_drive_bodies(hand: Hand, tmp_path: Path) -> None:
     assert len(hand.scene.drives) == 1
 
 
-def test_nested_tables_lists_and_points_or_names_are_edited(open_on: Callable[[str], Hand]) -> None:
+def test_nested_tables_lists_and_points_or_names_are_edited(open_on: OpenOn) -> None:
     text = BALL + "[[post]]\nposition = [-9.0, 1.0]\nradius = 0.3\n"
     text += "[[attraction]]\ntoward = [-20.0, 5.0]\nstrength = 1.0\n"
     hand = open_on(text)  # both lie to the left of the list of warnings, which may appear at any time
@@ -168,7 +165,7 @@ def test_nested_tables_lists_and_points_or_names_are_edited(open_on: Callable[[s
     assert hand.scene.attractions[0].toward == "b"
 
 
-def test_pairs_of_materials_and_the_surface_are_added(open_on: Callable[[str], Hand]) -> None:
+def test_pairs_of_materials_and_the_surface_are_added(open_on: OpenOn) -> None:
     hand = open_on(BALL)
     hand.press_button("material")
     hand.press_button("material")
@@ -182,7 +179,7 @@ def test_pairs_of_materials_and_the_surface_are_added(open_on: Callable[[str], H
     assert heading is not None
 
 
-def test_tables_of_play_and_parts_of_bodies_are_edited(open_on: Callable[[str], Hand]) -> None:
+def test_tables_of_play_and_parts_of_bodies_are_edited(open_on: OpenOn) -> None:
     text = BALL + '[[body]]\nname = "hammer"\nposition = [4.0, 2.0]\n'
     text += "box = [{ size = [0.2, 1.0] }, { size = [0.8, 0.3], position = [0.0, 0.5] }]\n"
     text += '\n[[play.marking]]\ncolour = "#ff0000"\nposition = [0.0, 0.0]\nradius = 1.0\n'
@@ -205,7 +202,7 @@ def test_tables_of_play_and_parts_of_bodies_are_edited(open_on: Callable[[str], 
     assert loads(hand.view.draft.text) == hand.scene
 
 
-def test_sections_are_those_of_the_draft_when_several_events_come_at_once(open_on: Callable[[str], Hand]) -> None:
+def test_sections_are_those_of_the_draft_when_several_events_come_at_once(open_on: OpenOn) -> None:
     hand = open_on("".join(f'[[material]]\nname = "m{k}"\n' for k in range(3)) + BALL)
     hand.frame()
     button = hand.in_view(lambda: hand.view.panel.button_of("material:2"))
@@ -216,7 +213,7 @@ def test_sections_are_those_of_the_draft_when_several_events_come_at_once(open_o
     hand.editor.set_value(("body", 0, "box", 7), "size", None)  # nothing to remove
 
 
-def test_name_of_a_generator_is_written_for_a_joint_to_one_of_its_bodies(open_on: Callable[[str], Hand]) -> None:
+def test_name_of_a_generator_is_written_for_a_joint_to_one_of_its_bodies(open_on: OpenOn) -> None:
     rope = "[[rope]]\nstart = [{0}, 4]\nend = [{1}, 4]\nlinks = 4\nradius = 0.1\n"
     hand = open_on(BALL + rope.format(-4, -2) + rope.format(-1, 1) + rope.format(2, 4))
     node = hand.scene.bodies.position[hand.scene.bodies.number_of["rope-2-2"]].tolist()
@@ -233,7 +230,7 @@ def test_name_of_a_generator_is_written_for_a_joint_to_one_of_its_bodies(open_on
     assert hand.scene.joints[0].between == ("line-2", "a")
 
 
-def test_names_of_several_and_references_of_play(open_on: Callable[[str], Hand]) -> None:
+def test_names_of_several_and_references_of_play(open_on: OpenOn) -> None:
     hand = open_on(BALL + '[play]\narrows = "a"\n')
     keys = [ElementKey("ball", 0), ElementKey("ball", 1)]
     assert hand.editor.set_property(keys, "name", "c") is None
@@ -244,7 +241,7 @@ def test_names_of_several_and_references_of_play(open_on: Callable[[str], Hand])
     assert not hand.scene.balls and hand.scene.play.arrows is None
 
 
-def test_last_part_of_a_kind_and_second_motor(open_on: Callable[[str], Hand]) -> None:
+def test_last_part_of_a_kind_and_second_motor(open_on: OpenOn) -> None:
     parts = "box = [{ size = [0.2, 1.0] }]\nball = [{ radius = 0.3 }]\n"
     hand = open_on(BALL + f'[[body]]\nname = "hammer"\nposition = [4.0, 2.0]\n{parts}')
     hand.editor.remove_table(("body", 0, "box", 0))
@@ -263,20 +260,12 @@ def unfold(hand: Hand, section: str) -> None:
     hand.frame(press(*heading.center), release(*heading.center))
 
 
-def test_table_of_a_preset_is_edited(tmp_path: Path) -> None:
-    window = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
-    try:
-        assert window.app_state.open(find("9-ball"))
-        pygame.event.clear()
-        window.start_editing()
-        hand = Hand(window)
-        hand.frame()
-        before = hand.scene.balls
-        assert hand.view.draft.preset_table is not None
-        hand.set_field("billiards", "gap", "0.001")
-        assert hand.view.draft.document["billiards"]["gap"] == 0.001
-        assert hand.scene.balls != before
-        hand.key(pygame.K_z, CTRL)
-        assert hand.scene.balls == before
-    finally:
-        window.close()
+def test_table_of_a_preset_is_edited(open_on: OpenOn) -> None:
+    hand = open_on(find("9-ball"))
+    before = hand.scene.balls
+    assert hand.view.draft.preset_table is not None
+    hand.set_field("billiards", "gap", "0.001")
+    assert hand.view.draft.document["billiards"]["gap"] == 0.001
+    assert hand.scene.balls != before
+    hand.key(pygame.K_z, CTRL)
+    assert hand.scene.balls == before

@@ -8,12 +8,13 @@ import pytest
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import ElementKey, all_elements
 from sandbox.scene.editing.fields import format_value, parse
-from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
+from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import location_of, property_sections
 from sandbox.window.editor.property_rows import PropertyRow, PropertySection
+from tests.samples import each_shipped_scene
 
-pytestmark = pytest.mark.full  # thousands of changes
+pytestmark = pytest.mark.fail_slow(60)  # thousands of changes
 
 ELEMENTS_OF_A_TABLE = 2
 """Elements of each table whose fields are set"""
@@ -48,53 +49,35 @@ def set_value(editor: Editor, section: str, field: str, value: Any) -> str | Non
     return editor.set_value(location_of(section), field, value)
 
 
-@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
-def test_shown_value_set_again_changes_nothing_and_is_undone(shipped_scene: ShippedScene) -> None:
-    editor = Editor(SceneDraft.read(shipped_scene.path))
-    draft, text, scene = editor.draft, editor.draft.text, editor.draft.scene
-    for _ in select_each(editor):
-        for section, row in shown_rows(editor):
-            if row.spec.kind == "other":
-                continue
-            value = parse(row.spec, format_value(row.spec, row.value))
-            assert set_value(editor, section, row.spec.key, value) is None, (section, row)
-            assert draft.scene == scene, (section, row)
-            if draft.undo_label is not None:
-                editor.undo()
-            assert draft.text == text, (section, row)
-
-
-@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
-def test_field_is_cleared_or_refused_and_undo_restores_the_text(shipped_scene: ShippedScene) -> None:
-    editor = Editor(SceneDraft.read(shipped_scene.path))
-    draft, text = editor.draft, editor.draft.text
-    for _ in select_each(editor):
-        for section, row in shown_rows(editor):
-            if row.spec.is_required:
-                continue
-            fault = set_value(editor, section, row.spec.key, None)
-            assert fault is None or draft.text == text, (section, row)
-            assert sections_of(editor), (section, row)
-            if draft.undo_label is not None:
-                editor.undo()
-            assert draft.text == text, (section, row)
-
-
-@pytest.mark.parametrize("shipped_scene", shipped(), ids=lambda each: each.name)
-def test_buttons_of_headings_are_undone(shipped_scene: ShippedScene) -> None:
+@pytest.mark.parametrize("name", each_shipped_scene())
+def test_fields_set_again_cleared_or_removed_are_undone(name: str) -> None:
     messages = list[str]()
-    editor = Editor(SceneDraft.read(shipped_scene.path), lambda text, _: messages.append(text))
-    draft, text = editor.draft, editor.draft.text
+    editor = Editor(SceneDraft.read(find(name)), lambda text, _: messages.append(text))
+    draft, text, scene = editor.draft, editor.draft.text, editor.draft.scene
+
+    def undo(what: object) -> None:
+        assert sections_of(editor), what
+        if draft.undo_label is not None:
+            editor.undo()
+        assert draft.text == text, what
+
     for _ in select_each(editor):
-        for section in sections_of(editor):
+        for section, row in shown_rows(editor):
+            if row.spec.kind != "other":
+                value = parse(row.spec, format_value(row.spec, row.value))
+                assert set_value(editor, section, row.spec.key, value) is None, (section, row)
+                assert draft.scene == scene, (section, row)
+                undo((section, row))
+            if not row.spec.is_required:
+                fault = set_value(editor, section, row.spec.key, None)
+                assert fault is None or draft.text == text, (section, row)
+                undo((section, row))
+        for heading in sections_of(editor):
             messages.clear()
-            if section.button == "remove":
-                editor.remove_table(location_of(section.key))
-            elif section.button == "add":
-                editor.add_material() if section.key == "material" else editor.add_pair()
-            assert sections_of(editor), section.title
-            assert section.button == "" or draft.text != text or messages, section.title
-            assert not any("edit it by hand" in message for message in messages), (section.title, messages)
-            if draft.undo_label is not None:
-                editor.undo()
-            assert draft.text == text, section.title
+            if heading.button == "remove":
+                editor.remove_table(location_of(heading.key))
+            elif heading.button == "add":
+                editor.add_material() if heading.key == "material" else editor.add_pair()
+            assert heading.button == "" or draft.text != text or messages, heading.title
+            assert not any("edit it by hand" in message for message in messages), (heading.title, messages)
+            undo(heading.title)

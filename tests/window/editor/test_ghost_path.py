@@ -7,16 +7,9 @@ import pytest
 
 from sandbox.scene.files.load import loads
 from sandbox.window.editor.ghost_path import SECONDS, GhostPath, GhostPredictor, predict_path
+from tests.toml_text import toml
 
-FLIGHT = """
-[world]
-gravity = [0, -9.81]
-[[ball]]
-name = "a"
-position = [0, 10]
-velocity = [3, 4]
-radius = 0.1
-"""
+FLIGHT = toml("world", gravity=[0, -9.81]) + toml("ball", name="a", position=[0, 10], velocity=[3, 4], radius=0.1)
 
 
 def test_path_of_a_flight_is_its_parabola() -> None:

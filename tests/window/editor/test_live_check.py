@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -13,183 +14,131 @@ from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.files.load import loads
 from sandbox.window.editor import live_check
 from sandbox.window.editor.live_check import CheckResult, LiveCheck, SceneMark, check_scene
+from tests.toml_text import toml
 
-GROUND = '[[plane]]\nname = "ground"\npoint = [0, 0]\nnormal = [0, 1]\n'
+FALL, DT = toml("world", gravity=[0, -9.81]), toml("solver", dt=0.01)
+GROUND = toml("plane", name="ground", point=[0, 0], normal=[0, 1])
 
 
-def boxes(count: int, size: float = 1.0, mass: str = "") -> str:
-    return "".join(
-        f'[[box]]\nname = "x{k}"\nposition = [0, {(k + 0.5) * size}]\nsize = [{size}, {size}]\nfriction = 0.5\n{mass}'
-        for k in range(count)
-    )
+def ball(name: str, x: float, y: float = 0.0, radius: float = 0.5, **more: Any) -> str:
+    return toml("ball", name=name, position=[x, y], radius=radius, **more)
+
+
+def box(name: str, x: float, y: float, **more: Any) -> str:
+    return toml("box", name=name, position=[x, y], size=[1, 1], **more)
+
+
+def boxes(count: int) -> str:
+    return "".join(box(f"x{k}", 0, k + 0.5, friction=0.5) for k in range(count))
+
+
+def joint(kind: str, *between: str, anchors: Any = ((0, 0), (0, 0)), **more: Any) -> str:
+    return toml("joint", kind=kind, between=between, anchors=anchors, **more)
 
 
 def chain(links: int, last_mass: float = 1.0) -> str:
-    text = ""
-    for k in range(links):
-        mass = last_mass if k == links - 1 else 1.0
-        text += f'[[ball]]\nname = "c{k}"\nposition = [{k + 1}, 0]\nradius = 0.1\nmass = {mass}\ncollides = "none"\n'
-        ends = f'["c{k - 1}", "c{k}"]\nanchors = [[0, 0], [0, 0]]' if k else '["c0"]\nanchors = [[0, 0], [0, 0]]'
-        text += f'[[joint]]\nname = "r{k}"\nkind = "rod"\nbetween = {ends}\n'
-    return text
+    masses = [1.0] * (links - 1) + [last_mass]
+    text = "".join(ball(f"c{k}", k + 1, 0, 0.1, mass=mass, collides="none") for k, mass in enumerate(masses))
+    return text + "".join(joint("rod", *(f"c{j}" for j in (k - 1, k) if j >= 0)) for k in range(links))
 
 
 BULLET = (
-    '[solver]\ndt = 0.01\n[[wall]]\nname = "w"\npoints = [[3, -5], [3, 5]]\nthickness = 0.05\n'
-    '[[ball]]\nname = "b"\nposition = [0, 0]\nvelocity = [30, 0]\nradius = 0.05\n'
+    DT
+    + toml("wall", name="w", points=[[3, -5], [3, 5]], thickness=0.05)
+    + toml("ball", name="b", position=[0, 0], velocity=[30, 0], radius=0.05)
 )
-SPRING = (
-    '[solver]\ndt = 0.01\n{solver}[[ball]]\nname = "b"\nposition = [1, 0]\nradius = 0.1\nmass = 1\n'
-    '[[joint]]\nname = "s"\nkind = "spring"\nbetween = ["b"]\nanchors = [[0, 0], [0, 0]]\n'
-    "stiffness = {stiffness}\ndamping = {damping}\nrest_length = 1\n"
-)
-ZONE = (
-    '[[ball]]\nname = "b"\nposition = [0, 0]\nvelocity = [30, 0]\nradius = 0.05\n'
-    '[[zone]]\nname = "gate"\npoints = [[3, -5], [3, 5]]\nthickness = 0.1\n'
-)
-KICK = (
-    "[world]\ngravity = [0, -9.81]\n[solver]\ndt = 0.01\n"
-    '[[wall]]\nname = "w"\npoints = [[-5, 0], [5, 0]]\nthickness = 0.5\nkick = {{speed = 2, threshold = {threshold}}}\n'
-    '[[ball]]\nname = "b"\nposition = [0, 2]\nradius = 0.3\n'
-)
-ROD = (
-    '[[ball]]\nname = "b"\nposition = [2, 0]\nradius = 0.1\n'
-    '[[joint]]\nname = "r"\nkind = "rod"\nbetween = ["b"]\nanchors = {anchors}\n{more}'
-)
-TOWER = "[world]\ngravity = [0, -9.81]\n" + "[solver]\ndt = 0.016\niterations = 10\n"
-B, W, R = ElementKey("ball", 0), ElementKey("wall", 0), ElementKey("joint", 0)
+
+
+def spring(stiffness: float, damping: float, **solver: str) -> str:
+    ends = joint("spring", "b", stiffness=stiffness, damping=damping, rest_length=1)
+    return toml("solver", dt=0.01, **solver) + ball("b", 1, 0, 0.1, mass=1) + ends
+
+
+KICK = FALL + DT + toml("wall", points=[[-5, 0], [5, 0]], thickness=0.5, kick={"speed": 2, "threshold": 0.05})
+ZONE = toml("zone", name="gate", points=[[3, -5], [3, 5]], thickness=0.1)
+SLACK = FALL + toml("solver", dt=0.016, iterations=10)
+RELAXED = FALL + toml("solver", dt=0.0167, iterations=2, joints="relaxation")
+ON_GROUND = GROUND + ball("b", 0, 0.4)
+PILE = "".join(toml("ball", position=[1.2 * (k % 2), 0.5 + 1.1 * k], radius=0.5, friction=0.4) for k in range(9))
+B, W, R, G = (ElementKey(kind, 0) for kind in ("ball", "wall", "joint", "plane"))
+STEPS = ("dt", "substeps")
+PASSES = ("iterations", *STEPS)
 
 CASES: dict[str, tuple[str, str, tuple[ElementKey, ...], tuple[str, ...]]] = {
     "wall": (BULLET, "tunnelling", (B, W), ("dt 0.0025 s", "4 substeps", "thickness 0.5 m")),
     "balls": (
-        '[solver]\ndt = 0.01\n[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [30, 0]\nradius = 0.05\n'
-        '[[ball]]\nname = "b"\nposition = [3, 0]\nradius = 0.05\n',
+        DT + ball("a", 0, 0, 0.05, velocity=[30, 0]) + ball("b", 3, 0, 0.05),
         "tunnelling",
         (B,),
         ("dt 0.00333 s", "3 substeps"),
     ),
-    "depth": (
-        "[world]\ngravity = [0, -9.81]\n[solver]\ndt = 0.01\n"
-        + GROUND
-        + '[[ball]]\nname = "b"\nposition = [0, 20]\nradius = 0.05\n',
-        "depth",
-        (B, ElementKey("plane", 0)),
-        ("dt", "substeps"),
+    "depth": (FALL + DT + GROUND + ball("b", 0, 20, 0.05), "depth", (B, G), STEPS),
+    "zone": (
+        ball("b", 0, 0, 0.05, velocity=[30, 0]) + ZONE,
+        "entry",
+        (B, ElementKey("zone", 0)),
+        ("dt 0.00333 s", "3 substeps", "thickness 0.3 m"),
     ),
-    "zone": (ZONE, "entry", (B, ElementKey("zone", 0)), ("dt 0.00333 s", "3 substeps", "thickness 0.3 m")),
-    "overlap with the ground": (
-        GROUND + '[[ball]]\nname = "b"\nposition = [0, 0.4]\nradius = 0.5\n',
-        "overlap",
-        (B, ElementKey("plane", 0)),
-        ("move 'b' by 0.1 m",),
-    ),
+    "overlap with the ground": (ON_GROUND, "overlap", (B, G), ("move 'b' by 0.1 m",)),
     "overlap of balls": (
-        '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 0.5\n'
-        '[[ball]]\nname = "b"\nposition = [0.5, 0.7]\nradius = 0.5\n'
-        "[[grid]]\norigin = [9, 9]\ncolumns = 13\nrows = 13\nspacing = [1, 1]\nradius = 0.1\n",
+        ball("a", 0)
+        + ball("b", 0.5, 0.7)
+        + toml("grid", origin=[9, 9], columns=13, rows=13, spacing=[1, 1], radius=0.1),
         "overlap",
         (B, ElementKey("ball", 1)),
         ("move 'a' by 0.14 m",),
     ),
     "overlap of boxes": (
-        '[[box]]\nname = "a"\nposition = [0, 0]\nsize = [1, 1]\n'
-        '[[box]]\nname = "b"\nposition = [0.8, 0]\nsize = [1, 1]\n',
+        box("a", 0, 0) + box("b", 0.8, 0),
         "overlap",
         (ElementKey("box", 0), ElementKey("box", 1)),
         (),
     ),
     "iterations": (
-        "[solver]\niterations = 1\n[[ball]]\nposition = [0, 0]\nradius = 0.5\nrestitution = 0.9\nvelocity = [1, 0]\n"
-        "[[ball]]\nposition = [3, 0]\nradius = 0.5\nrestitution = 0.9\n",
+        toml("solver", iterations=1) + ball("a", 0, restitution=0.9, velocity=[1, 0]) + ball("b", 3, restitution=0.9),
         "iterations",
         (),
         ("3 iterations",),
     ),
-    "rounding": (
-        '[[post]]\nposition = [0, 0]\nradius = 1\n[[ball]]\nname = "b"\nposition = [1e14, 0]\nradius = 0.5\n',
-        "rounding",
-        (B,),
-        (),
-    ),
+    "rounding": (toml("post", position=[0, 0], radius=1) + ball("b", 1e14), "rounding", (B,), ()),
     "kick": (
-        KICK.format(threshold=0.05),
+        KICK + ball("b", 0, 2, 0.3),
         "kick_threshold",
         (W,),
         ("dt 0.00509 s", "2 substeps", "threshold 0.0982 m/s"),
     ),
-    "joint error": (
-        ROD.format(anchors="[[0, 0], [0, 0]]", more="length = 1.5\n"),
-        "joint_start",
-        (R,),
-        ("length as it starts",),
-    ),
+    "joint error": (ball("b", 2) + joint("rod", "b", length=1.5), "joint_start", (R,), ("length as it starts",)),
     "anchors": (
-        ROD.format(anchors="[[5, 0], [0.01, 0]]", more=""),
+        ball("b", 2, 0, 0.1) + joint("rod", "b", anchors=((5, 0), (0.01, 0))),
         "anchors",
         (R, B),
         ("swap the anchors",),
     ),
-    "spring": (SPRING.format(solver="", stiffness=4e4, damping=0), "spring", (R,), ("dt 0.00749 s", "2 substeps")),
-    "spring at a round number": (
-        SPRING.format(solver="", stiffness=9e4, damping=0),
-        "spring",
-        (R,),
-        ("dt 0.00499 s", "3 substeps"),
-    ),
-    "explicit Euler": (
-        SPRING.format(solver='integrator = "explicit_euler"\n', stiffness=1e3, damping=0),
-        "spring",
-        (R,),
-        ("default integrator",),
-    ),
-    "damper": (SPRING.format(solver="", stiffness=1, damping=400), "spring", (R,), ("dt", "substeps")),
+    "spring": (spring(4e4, 0), "spring", (R,), ("dt 0.00749 s", "2 substeps")),
+    "spring at a round number": (spring(9e4, 0), "spring", (R,), ("dt 0.00499 s", "3 substeps")),
+    "explicit Euler": (spring(1e3, 0, integrator="explicit_euler"), "spring", (R,), ("default integrator",)),
+    "damper": (spring(1, 400), "spring", (R,), STEPS),
     "orbit": (
-        "[solver]\ndt = 0.05\n[[attraction]]\ntoward = [0, 0]\nstrength = 1\n"
-        '[[ball]]\nname = "b"\nposition = [1, 0]\nvelocity = [0, 0.3]\nradius = 0.01\ncollides = "none"\n',
+        toml("solver", dt=0.05)
+        + toml("attraction", toward=[0, 0], strength=1)
+        + ball("b", 1, 0, 0.01, velocity=[0, 0.3], collides="none"),
         "orbit",
         (B,),
-        ("dt", "substeps"),
+        STEPS,
     ),
-    "chain": (
-        "[world]\ngravity = [0, -9.81]\n[solver]\ndt = 0.016\niterations = 10\n" + chain(20),
-        "chain",
-        (R,),
-        ("iterations", "dt", "substeps"),
-    ),
-    "stretch": (
-        '[world]\ngravity = [0, -9.81]\n[solver]\ndt = 0.0167\niterations = 2\njoints = "relaxation"\n' + chain(20),
-        "chain",
-        (R,),
-        ("iterations", "dt", "substeps"),
-    ),
-    "load of a chain": (
-        "[world]\ngravity = [0, -9.81]\n[solver]\ndt = 0.016\niterations = 10\n" + chain(3, 100.0),
-        "mass_ratio",
-        (ElementKey("joint", 2),),
-        ("iterations", "dt", "substeps"),
-    ),
-    "tower": (TOWER + GROUND + boxes(12), "stack", (ElementKey("box", 0),), ("iterations", "dt", "substeps")),
+    "chain": (SLACK + chain(20), "chain", (R,), PASSES),
+    "stretch": (RELAXED + chain(20), "chain", (R,), PASSES),
+    "load of a chain": (SLACK + chain(3, 100.0), "mass_ratio", (ElementKey("joint", 2),), PASSES),
+    "tower": (SLACK + GROUND + boxes(12), "stack", (ElementKey("box", 0),), PASSES),
     "heavy on light": (
-        TOWER
-        + GROUND
-        + '[[box]]\nname = "light"\nposition = [0, 0.5]\nsize = [1, 1]\nmass = 1\n'
-        + '[[box]]\nname = "heavy"\nposition = [0, 1.5]\nsize = [1, 1]\nmass = 100\n',
+        SLACK + GROUND + box("light", 0, 0.5, mass=1) + box("heavy", 0, 1.5, mass=100),
         "mass_ratio",
         (ElementKey("box", 1), ElementKey("box", 0)),
-        ("iterations", "dt", "substeps"),
+        PASSES,
     ),
-    "events": (
-        "[world]\ngravity = [0, -9.81]\n"
-        + GROUND
-        + "".join(
-            f"[[ball]]\nposition = [{1.2 * (k % 2)}, {0.5 + 1.1 * k}]\nradius = 0.5\nfriction = 0.4\n" for k in range(9)
-        ),
-        "event_rate",
-        (),
-        (),
-    ),
+    "events": (FALL + GROUND + PILE, "event_rate", (), ()),
     "duration": (
-        "[world]\nduration = 0.1\n[solver]\ndt = 0.5\n[[ball]]\nposition = [0, 0]\nradius = 0.5\n",
+        toml("world", duration=0.1) + toml("solver", dt=0.5) + ball("b", 0),
         "duration",
         (),
         ("dt 0.1 s", "duration 0.5 s"),
@@ -224,8 +173,7 @@ def test_every_remedy_removes_the_diagnostic_and_adds_none(case: str) -> None:
 
 
 def test_harmless_scene_has_no_marks() -> None:
-    text = "[world]\ngravity = [0, -9.81]\n" + GROUND + '[[ball]]\nname = "b"\nposition = [0, 1]\nradius = 0.5\n'
-    found = check_scene(loads(text))
+    found = check_scene(loads(FALL + GROUND + ball("b", 0, 1)))
     assert found.marks == ()
     assert found.note == ""
 
@@ -237,24 +185,20 @@ def test_remedies_are_dropped_where_they_do_not_apply() -> None:
     near = BULLET.replace("position = [0, 0]", "position = [2.8, 0]")
     labels = [remedy.label for remedy in mark_of(near, "tunnelling").remedies]
     assert labels == ["dt 0.0025 s", "4 substeps"]  # a thicker wall would overlap the ball
-    tied = CASES["overlap with the ground"][0] + '[[thrust]]\nbody = "b"\nforce = [1, 0]\n'
+    tied = ON_GROUND + toml("thrust", body="b", force=[1, 0])
     assert mark_of(tied, "overlap").remedies == ()
-    beside = CASES["overlap with the ground"][0] + '[[ball]]\nname = "c"\nposition = [0.6, 1.24]\nradius = 0.5\n'
-    assert mark_of(beside, "overlap").remedies == ()  # there is no room for it
+    assert mark_of(ON_GROUND + ball("c", 0.6, 1.24), "overlap").remedies == ()  # there is no room for it
 
 
 def test_elements_of_generators_and_default_names_are_found() -> None:
-    text = (
-        BULLET.replace('name = "w"\n', "")
-        + "[[grid]]\norigin = [-9, 1]\ncolumns = 2\nrows = 2\nspacing = [1, 1]\nradius = 0.01\n"
-    )
-    text += "velocity = [40, 0]\n"
+    grid = {"origin": [-9, 1], "columns": 2, "rows": 2, "spacing": [1, 1], "radius": 0.01, "velocity": [40, 0]}
+    text = BULLET.replace('name = "w"\n', "") + toml("grid", **grid)
     found = {mark.elements for mark in check_scene(loads(text)).marks if mark.kind == "tunnelling"}
     assert (ElementKey("grid", 0), W) in found
 
 
 def test_demands_and_engines_of_a_scene() -> None:
-    found = check_scene(loads(GROUND + "[world]\ngravity = [0, -9.81]\n" + boxes(1)))
+    found = check_scene(loads(GROUND + FALL + boxes(1)))
     assert "friction" in found.demands
     assert "polygons" in found.demands
     assert "springs" not in found.demands
@@ -266,7 +210,7 @@ def test_demands_and_engines_of_a_scene() -> None:
 
 def test_large_scene_is_not_checked_which_a_note_says(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_check, "MAX_CHECKED_BODIES", 1)
-    found = check_scene(loads(BULLET + "[[ball]]\nposition = [0, 9]\nradius = 0.5\n"))
+    found = check_scene(loads(BULLET + ball("c", 0, 9)))
     assert found.marks == ()
     assert "2 bodies" in found.note
     assert found.engines

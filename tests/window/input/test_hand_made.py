@@ -20,20 +20,13 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.playback.parameters import turned as parameter_actions
 from sandbox.window.playback.session import Session
+from tests.toml_text import toml
 from tests.window.pressing import key, key_up, move
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.full  # every shipped scene
+pytestmark = pytest.mark.fail_slow(30)  # every shipped scene
 
-REST = """
-title = "Rest"
-[solver]
-dt = 0.01
-[[ball]]
-name = "a"
-position = [0.0, 0.0]
-radius = 0.4
-"""
+REST = 'title = "Rest"\n' + toml("solver", dt=0.01) + toml("ball", name="a", position=[0.0, 0.0], radius=0.4)
 B, R, ESCAPE = pygame.K_b, pygame.K_r, pygame.K_ESCAPE
 
 
@@ -121,17 +114,6 @@ def test_restart_keeps_parameters_without_asking_and_quit_asks(window: App) -> N
     run_frame(window)
     tap(window, ESCAPE)
     assert window.app_state.question is not None
-
-
-def test_undo_restores_a_body_lost_by_a_restart(window: App) -> None:
-    tap(window, B)
-    tap(window, R)
-    tap(window, R)
-    assert window.app_state.live is not None
-    assert len(window.app_state.live.bodies) == 1
-    tap(window, pygame.K_z, pygame.KMOD_CTRL)
-    window.app_state.live.finish_seek()
-    assert len(window.app_state.live.bodies) == 2
 
 
 def test_undone_restart_counts_as_unsaved_and_undo_swaps_the_sessions(window: App) -> None:

@@ -14,27 +14,15 @@ from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import LONG, Snapshot, active_thrusters
 from sandbox.window.render.palette import ORANGE
 from sandbox.window.render.renderer import Renderer
+from tests.toml_text import toml
 
-SHIP = """
-title = "Ship"
-[[polygon]]
-name = "ship"
-points = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]   # the centre of mass is at (1, 1)
-angle = 0.5
-[[thrust]]
-name = "main"
-body = "ship"
-force = [4.0, 0.0]
-point = [0.0, 1.0]
-key = "up"
-[[thrust]]
-name = "always"
-body = "ship"
-force = [0.0, 1.0]
-point = [1.0, 0.0]
-begin = 1.0
-end = 2.0
-"""
+SHIP = (
+    toml(title="Ship")
+    # the centre of mass is at (1, 1)
+    + toml("polygon", name="ship", points=[[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]], angle=0.5)
+    + toml("thrust", name="main", body="ship", force=[4.0, 0.0], point=[0.0, 1.0], key="up")
+    + toml("thrust", name="always", body="ship", force=[0.0, 1.0], point=[1.0, 0.0], begin=1.0, end=2.0)
+)
 SCENE = loads(SHIP)
 REACH = math.sqrt(2.0)  # m, from the centre of a square of 2 m to its corner
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn, Strike, Switch
@@ -25,7 +25,7 @@ from sandbox.window.playback.history import Keyframe
 from sandbox.window.playback.live import switch_engine
 from sandbox.window.playback.session import ReplayMismatchError, Session
 
-pytestmark = pytest.mark.full  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
 
 
 def shipped(name: str) -> Scene:
@@ -96,9 +96,19 @@ def test_recording_keeps_the_future_after_seeking_back(name: str, engine: str) -
     assert_replays(session)
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("with_actions", [False, True], ids=["untouched", "acted on"])
+@pytest.mark.parametrize(
+    ("name", "engine", "with_actions"),
+    [
+        *(("bounce", engine, True) for engine in ENGINES),
+        ("bounce", "exact", False),
+        ("gas", "pymunk", True),
+        ("newtons_cradle", "exact", True),
+        ("newtons_cradle", "reference", False),
+        ("pile", "pymunk", False),
+        ("pile", "exact", True),
+        ("pile", "reference", True),
+    ],
+)
 def test_seeking_back_and_forth_reproduces_the_same_states(name: str, engine: str, with_actions: bool) -> None:
     session = Session(SCENES[name], engine)
     part = 2 if (name, engine) == ("pile", "exact") else 20  # rigid balls in a heap soon collide without end
@@ -156,17 +166,6 @@ def test_refused_action_changes_nothing_and_keeps_the_future() -> None:
         session.apply(Remove(time=0.0, body="zzz"))
     assert session.actions == ()
     assert hashes(session) == expected
-
-
-def test_actions_of_a_recording_are_applied_at_their_times() -> None:
-    first = step_times(Session(SCENES["gas"]), 20)
-    first.apply(Move(time=0.0, body="atom-1", position=(0.6, 0.6), velocity=(0.0, 3.0)))
-    step_times(first, 20)
-    first.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
-    replayed = Session(SCENES["gas"], actions=first.actions)
-    assert replayed.advance(40) == 40
-    assert replayed.frame.state_hash() == first.frame.state_hash()
-    assert replayed.actions == first.actions
 
 
 def test_recorded_action_that_fails_ends_the_session_with_its_reason() -> None:
@@ -271,7 +270,7 @@ def test_replay_mismatch_while_playing_is_repaired_by_seeking_the_same_step() ->
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("after", [0, 1, 20])
+@pytest.mark.parametrize("after", [0, 20])
 def test_session_continued_from_a_checkpoint_can_be_sought_and_replayed(engine: str, after: int) -> None:
     """`exact` rounds differently after a restart from a checkpoint; actions there must stay replayable."""
     session = step_times(Session(load(find("fireworks")), engine), 100)
@@ -336,9 +335,7 @@ def test_pull_is_released_when_its_later_release_is_discarded() -> None:
     assert step_times(session, 150).frame.position[0] == pytest.approx([1.0, 0.0], abs=1e-9)  # (1 + ωt)·e^{−ωt}
 
 
-def test_seek_works_with_a_history_limited_in_memory(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_seek_works_with_a_history_limited_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
         history_module, "MAX_BYTES", 20 * (225 * history_module.BYTES_PER_BODY + history_module.BYTES_PER_FRAME)
     )
@@ -473,30 +470,7 @@ def test_engine_that_cannot_start_is_refused() -> None:
         Session(scene_of(ball("a", 0, 0), ball("b", 0.1, 0)), "exact")
 
 
-EDGE_CASES: dict[str, Scene] = {
-    "empty": from_document({"title": "nothing"}),
-    "planes": from_document({"plane": [{"point": [0, 0], "normal": [0, 1]}], "world": {"gravity": [0, -9.81]}}),
-    "fixed": scene_of(ball("a", 0, 0, fixed=True), ball("b", 9, 0, fixed=True)),
-    "leaves": scene_of(ball("a", 0, 0, velocity=[99, 0]), world={"bounds": [[-1, -1], [1, 1]]}),
-    "long step": scene_of(ball("a", 0, 0, velocity=[1, 0]), world={"duration": 0.1}, solver={"dt": 10.0}),
-}
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("name", EDGE_CASES)
-def test_edge_case_scenes_seek_back_and_forth(name: str, engine: str) -> None:
-    session = step_times(Session(EDGE_CASES[name], engine), 70)
-    expected = hashes(session)
-    session.apply(Spawn(time=0.0, ball=Ball(position=(0.0, 0.5), radius=0.1)))
-    step_times(session, 5)
-    assert_replays(session)
-    seek(session, 30)
-    assert session.frame.state_hash() == expected[30]
-    seek(session, 75)
-    assert len(session.bodies) == len(EDGE_CASES[name].bodies) + 1
-    assert_replays(session)
-
-
+@pytest.mark.nightly
 def test_hundred_thousand_bodies_can_be_sought_back() -> None:
     session = Session(load(find("fireworks_100k")))
     session.advance(3)
@@ -531,7 +505,6 @@ TWO = scene_of(
 @given(plan=st.lists(operations, max_size=12))
 # Step 62 of this example reveals that step 47 was unconfirmed.
 @example(plan=[("on", 1), ("on", 29), ("to", 29), ("to", 111), ("to", 47), ("on", 15)])
-@settings(max_examples=30)
 def test_confirmed_steps_are_unchanged_by_any_order_of_operations(engine: str, plan: list[tuple[str, int]]) -> None:
     session = Session(TWO, engine)
     for kind, number in plan:
@@ -573,9 +546,8 @@ def session_after_stroke(aim: float, speed: float, steps: int) -> Session:
     return session
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_seeking_on_a_billiards_table_reproduces_the_same_states(seed: int) -> None:
-    random = np.random.default_rng(seed)
+def test_seeking_on_a_billiards_table_reproduces_the_same_states() -> None:
+    random = np.random.default_rng(1)
     session = session_after_stroke(1.5708 + random.uniform(-0.2, 0.2), random.uniform(2.0, 6.0), 600)
     before = hashes(session)
     for target in random.integers(0, session.history.last_step, 6).tolist():

@@ -19,7 +19,7 @@ def test_recordings_exist_for_every_kind() -> None:
     assert {file.stem for file in FILES} == {"9-ball", "curling", "duel", "landing", "pile", "pinball"}
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
 def test_stored_recording_replays_without_a_window(file: Path) -> None:
     recording = Recording.load(file)
@@ -31,7 +31,7 @@ def test_stored_recording_replays_without_a_window(file: Path) -> None:
     assert game.get("otherwise") is None
 
 
-@pytest.mark.full
+@pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
 def test_stored_recording_replays_in_a_session_of_the_window(file: Path) -> None:
     recording = Recording.load(file)

@@ -41,51 +41,37 @@ def test_colour_of_velocities_differs_from_the_colours_of_forces():
     assert min(sum(abs(a - b) for a, b in zip(heat, ORANGE, strict=True)) for heat in HEAT) > 100
 
 
-def test_a_body_at_rest_has_no_arrow():
-    assert not overlay_pixels(scene(balls=[ball(0, 0)]), "velocities").any()
-
-
 def test_arrow_of_a_fast_body_is_limited_in_length():
     left, _, right, _ = pixel_box(overlay_pixels(scene(balls=[ball(0, 0, velocity=[1e9, 0.0])]), "velocities"))
     assert left >= 90
     assert right == pytest.approx(100 + 120 / 3, abs=2)  # the edge of the arrow's head
 
 
-@pytest.mark.parametrize("overlay", ["joints", "energy"])
+@pytest.mark.parametrize("overlay", ["joints", "energy", "velocities"])
 def test_overlays_without_content_change_no_pixel(overlay):
-    assert not overlay_pixels(ONE, overlay).any()
+    assert not overlay_pixels(scene(balls=[ball(0, 0)]), overlay).any()
 
 
-def test_contacts_are_drawn_at_the_current_position_of_the_body():
-    stale = contact((0, -1), (-4.0, -1.0), (0.0, -1.0))
-    left, top, right, bottom = pixel_box(overlay_pixels(HEAVY, "contacts", contacts=stale))
-    assert left >= 95
-    assert right <= 105
-    assert top >= 76
-    assert bottom == pytest.approx(80 + 16, abs=2)  # the normal is 16 px long
+POST = scene(balls=[ball(0, 1.5)], post=[{"position": [0.0, 0.0], "radius": 0.5}])
+WALL = scene(balls=[ball(0, 1.5)], wall=[{"points": [[0.0, 0.0], [4.0, 0.0]], "thickness": 1.0}])
 
 
-def test_contact_of_two_balls_is_drawn_between_them():
-    pair = scene(balls=[ball(-1, 0), ball(1, 0)])
-    wrong = contact((0, 1), (9.0, 9.0), (0.0, 1.0))
-    left, top, right, bottom = pixel_box(overlay_pixels(pair, "contacts", contacts=wrong))
-    assert 94 <= left < right <= 118
-    assert 54 <= top < bottom <= 66
-
-
-def test_contact_with_a_post_is_drawn_towards_the_ball():
-    model = scene(balls=[ball(0, 1.5)], post=[{"position": [0.0, 0.0], "radius": 0.5}])
-    stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
-    left, _, right, bottom = pixel_box(overlay_pixels(model, "contacts", contacts=stale))
-    assert 94 <= left < right <= 106
-    assert bottom == pytest.approx(60 - 10 + 16, abs=2)  # the normal is 16 px long
-
-
-def test_contact_with_the_end_of_a_wall_is_drawn_towards_the_ball():
-    model = scene(balls=[ball(0, 1.5)], wall=[{"points": [[0.0, 0.0], [4.0, 0.0]], "thickness": 1.0}])
-    stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
-    left, _, right, _ = pixel_box(overlay_pixels(model, "contacts", contacts=stale))
-    assert 94 <= left < right <= 106
+@pytest.mark.parametrize(
+    ("model", "recorded", "columns", "rows", "bottom"),
+    [
+        # a normal is 16 px long
+        (HEAVY, contact((0, -1), (-4.0, -1.0), (0.0, -1.0)), (95, 105), (76, 120), 80 + 16),
+        (scene(balls=[ball(-1, 0), ball(1, 0)]), contact((0, 1), (9.0, 9.0), (0.0, 1.0)), (94, 118), (54, 66), None),
+        (POST, contact((0, -1), (0.5, 0.0), (-1.0, 0.0)), (94, 106), (0, 120), 60 - 10 + 16),
+        (WALL, contact((0, -1), (0.5, 0.0), (-1.0, 0.0)), (94, 106), (0, 120), None),
+    ],
+    ids=["plane", "two balls", "post", "end of a wall"],
+)
+def test_contact_is_drawn_between_the_bodies_as_they_lie_now(model, recorded, columns, rows, bottom):
+    found = pixel_box(overlay_pixels(model, "contacts", contacts=recorded))
+    assert columns[0] <= found[0] < found[2] <= columns[1]
+    assert rows[0] <= found[1] < found[3] <= rows[1]
+    assert bottom is None or found[3] == pytest.approx(bottom, abs=2)  # smooth ends
 
 
 def force(newtons: float, model=HEAVY, seconds=0.01) -> np.ndarray:
@@ -93,17 +79,9 @@ def force(newtons: float, model=HEAVY, seconds=0.01) -> np.ndarray:
     return overlay_pixels(model, "impulses", contacts=row, seconds=seconds)
 
 
-def test_impulse_arrows_are_scaled_by_the_weight():
-    lengths = []
-    for weights in (1.0, 2.0, 3.0):
-        differ = force(weights * WEIGHT)[96:104]
-        lengths.append(pixel_box(differ)[3] - pixel_box(differ)[1])
-    assert lengths == pytest.approx([26, 52, 78], abs=2.5)  # smooth ends
-
-
-def test_arrow_of_a_large_impulse_is_limited_in_length():
-    differ = force(1e9)[96:104]
-    assert pixel_box(differ)[3] - pixel_box(differ)[1] == pytest.approx(80, abs=2.5)  # smooth ends
+def test_impulse_arrows_are_scaled_by_the_weight_and_limited_in_length():
+    arrows = [pixel_box(force(newtons)[96:104]) for newtons in (WEIGHT, 2.0 * WEIGHT, 3.0 * WEIGHT, 1e9)]
+    assert [box[3] - box[1] for box in arrows] == pytest.approx([26, 52, 78, 80], abs=2.5)  # smooth ends
 
 
 def test_impulse_arrows_without_gravity_are_scaled_by_the_largest():
@@ -124,9 +102,12 @@ def test_impulses_of_zero_duration_are_not_drawn():
     assert not force(1.0, seconds=0.0).any()
 
 
-def test_bounds_surround_each_body():
-    left, top, right, bottom = pixel_box(overlay_pixels(ONE, "bounds"))
-    assert (left, top, right, bottom) == pytest.approx((80, 40, 120, 80), abs=1)  # a line's width
+BOX = scene(box=[{"position": [0, 0], "size": [4, 2], "angle": math.pi / 2}])
+
+
+@pytest.mark.parametrize(("model", "surrounded"), [(ONE, (80, 40, 120, 80)), (BOX, (80, 20, 120, 100))])
+def test_bounds_surround_each_body(model, surrounded):
+    assert pixel_box(overlay_pixels(model, "bounds")) == pytest.approx(surrounded, abs=1)  # a line's width
 
 
 def test_centres_are_marked():
@@ -136,12 +117,18 @@ def test_centres_are_marked():
     assert overlay_pixels(scene(balls=[ball(0, 0, 0.001)]), "centres").any()
 
 
-def test_names_are_written_above():
-    model = scene(balls=[ball(0, -1, 1.0, name="cue")])
-    left, top, right, bottom = pixel_box(overlay_pixels(model, "names"))
+@pytest.mark.parametrize(
+    ("model", "top"),
+    [
+        (scene(balls=[ball(0, -1, 1.0, name="cue")]), 60),
+        (scene(box=[{"position": [0, 0], "size": [8, 0.4], "name": "beam"}]), 60 - 4),
+    ],
+)
+def test_names_are_written_above_the_outline(model, top):
+    left, upper, right, bottom = pixel_box(overlay_pixels(model, "names"))
     assert left < 100 < right
-    assert bottom <= 60 + 1, "above the ball, whose top is at 0"
-    assert bottom - top < 16
+    assert top - 20 < upper < bottom <= top + 1
+    assert bottom - upper < 16
 
 
 def test_overlapping_names_are_omitted():

@@ -8,32 +8,21 @@ import pytest
 
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window import app_state
-from sandbox.window.app import App
-from sandbox.window.app_state import AppState
 from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.ui import gui
 from sandbox.window.ui.panel import SidePanel
+from tests.toml_text import toml
 from tests.window.pressing import press, release
 from tests.window.windowed import open_window, run_frame
 
-ROOM = """
-[world]
-gravity = [0.0, -9.8]
-duration = 60.0
-[[ball]]
-name = "ball"
-position = [0.0, 1.0]
-radius = 0.4
-[[emitter]]
-name = "spark"
-position = [1.0, 0.0]
-count = 3
-velocity_min = [-1.0, -1.0]
-velocity_max = [1.0, 1.0]
-radius = 0.05
-[play]
-relaunch = "spark"
-"""
+ROOM = (
+    toml("world", gravity=[0.0, -9.8], duration=60.0)
+    + toml("ball", name="ball", position=[0.0, 1.0], radius=0.4)
+    + toml(
+        "emitter", name="spark", position=[1.0, 0.0], count=3, velocity_min=[-1, -1], velocity_max=[1, 1], radius=0.05
+    )
+    + toml("play", relaunch="spark")
+)
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[str]:
@@ -49,12 +38,6 @@ def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> li
     return calls
 
 
-def open_game(name: str, folder: Path) -> App:
-    window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
-    assert window.app_state.open(find(name))
-    return window
-
-
 def test_key_bindings_are_computed_once_per_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, app_state, "key_bindings")
     with open_window(ROOM, tmp_path) as window:
@@ -64,21 +47,9 @@ def test_key_bindings_are_computed_once_per_scene(tmp_path: Path, monkeypatch: p
         assert window.app_state.key_bindings.pressed.keys() == {pygame.K_SPACE}
 
 
-def test_keys_are_announced_once_per_scene_and_not_after_a_restart(tmp_path: Path) -> None:
-    with open_window(ROOM, tmp_path) as window:
-        run_frame(window)
-        assert window.app_state.messages.visible() == (("info", "Space: relaunch spark"),)
-        window.app_state.messages = type(window.app_state.messages)()
-        run_frame(window)
-        window.app_state.restart()
-        run_frame(window)
-        assert window.app_state.messages.visible() == ()
-
-
 def test_score_panel_layout_is_cached(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, gui, "layout_score")
-    window = open_game("duel", tmp_path)
-    try:
+    with open_window(find("duel"), tmp_path, (1280, 720)) as window:
         window.run_frame(0.0)
         calls.clear()
         window.run_frame(0.0)
@@ -86,8 +57,6 @@ def test_score_panel_layout_is_cached(tmp_path: Path, monkeypatch: pytest.Monkey
         window.context.gui.panel.visible = False  # changes the free width
         window.run_frame(0.0)
         assert len(calls) == 1
-    finally:
-        window.close()
 
 
 def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,10 +7,11 @@ import pygame
 import pytest
 
 from sandbox.scene.files.load import loads
-from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.ui.scene_browser import SceneBrowser, draw_thumbnail, read_scene
+from tests.samples import each_shipped_scene
 from tests.window.pressing import key, move, press, release, wheel
 
 BALL = 'title = "{title}"\nabout = "{about}"\n[world]\ngravity = [0, -9.81]\n[[ball]]\nposition = [0, 0]\nradius = 1\n'
@@ -157,17 +158,6 @@ def test_picker_is_drawn_on_any_size(files: list[tuple[str, Path]], size: tuple[
     draw_picker([], size, 2)
 
 
-@pytest.mark.full
-def test_thumbnails_of_all_shipped_scenes_are_not_empty() -> None:
-    scenes = shipped()
-    assert scenes
-    for name, path in scenes:
-        scene = read_scene(path).scene
-        assert scene is not None, name
-        thumbnail = draw_thumbnail(scene, (200, 112), Renderer(), 0.7)
-        assert np.ptp(pygame.surfarray.array3d(thumbnail).astype(int), axis=(0, 1)).max() > 60, name
-
-
 def test_thumbnail_of_a_burst_shows_it_in_flight() -> None:
     burst = "[world]\nduration = 2\n[[emitter]]\nposition = [0, 0]\ncount = 200\nradius = 0.05\n"
     scene = loads(burst + "velocity_min = [-5, -5]\nvelocity_max = [5, 5]\n")
@@ -175,3 +165,11 @@ def test_thumbnail_of_a_burst_shows_it_in_flight() -> None:
     differs = np.abs(thumbnail - np.asarray(BACKGROUND)).max(axis=2) > 60
     assert differs[:80].any()
     assert differs[120:].any()
+
+
+@pytest.mark.parametrize("name", each_shipped_scene())
+def test_thumbnail_of_a_shipped_scene_is_not_empty(name: str) -> None:
+    scene = read_scene(find(name)).scene
+    assert scene is not None
+    thumbnail = draw_thumbnail(scene, (200, 112), Renderer(), 0.7)
+    assert np.ptp(pygame.surfarray.array3d(thumbnail).astype(int), axis=(0, 1)).max() > 60

@@ -2,45 +2,32 @@
 
 import sandbox
 from sandbox.scene.compile.scene import Scene
+from tests.toml_text import toml
 
 R = 0.028575
 
-FLOOR = """
-[world]
-seed = 7
-
-[surface]
-gravity = 9.81
-sliding_friction = 0.2
-rolling_friction = 0.01
-spinning_friction = 0.0127
-
-[contact_models]
-ball_ball = "elastic"
-
-[[material]]
-name = "phenolic"
-
-[[pair]]
-between = ["phenolic", "phenolic"]
-restitution = 1.0
-"""
+FLOOR = (
+    toml("world", seed=7)
+    + toml("surface", gravity=9.81, sliding_friction=0.2, rolling_friction=0.01, spinning_friction=0.0127)
+    + '[contact_models]\nball_ball = "elastic"\n'
+    + toml("material", name="phenolic")
+    + toml("pair", between=["phenolic", "phenolic"], restitution=1.0)
+)
 
 
 def ball(name: str, x: float, y: float = 0.0) -> str:
     """Return a ball at rest."""
-    properties = f'radius = {R}\nmass = 0.17\nmaterial = "phenolic"'
-    return f'\n[[ball]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\n{properties}\n'
+    return toml("ball", name=name, position=[x, y], radius=R, mass=0.17, material="phenolic")
 
 
 def pocket(name: str, x: float, y: float = 0.0, radius: float = 0.06) -> str:
     """Return a pocket."""
-    return f'\n[[pocket]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\nradius = {radius!r}\n'
+    return toml("pocket", name=name, position=[x, y], radius=radius)
 
 
 def shot(aim: float = 0.0, speed: float = 2.0, side: float = 0.0, height: float = 0.0) -> str:
     """Return a shot at the cue ball."""
-    return f'\n[[shot]]\nname = "it"\naim = {aim!r}\nspeed = {speed!r}\nside = {side!r}\nheight = {height!r}\n'
+    return toml("shot", name="it", aim=aim, speed=speed, side=side, height=height)
 
 
 def scene_with(*parts: str) -> Scene:

@@ -1,42 +1,46 @@
-"""Breaking joints in a live view: shown before their break and hidden after it, however a time is reached."""
+"""Breaking joints and zones in a session: shown and reproduced as at first, however a time is reached."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
 
-from sandbox.action import Force, Switch
+from sandbox.action import Force, Impulse, Switch
 from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import rerun
+from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.fixed import HELD
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import from_document, load, loads
+from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import Snapshot
+from tests.toml_text import toml
 
 ALL = frozenset({"shapes", "joints"})
-CLOTH = """
-title = "Rag"
-[world]
-gravity = [0.0, -10.0]
-duration = 1.0
-[solver]
-dt = 0.01
-substeps = 2
-[[cloth]]
-name = "rag"
-corner = [0.0, 0.0]
-columns = 4
-rows = 4
-spacing = [0.1, 0.1]
-stiffness = 100.0
-damping = 0.05
-mass = 0.1
-strength = 3.5
-"""
+CLOTH = (
+    toml(title="Rag")
+    + toml("world", gravity=[0.0, -10.0], duration=1.0)
+    + toml("solver", dt=0.01, substeps=2)
+    + toml(
+        "cloth",
+        name="rag",
+        corner=[0.0, 0.0],
+        columns=4,
+        rows=4,
+        spacing=[0.1, 0.1],
+        stiffness=100.0,
+        damping=0.05,
+        mass=0.1,
+        strength=3.5,
+    )
+)
 """The uppermost threads carry 3 N at rest, and more while the cloth swings."""
 
 
@@ -121,3 +125,43 @@ def test_recorded_run_refuses_joints_that_differ_from_the_scene() -> None:
     mismatched = Trajectory(**{**vars(trajectory), "broken_time": np.full(3, np.nan)})
     with pytest.raises(SceneError, match="broken_time: the run had 3 joints"):
         RecordedRun(mismatched)
+
+
+HOLES: list[dict[str, Any]] = [
+    {"name": "mouth", "points": [[0.3, -1], [0.3, 1]], "thickness": 0.1, "to_layer": "up"},
+    {"name": "slope", "position": [0.8, 0], "radius": 0.3, "layers": ["up"], "gravity": [-0.5, 0.0]},
+    {"name": "hole", "position": [1.5, 0], "radius": 0.1, "layers": ["up"], "holds": True},
+]
+
+
+def run_session(scene: Scene, steps: int, kick: int | None = None) -> Session:
+    session = Session(scene)
+    while session.step_number < steps:
+        session.advance()
+        if session.step_number == kick:
+            session.apply(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
+    return session
+
+
+def course() -> Scene:
+    ball = {"name": "ball", "position": [0, 0], "velocity": [1.5, 0], "radius": 0.1}
+    return from_document({"ball": [ball], "zone": HOLES})
+
+
+@pytest.mark.parametrize("name", ["holes", "overpass"])
+def test_seeking_back_and_forth_reproduces_the_same_visits(name: str) -> None:
+    """The run is long enough for checkpoints, also inside zones; each state is compared with the first pass."""
+    session = run_session(course() if name == "holes" else load(find(name)), 320, kick=200)
+    known = {k: session.history.get(k) for k in range(321)}
+    assert session.history.keyframe_steps
+    assert {int(mark) for frame in known.values() if frame is not None for mark in np.unique(frame.visits)} >= {0, 1}
+    assert name != "holes" or any(known[k].visits[0, 2] == HELD for k in range(200))
+    for step in (150, 40, 210, 199, 320, 0, 320):
+        for _ in session.seek(step):
+            pass
+        assert session.frame.state_hash() == known[step].state_hash()
+        assert np.array_equal(session.frame.visits, known[step].visits)
+        assert np.array_equal(session.frame.layer, known[step].layer)
+    assert session.history.checkpoints_enabled  # no checkpoint replayed differently
+    recording = Recording.from_json(session.recording().to_json())
+    assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash

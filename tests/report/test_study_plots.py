@@ -1,6 +1,7 @@
-"""Heat maps of extremes: every sample has its cell, colour and mark."""
+"""Plots of studies: heat maps of extremes, and the lines, front and limits of a trade-off."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,6 +10,7 @@ from sandbox.measure.extremes.outcome import VERDICTS, Outcome, Sample
 from sandbox.measure.extremes.runner import Extremes, ExtremesPlan
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
 from sandbox.report.extremes_plot import COLOURS, MARKS, draw_axes, draw_pairs, level_text, plot_extremes
+from sandbox.report.tradeoff_plot import draw_tradeoff, plot_tradeoff
 
 
 def synthetic_extremes() -> Extremes:
@@ -61,3 +63,49 @@ def test_verdicts_differ_in_colour_and_mark() -> None:
 )
 def test_levels_are_short(level: float, text: str) -> None:
     assert level_text(level) == text
+
+
+def point(engine: str, dt: float, error: float | None, cost: float | None, status: str = "ok") -> dict[str, Any]:
+    return {
+        "engine": engine,
+        "settings": {"dt": dt, "substeps": 1},
+        "error": error,
+        "cost_ms_per_second": cost,
+        "status": status,
+        "reason": None if status == "ok" else "it ran away",
+    }
+
+
+@pytest.fixture
+def document() -> dict[str, Any]:
+    points = [point("pymunk", 0.01, 0.1, 2.0), point("pymunk", 0.001, 0.01, 20.0), point("exact", 0.01, 0.0, 30.0)]
+    failed = point("pymunk", 0.1, None, 0.5, "diverged")
+    request = {"metric": "max_position", "unit": "m", "tolerance": 0.02, "budget": 0.5, "fps": 60.0}
+    lines = {"floors": {"pymunk": 0.005}, "pareto": points}
+    return {"title": "$x$ <b>", "points": [*points, failed], **lines, **request}
+
+
+def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
+    (panel,) = draw_tradeoff(document).axes
+    assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
+    fronts = [line for line in panel.lines if line.get_linewidth() == 3.0]
+    assert [list(map(float, front.get_xdata())) for front in fronts] == [[2.0, 20.0, 30.0]]
+    assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 1e-16]  # 0 is drawn at the smallest error
+    horizontal = [float(line.get_ydata()[0]) for line in panel.lines if list(line.get_xdata()) == [0, 1]]
+    assert horizontal == [0.005, 0.02]
+    vertical = [float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]]
+    assert vertical == [30.0]  # 0.5 ms per frame at 60 frames per second
+
+
+def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any]) -> None:
+    (panel,) = draw_tradeoff(document).axes
+    ((x, y),) = [line.get_xydata()[0] for line in panel.lines if line.get_marker() == "x"]
+    assert x == 0.5
+    assert y > 0.1
+
+
+@pytest.mark.parametrize("suffix", [".png", ".svg"])
+def test_file_is_written(document: dict[str, Any], suffix: str, tmp_path: Path) -> None:
+    path = plot_tradeoff(document, tmp_path / f"plot{suffix}")
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+    assert path.stat().st_size > 1000
