@@ -44,9 +44,10 @@ class Checkout:
     """A copy of a repository in which one mutant after another is tested."""
 
     def __init__(self, root: Path, folder: Path) -> None:
-        """Copy a repository, with the times of its files: compiled kernels stay valid by them."""
-        self.root, self.folder = root, folder
-        shutil.copytree(root, folder, ignore=IGNORED, symlinks=True)
+        """Copy a repository, unless it is to be mutated in place."""
+        self.folder = folder
+        if folder != root:
+            shutil.copytree(root, folder, ignore=IGNORED, symlinks=True)
 
     def run(self, tests: list[str], limit: float, **environment: str) -> tuple[str, str]:
         """Run tests until one fails; return "passed", "failed" or "timeout", and the first that failed."""
@@ -78,7 +79,7 @@ class Checkout:
     def keep_kernels(self) -> None:
         """Let compiled kernels stay valid although a module of plain Python beside them has changed."""
         script = "from sandbox.engines.common.kernel import cache_folder; print(cache_folder())"
-        old = max(self.folder.rglob("kernels-*"), key=lambda each: each.stat().st_mtime, default=None)
+        old = max((self.folder / "sandbox").rglob("kernels-*"), key=lambda each: each.stat().st_mtime, default=None)
         found = subprocess.run(
             [sys.executable, "-c", script], cwd=self.folder, capture_output=True, text=True, check=True
         ).stdout
@@ -87,14 +88,15 @@ class Checkout:
             shutil.rmtree(new)
             old.rename(new)
 
-    def test(self, mutant: Mutant, contexts: dict[str, Context]) -> dict[str, Any]:
+    def test(self, mutant: Mutant, contexts: dict[str, Context], only_uncompiled: bool) -> dict[str, Any]:
         """Return the fate of a mutant."""
         file = self.folder / mutant.path
+        original, status = file.read_bytes(), file.stat()
         file.write_text(mutant.source, encoding="utf-8")
         tests = sorted(
             (test for test, context in contexts.items() if context.executes(mutant)), key=lambda t: contexts[t].seconds
         )
-        start = time.monotonic()
+        start, keeps_kernels = time.monotonic(), mutant.kernel is None and "/engines/" in mutant.path
         try:
             fate, killer = "passed", ""
             cheap = [t for t in tests if t.startswith(UNCOMPILED) and contexts[t].seconds < MAX_UNCOMPILED_COST]
@@ -102,13 +104,14 @@ class Checkout:
                 fate, killer = self.run(cheap, 150.0, NUMBA_DISABLE_JIT="1")
                 if "Timeout" in killer or fate == "timeout":
                     fate = "passed"
-            if mutant.kernel is None:
+            if keeps_kernels:
                 self.keep_kernels()
-            if fate == "passed" and tests:
+            if fate == "passed" and tests and not only_uncompiled:
                 fate, killer = self.run(tests, LIMIT)
         finally:
-            shutil.copy2(self.root / mutant.path, file)
-            if mutant.kernel is None:
+            file.write_bytes(original)
+            os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))  # compiled kernels are valid by these times
+            if keeps_kernels:
                 self.keep_kernels()
         return {
             "mutant": mutant.name,
@@ -130,7 +133,9 @@ def main() -> None:
     parser.add_argument("--survivors-of", type=Path, help="test only the mutants that survived in this file")
     parser.add_argument("--count", type=int, default=15, help="mutants of each module")
     parser.add_argument("--modules", nargs="*", default=MODULES, help="mutated modules")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--uncompiled", action="store_true", help="only tests of the engines, without compilation")
+    parser.add_argument("--in-place", action="store_true", help="mutate this checkout, one mutant after another")
+    parser.add_argument("--workers", type=int, default=2, help="copies of the checkout, each with kernels to compile")
     given = parser.parse_args()
     contexts: dict[str, Context] = {}
     for folder in given.contexts:
@@ -152,13 +157,15 @@ def main() -> None:
                 mutant = left.get_nowait()
             except queue.Empty:
                 return
-            row = checkout.test(mutant, contexts)
+            row = checkout.test(mutant, contexts, given.uncompiled)
             print("detected" if row["detected"] else "SURVIVED", row["mutant"], row["by"], sep="  ", flush=True)
             with given.out.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(row) + "\n")
 
     with tempfile.TemporaryDirectory() as work_folder:
-        threads = [threading.Thread(target=work, args=(Path(work_folder) / str(k),)) for k in range(given.workers)]
+        folders = [Path(work_folder) / str(k) for k in range(given.workers)]
+        folders = [given.root.resolve()] if given.in_place else folders
+        threads = [threading.Thread(target=work, args=(folder,)) for folder in folders]
         for thread in threads:
             thread.start()
         for thread in threads:

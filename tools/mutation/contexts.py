@@ -56,7 +56,9 @@ def read_contexts(folder: Path) -> dict[str, Context]:
     """Return the context of each test in a folder of records."""
     found: dict[str, Context] = {}
     for file in sorted(folder.rglob("*.jsonl")):
-        for line in file.read_text(encoding="utf-8").splitlines():
+        for line in file.read_text(encoding="utf-8").splitlines(keepends=True):
+            if not line.endswith("\n"):
+                continue  # the process was killed while it wrote
             row = json.loads(line)
             known = found.get(row["test"], Context(0.0, 0.0, frozenset()))
             hits = known.hits.union((module, at) for module, at in row["hits"])
