@@ -10,7 +10,7 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.advice import Advice, advise, scoring, study
+from sandbox.measure.advice import Advice, advise, scoring
 from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
@@ -242,17 +242,6 @@ def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() ->
     assert advice.present.missed_contacts == 0
     replays = {each.setting: each for each in advice.replays}
     assert (replays["present"].status, replays["present"].missed_contacts) == ("ok", 1)
-
-
-def test_interrupted_advice_keeps_the_present_setting(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(study, "tradeoff", interrupt)
-    advice = advice_of(FLIGHT)
-    assert advice.interrupted
-    assert advice.present.error is not None
-    assert (advice.present.frame_ms, advice.recommended, advice.knobs) == (None, None, ())
 
 
 @pytest.mark.parametrize("name", ["fps", "zoom", "tolerance", "budget", "effort", "time_limit"])

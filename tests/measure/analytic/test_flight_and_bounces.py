@@ -133,20 +133,6 @@ def test_free_flight_under_quadratic_drag_is_refused() -> None:
     assert unsupported_reason(scene_of(BALL, world="linear_drag = 0.1")) is None
 
 
-def test_bounces_from_5_m_have_the_known_times_and_peaks() -> None:
-    first = np.sqrt(2 * 5.0 / G)
-    assert first == pytest.approx(1.0096376, abs=5e-8)  # the digits printed
-    peaks = first + first * np.cumsum([0.8, 0.8 + 0.64, 0.64 + 0.512])
-    height, velocity = bounces(peaks, 5.0, 0.0, G, 0.8)
-    assert height == pytest.approx([3.2, 2.048, 1.31072], rel=1e-14)  # 0.64ⁿ · 5, a few roundings
-    assert velocity == pytest.approx(np.zeros(3), abs=1e-14)  # of speeds near 10 m/s
-    rest_time = first * 1.8 / 0.2
-    assert rest_time == pytest.approx(9.0867380, abs=5e-8)  # the digits printed
-    height, velocity = bounces(np.array([rest_time - 1e-3, rest_time + 1e-9, 1e6]), 5.0, 0.0, G, 0.8)
-    assert height[0] > 0
-    assert height[1:].tolist() == velocity[1:].tolist() == [0.0, 0.0]
-
-
 @given(e=st.floats(0.01, 1.0), height=st.floats(0.0, 100.0), speed=st.floats(-20.0, 20.0), fraction=st.floats(0.0, 1.0))
 @example(e=1.0 - 2.0**-53, height=5.0, speed=0.0, fraction=0.3)
 @example(e=1.0 - 1e-9, height=5.0, speed=-3.0, fraction=0.7)
@@ -182,12 +168,6 @@ def test_bouncing_ball_never_sinks_or_gains_energy(e: float, height: float, spee
     assert np.all(energy <= start * (1 + 1e-12))  # a dozen roundings
     # Energy may rise by the rounding of v − g t after a fall from a great height.
     assert np.all(np.diff(energy) <= 1e-9 * start)
-
-
-def test_elastic_ball_never_comes_to_rest() -> None:
-    period = 2 * np.sqrt(2 * 5.0 / G)
-    height, _ = bounces(np.arange(1000) * period, 5.0, 0.0, G, 1.0)
-    assert height == pytest.approx(np.full(1000, 5.0), rel=1e-12)  # at a peak the error of time enters squared
 
 
 def test_ball_without_restitution_stays_where_it_lands() -> None:
@@ -269,10 +249,6 @@ def test_closed_form_slides_along_a_frictionless_plane() -> None:
     assert form.valid.all()
     assert form.position[:, 0] == pytest.approx(1.0 + 3.0 * time, abs=4e-15)  # two roundings of up to 13 m
 
-    rough = scene_of(GROUND, moving + "friction = 0.5\n")
-    form = closed_form(run_of(rough, time, contacts=hit), rough, 0)
-    assert np.array_equal(form.valid, time < 1.0096376)  # only the free flight to the ground is valid
-
 
 @pytest.mark.parametrize(
     ("world", "ground", "ball"),
@@ -294,14 +270,6 @@ def test_first_flight_is_valid_where_bouncing_has_no_formula(world: str, ground:
     assert np.array_equal(form.valid, above)
 
 
-def test_ball_without_collisions_falls_through_the_ground() -> None:
-    scene = scene_of(GROUND, BALL + 'collides = "none"\n')
-    time = np.linspace(0.0, 3.0, 31)
-    form = closed_form(run_of(scene, time), scene, 0)
-    assert form.valid.all()
-    assert form.position[-1, 1] == pytest.approx(5.5 - 0.5 * G * 9.0, rel=1e-15)  # a few roundings of 44 m
-
-
 def test_bouncing_is_valid_until_contact_with_another_ball() -> None:
     other = BALL.replace('"ball"', '"other"')
     scene = scene_of(GROUND, BALL, other)
@@ -310,19 +278,8 @@ def test_bouncing_is_valid_until_contact_with_another_ball() -> None:
     first, second = (closed_form(run, scene, n) for n in (0, 1))
     assert np.array_equal(first.valid, time < 2.05)
     assert np.array_equal(second.valid, time < 1.55)
-
-
-def test_missed_bounce_does_not_end_validity() -> None:
-    scene = scene_of(GROUND, BALL)
-    form = closed_form(run_of(scene, np.linspace(0, 3, 31), missed=((1.0, (0, -1)),)), scene, 0)
-    assert form.valid.all()
-
-
-def test_closed_form_of_a_resting_ball_stays_at_rest() -> None:
-    scene = scene_of(GROUND, BALL.replace("5.5", "0.5"))
-    form = closed_form(run_of(scene, [0.0, 1.0, 2.0], contacts=((0.0, (0, -1)),)), scene, 0)
-    assert form.position.tolist() == [[1.0, 0.5]] * 3
-    assert form.velocity.tolist() == [[0.0, 0.0]] * 3
+    missed = run_of(scene, time, missed=((1.0, (0, -1)),))
+    assert closed_form(missed, scene, 0).valid.all()
 
 
 def test_closed_form_is_none_for_unsupported_bodies() -> None:

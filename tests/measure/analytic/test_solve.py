@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from sandbox.measure.analytic import solution
-from sandbox.measure.analytic.model import SceneFacts
 from sandbox.measure.analytic.solve import BODY_SOLUTIONS, COUPLED_SOLUTIONS
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.compile.scene import Scene
@@ -74,14 +73,3 @@ def test_crowd_is_rejected_after_one_body_is_examined(scene: Scene, monkeypatch:
     monkeypatch.setattr("sandbox.measure.analytic.solve.COUPLED_SOLUTIONS", tuple(map(counted, COUPLED_SOLUTIONS)))
     assert solution(scene) is None
     assert len(calls) <= len(BODY_SOLUTIONS)
-
-
-def test_anchor_is_the_single_joint_to_a_static_body_in_either_order() -> None:
-    ball = "[[ball]]\nname = 'b'\nposition = [1.0, 0.0]\nradius = 0.1\ncollides = 'none'\n"
-    nail = "[[ball]]\nname = 'n'\nposition = [0.0, 2.0]\nradius = 0.1\nfixed = true\ncollides = 'none'\n"
-    for between in ("'b', 'n'", "'n', 'b'"):
-        facts = SceneFacts.of(scene_of(ball, nail, f"[[joint]]\nkind = 'rod'\nbetween = [{between}]\n"))
-        anchor = facts.anchor(0)
-        assert (anchor.place.tolist(), anchor.arm.tolist()) == ([0.0, 2.0], [0.0, 0.0])
-    loose = nail.replace("fixed = true\n", "")
-    assert SceneFacts.of(scene_of(ball, loose, "[[joint]]\nkind = 'rod'\nbetween = ['b', 'n']\n")).anchor(0) is None

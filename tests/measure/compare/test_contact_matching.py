@@ -68,17 +68,14 @@ def test_missing_and_extra_contacts_are_named() -> None:
     ]
 
 
-def test_contacts_of_different_pairs_do_not_match() -> None:
+@pytest.mark.parametrize(
+    ("pair", "steps", "kinds"),
+    [((0, -1), 9, ["matched"]), ((0, -1), 11, ["missed", "phantom"]), ((1, -1), 0, ["missed", "phantom"])],
+)
+def test_contact_of_another_pair_or_delayed_too_long_is_missed_and_phantom(pair, steps, kinds):
     truth = run_of(SCENE, contacts=[(0.5, (0, -1), -1.0)])
-    run = run_of(SCENE, contacts=[(0.5, (1, -1), -1.0)])
-    assert [e.kind for e in match_contacts(run, truth, SCENE, DT, TOLERANCE, 2.0)] == ["missed", "phantom"]
-
-
-def test_contact_delayed_too_long_is_missed_and_phantom() -> None:
-    truth = run_of(SCENE, contacts=[(0.5, (0, -1), -1.0)])
-    near, far = (run_of(SCENE, contacts=[(0.5 + n * DT, (0, -1), -1.0)]) for n in (9, 11))
-    assert [e.kind for e in match_contacts(near, truth, SCENE, DT, TOLERANCE, 2.0)] == ["matched"]
-    assert [e.kind for e in match_contacts(far, truth, SCENE, DT, TOLERANCE, 2.0)] == ["missed", "phantom"]
+    run = run_of(SCENE, contacts=[(0.5 + steps * DT, pair, -1.0)])
+    assert [e.kind for e in match_contacts(run, truth, SCENE, DT, TOLERANCE, 2.0)] == kinds
 
 
 def test_contacts_beyond_the_end_do_not_count() -> None:

@@ -33,7 +33,3 @@ def test_single_needed_item_of_many_is_found_in_few_calls() -> None:
     calls = []
     assert ddmin(range(1024), lambda kept: calls.append(kept) or 700 in kept) == (700,)
     assert len(calls) <= 2 * 10 + 1
-
-
-def test_result_is_empty_if_no_item_is_needed() -> None:
-    assert ddmin("abc", lambda _: True) == ()

@@ -1,12 +1,9 @@
 """Refined truths end where a second method contradicts them, or where they violate a conservation law."""
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import pytest
 
-from sandbox.engines import registry
-from sandbox.engines.contract import Simulation
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.measure.compare import compare
 from sandbox.measure.compare import ground_truth as witness
@@ -16,6 +13,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, loads
+from tests.measure.compare.altered_engines import AlteredPymunk, install
 
 pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
 
@@ -38,37 +36,9 @@ IMPACT_TIME = 0.129**0.5
 TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True)
-class AlteredPymunk:
-    """pymunk with an altered world: it converges, but to a different result."""
-
-    gravity: float = 1.0
-    """a factor"""
-    restitution: float = 1.0
-    """likewise"""
-    name: str = "another"
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(PymunkEngine(), name)
-
-    def start(self, start: Scene | Setup, settings: Settings | None = None) -> Simulation:
-        setup = Setup.of(start)
-        scene = setup.scene
-        world = scene.world.model_copy(update={"gravity": tuple(self.gravity * g for g in scene.world.gravity)})
-        balls = tuple(
-            b.model_copy(update={"restitution": self.restitution * (b.restitution or 0.0)}) for b in scene.balls
-        )
-        changed = replace(setup, scene=scene.model_copy(update={"world": world}))
-        return PymunkEngine().start(replace(changed, bodies=replace(setup.bodies, elements=balls)), settings)
-
-
-def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
-    """Leave only these engines in the registry, and disable closed forms."""
+@pytest.fixture(autouse=True)
+def _no_closed_forms(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sandbox.measure.compare.ground_truth.solution", lambda _: None)
-    for name in [*reversed(registry.ENGINES)]:  # restored in reverse order: that of the registry
-        monkeypatch.delitem(registry.ENGINES, name)
-    for name, engine in engines.items():
-        monkeypatch.setitem(registry.ENGINES, name, engine)
 
 
 def test_two_engines_that_agree_confirm_each_other(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -118,9 +118,3 @@ def test_closed_form_of_a_falling_box_is_valid_until_a_corner_touches() -> None:
     last = form.valid.nonzero()[0][-1] * 0.001
     # It falls until its centre is half a diagonal above the ground: ½·10·t² = 3 − √½.
     assert last == pytest.approx(math.sqrt((3.0 - math.sqrt(0.5)) / 5.0), abs=0.0011)  # a step
-    free = loads(
-        "[world]\ngravity = [0, -10]\nduration = 1.0\n"
-        "[[box]]\nname = 'b'\nposition = [0, 3]\nsize = [1, 1]\nangular_velocity = 2.0\n"
-    )
-    whole = solved_run(free, free.solver)
-    assert whole.angle[-1, 0] == pytest.approx(2.0, rel=1e-15)  # a product

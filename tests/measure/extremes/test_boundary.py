@@ -143,13 +143,10 @@ def test_change_is_described_in_one_line() -> None:
     [
         ("", "cannot be read"),
         ("[1, 2]", "contains no boundaries"),
-        ('{"limits": [{"axis": "speed"}]}', "contains no boundaries"),
         ('{"limits": [{"axis": "a", "setup": "b", "limit": "x", "first_failure": null}]}', "is not a number"),
         ('{"limits": [{"axis": [], "setup": "b", "limit": 1, "first_failure": null}]}', "contains no boundaries"),
-        ('{"limits": [{"axis": "a", "setup": {}, "limit": 1, "first_failure": null}]}', "contains no boundaries"),
         ('{"limits": [{"axis": "a", "setup": "b", "limit": true, "first_failure": null}]}', "is not a number"),
         ('{"limits": [{"axis": "a", "setup": "b", "limit": NaN, "first_failure": null}]}', "is not a number"),
-        ('{"limits": [{"axis": "a", "setup": "b", "limit": 1e999, "first_failure": null}]}', "is not a number"),
         (
             f'{{"limits": [{{"axis": "a", "setup": "b", "limit": 1{"0" * 400}, "first_failure": 0}}]}}',
             "is not a number",

@@ -7,7 +7,7 @@ import pytest
 
 import sandbox
 from sandbox.measure.compare.reductions import expand_generators
-from sandbox.measure.metrics.clearance import clearance, hull_distance, plane_clearance, posed_pieces
+from sandbox.measure.metrics.clearance import clearance, hull_distance, plane_clearance
 from sandbox.measure.metrics.contacts import are_collisions, collisions, share_layer
 from sandbox.measure.metrics.invariants import momentum_drift
 from sandbox.scene.files.load import from_document, loads
@@ -74,13 +74,6 @@ def test_touching_hulls_have_distance_zero_and_crossing_ones_a_negative_one() ->
     assert hull_distance(cross, np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [-0.5]
     assert hull_distance(np.array([[[0.5, 0.25]]]), square).tolist() == [-0.25]
     assert hull_distance(np.array([[[2.0, 0.0]]]), np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [1.0]
-
-
-def test_pieces_rotate_with_their_body() -> None:
-    index = SCENE.bodies.names.index("rod")
-    ((corners, radius),) = posed_pieces(SCENE.bodies, index, np.array([[1.0, 2.0]]), np.array([math.pi / 2]))
-    assert radius == 0.25
-    assert corners[0] == pytest.approx(np.array([[1.0, 1.0], [1.0, 3.0]]), abs=1e-15)  # cosine of a right angle
 
 
 def test_gap_is_the_distance_of_the_centre_from_the_zone() -> None:

@@ -1,5 +1,7 @@
 """Energies against hand-computed joules."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
+from tests.runs_by_hand import run_of
 
 BALLS = """
 [world]
@@ -36,21 +39,9 @@ fixed = true
 def resting_run(scene: Scene, frames: int = 4, **changes: object) -> Trajectory:
     """Return a run in which every body keeps its initial state, except for the given changes."""
     bodies = scene.bodies
-    arrays = {
-        "time": np.arange(frames, dtype=float),
-        "position": np.tile(bodies.position, (frames, 1, 1)),
-        "velocity": np.tile(bodies.velocity, (frames, 1, 1)),
-        "angle": np.tile(bodies.angle, (frames, 1)),
-        "angular_velocity": np.tile(bodies.angular_velocity, (frames, 1)),
-        "names": np.asarray(bodies.names, dtype=str),
-        "contact_time": np.empty(0),
-        "contact_pair": np.empty((0, 2), np.int64),
-        "retired_time": np.full(len(bodies), np.nan),
-        "missed_time": np.empty(0),
-        "missed_pair": np.empty((0, 2), np.int64),
-    }
-    arrays |= {f"contact_{name}": np.empty((0, 2)) for name in ("point", "normal", "impulse")}
-    return Trajectory(**{**arrays, **changes})
+    velocity = np.tile(bodies.velocity, (frames, 1, 1))
+    turned = {name: np.tile(getattr(bodies, name), (frames, 1)) for name in ("angle", "angular_velocity")}
+    return replace(run_of(scene, time=np.arange(frames, dtype=float), velocity=velocity), **(turned | changes))
 
 
 def test_energies_are_summed_over_moving_bodies() -> None:

@@ -69,6 +69,9 @@ def test_common_frames_of_different_steps_are_those_of_equal_time() -> None:
     assert its.tolist() == list(range(21))
     mine, its = common_frames(run_of(SCENE, time=np.arange(7) * 0.3), truth)
     assert its.tolist() == list(range(0, 19, 3))
+    for shift, count in ((9e-8, 21), (-9e-8, 21), (1.1e-7, 0)):  # a millionth of the interval is 1e-7 s
+        _, its = common_frames(run_of(SCENE, time=truth.time + shift), truth)
+        assert its.tolist() == list(range(count))
 
 
 def test_run_without_frames_has_no_score() -> None:

@@ -73,11 +73,7 @@ def test_path_crosses_only_within_the_segment():
     assert crosses(*rows((-1.0, 0.0), (1.0, 0.5)), tail, along)[0]
     assert not crosses(*rows((-1.0, 1.5), (1.0, 1.5)), tail, along)[0]
     assert not crosses(*rows((-1.0, 0.0), (-0.5, 0.0)), tail, along)[0]
-
-
-def test_path_that_ends_on_the_line_does_not_cross():
-    tail, along = rows((0.0, -1.0), (0.0, 2.0))
-    assert not crosses(*rows((-1.0, 0.0), (0.0, 0.0)), tail, along)[0]
+    assert not crosses(*rows((-1.0, 0.0), (0.0, 0.0)), tail, along)[0]  # it ends on the line
 
 
 def test_path_through_a_joint_crosses_at_least_one_segment():

@@ -60,7 +60,7 @@ def test_box2d_rounds_positions_to_32_bits() -> None:
 
 @given(st.floats(1.0, 1e6), st.floats(1e-3, 1.0), st.floats(0.0, 1.0), st.floats(1e-6, 10.0), st.integers(1, 9))
 def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(v, r, w, dt, substeps):
-    """The values of the odds are tested below, by flights with random phases."""
+    """Flights with random phases agree with the odds: `tests/laws/test_tunnelling.py`."""
     scene = bullet(v, r, w, f"dt = {dt!r}\nsubsteps = {substeps}")
     (passage,) = tunnelling_risks(scene)
     safe = largest_safe_dt(scene)
@@ -75,35 +75,6 @@ def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(v, r, w, dt, s
         assert (warning.details["odds"], warning.details["safe_dt"]) == (passage.odds(h), safe)
 
 
-# `COUNT` bullets fly side by side at a wall, each from its own distance: random phases.
-COUNT = 200
-
-
-def volley(seed: int, thing: str, dt: float) -> tuple[int, int]:
-    """Return how many bullets the audit reports as missed, and how many have contacts in the engine."""
-    scene = loads(
-        f"[world]\nduration = 0.5\nseed = {seed}\n[solver]\ndt = {dt!r}\n{thing}\n"
-        f'[[grid]]\nname = "b"\norigin = [-6.0, 0.0]\ncolumns = 1\nrows = {COUNT}\nspacing = [1.0, 1.0]\njitter = 0.3\n'
-        'velocity = [20.0, 0.0]\nradius = 0.05\ncollides = "fixed"\n'
-    )
-    result = run(scene)
-    return len(np.unique(result.missed_pair[:, 0])), len(np.unique(result.contact_pair[:, 0]))
-
-
-@pytest.mark.parametrize("seed", [1, 2, 3])
-@pytest.mark.parametrize("thickness", [0.0, 0.1])
-def test_bullets_miss_a_wall_only_above_the_safe_step(seed: int, thickness: float) -> None:
-    wall = f"[[wall]]\npoints = [[0, -5], [0, {COUNT + 5}]]\nthickness = {thickness}\n"
-    safe = largest_safe_dt(bullet(20.0, 0.05, thickness))
-    assert volley(seed, wall, 0.99 * safe) == (0, COUNT)
-    for factor in (1.2, 2.0):
-        missed, touched = volley(seed, wall, factor * safe)
-        assert missed + touched >= COUNT
-        odds = 1 - 1 / factor
-        # Five standard deviations of a binomial count: one seed in a million fails, and these seeds are fixed.
-        assert missed == pytest.approx(COUNT * odds, abs=5 * math.sqrt(COUNT * odds * (1 - odds)))
-
-
 def test_tunnelling_of_two_balls_depends_on_closing_speed_and_both_radii() -> None:
     scene = loads(
         '[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [30, 0]\nradius = 0.1\n'
@@ -113,9 +84,7 @@ def test_tunnelling_of_two_balls_depends_on_closing_speed_and_both_radii() -> No
     # Nothing else can turn them round: they approach at 40 m/s, and touch at the sum of their radii.
     assert (passage.speed, passage.reach) == (40.0, 0.4)
     (warning,) = warnings(scene, scene.solver.replace(dt=0.02))
-    assert warning.kind == "tunnelling"
-    assert warning.message.startswith("'a' can approach another ball at up to 40 m/s, 0.8 m per substep")
-    assert warning.message.endswith("odds up to 50 %; dt <= 0.01 s is safe")
+    assert (warning.kind, warning.details["odds"], warning.details["safe_dt"]) == ("tunnelling", 0.5, 0.01)
 
 
 def test_each_body_at_risk_is_named_with_its_own_speed() -> None:
@@ -124,7 +93,6 @@ def test_each_body_at_risk_is_named_with_its_own_speed() -> None:
         text += f"[[ball]]\nname = {name!r}\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n"
     found = [w for w in warnings(loads(text)) if w.details["thing"] == "w"]
     assert [(w.details["ball"], w.details["speed"]) for w in found] == [("fast", 60.0), ("middle", 25.0)]
-    assert found[0].message.startswith("'fast' can approach 'w' at up to 60 m/s, 0.6 m per substep")
 
 
 def test_impact_speed_on_a_floor_wall_is_that_of_the_fall() -> None:
@@ -205,6 +173,8 @@ def test_posts_planes_and_fixed_balls_have_individual_depths() -> None:
     )
     assert {p.thing: p.reach for p in tunnelling_risks(scene)} == {"p": 1000.5, "q": 0.75, "f": 1.25}
     assert largest_safe_dt(scene) == 0.075
+    (passage,) = tunnelling_risks(loads(FENCE + BOX.format(y=9) + "velocity = [30, 0]\n"))
+    assert passage.reach == 1.1  # half the smaller side of the box, and half the thickness of the wall
 
 
 @settings(max_examples=30)  # each example is a run
@@ -341,13 +311,6 @@ def test_spring_near_the_limit_of_the_scheme_is_warned_of(omega_h: float, is_war
         assert warnings(spring_scene(omega_h), spring_scene(1.0).solver.replace(dt=0.99 * 0.015 / omega_h)) == []
 
 
-@pytest.mark.parametrize(("omega_h", "bounded"), [(1.99, True), (2.01, False)])
-def test_spring_limit_is_that_of_pymunk(omega_h: float, bounded: bool) -> None:
-    amplitude = np.abs(run(spring_scene(omega_h), audit=False).position[:, 0, 0] - 1.0).max()
-    # From 1 mm: stable, it grows by 1/√(1 − ωh/2) = 14 at most; else by e^(2·acosh(ωh/2)) in each of 500 steps.
-    assert (amplitude < 0.02) == bounded
-
-
 def test_chain_of_springs_oscillates_twice_as_fast_as_one() -> None:
     (warning,) = warnings(spring_scene(0.99, count=40))
     # The highest mode of 40 balls fixed at one end: 2 ω·cos(π/(2·40 + 1)).
@@ -372,10 +335,6 @@ def test_explicit_euler_is_warned_of_its_growth_unless_damped() -> None:
     euler = "integrator = 'explicit_euler'"
     (warning,) = warnings(spring_scene(0.1, euler))
     assert warning.details["growth"] == pytest.approx((1.0 + 0.01) ** 50, rel=1e-9)  # rounding in a power
-    found = run(spring_scene(0.1, euler), "reference", audit=False)
-    growth = np.abs(found.position[-100:, 0, 0] - 1.0).max() / 0.001
-    # Growth after 4 to 5 s, of the last second; a maximum of the oscillation of 0.63 s lies within a step of 0.06 rad.
-    assert 1.01**200 * 0.99 < growth < 1.01**250 * 1.01
     # |R| = 1 at c = k·h.
     assert warnings(spring_scene(0.1, euler, damping=1.001)) == []
     assert len(warnings(spring_scene(0.1, euler, damping=0.9))) == 1
@@ -413,6 +372,9 @@ def test_iterations_needed_for_a_chain_agree_with_measurements(links: int) -> No
 @pytest.mark.parametrize(("links", "load"), [(20, 1.0), (2, 100.0), (5, 100.0)])
 def test_chain_holds_or_breaks_as_predicted(links: int, load: float, fraction: float, holds: bool) -> None:
     found = [w for w in warnings(chain(links, load, "dt = 0.005\niterations = 1")) if w.kind in ("chain", "mass_ratio")]
+    if load > 1.0:
+        joint, ratio = found[0].details["joint"], found[0].details["ratio"]
+        assert (found[0].kind, joint, ratio) == ("mass_ratio", f"j{links}", 100.0)
     iterations = fraction * float(found[0].details["needed"]) * 0.005
     solver = f"dt = {0.005 * math.ceil(iterations) / iterations!r}\niterations = {math.ceil(iterations)}"
     scene = chain(links, load, solver)
@@ -420,12 +382,6 @@ def test_chain_holds_or_breaks_as_predicted(links: int, load: float, fraction: f
     error = run(scene, audit=False).info["joint_error"]
     # Torn apart, the error is half a link or more; else it is the stretch by the fall in one step, a few percent.
     assert (error < 0.25) == holds
-
-
-def test_chain_torn_by_its_load_is_warned_of_as_mass_ratio() -> None:
-    (warning,) = warnings(chain(3, 100.0, "dt = 0.016666\niterations = 10"))
-    assert (warning.kind, warning.details["joint"], warning.details["ratio"]) == ("mass_ratio", "j3", 100.0)
-    assert warning.message.startswith("the joint 'j3' connects 'b2' and 'b3', one of which is 100 times as heavy")
 
 
 @pytest.mark.parametrize("method", ["relaxation", "xpbd", "rattle"])
@@ -527,16 +483,13 @@ def test_overlap_with_a_fixed_shape_is_warned_of_with_its_depth(body: str, thing
 
 
 @pytest.mark.parametrize(
-    "more", ["fixed = true\n", 'collides = "none"\n', 'layer = "up"\n'], ids=["fixed", "passing", "on another layer"]
-)
-def test_body_without_collisions_may_overlap_fixed_shapes(more: str) -> None:
+    ("wall", "ball"),
+    [("", "fixed = true\n"), ("", 'collides = "none"\n'), ("", 'layer = "up"\n'), ("solid = false\n", ""),
+     ("one_way = true\n", "")],
+)  # fmt: skip
+def test_body_that_a_wall_does_not_stop_may_overlap_it(wall: str, ball: str) -> None:
     other = "[[zone]]\nposition = [9, 9]\nradius = 0.1\nto_layer = 'up'\n"
-    assert kinds("[world]\nduration = 0.01\n" + FENCE + BALL.format(y=0.4) + more + other) == []
-
-
-def test_body_may_overlap_sensor_and_one_way_walls() -> None:
-    for passing in ("solid = false\n", "one_way = true\n"):
-        assert kinds("[world]\nduration = 0.01\n" + FENCE + passing + BALL.format(y=0.4)) == []
+    assert kinds("[world]\nduration = 0.01\n" + FENCE + wall + BALL.format(y=0.4) + ball + other) == []
 
 
 def test_deepest_overlap_among_bodies_and_fixed_shapes_is_named() -> None:
@@ -545,15 +498,6 @@ def test_deepest_overlap_among_bodies_and_fixed_shapes_is_named() -> None:
     assert warning.details["pairs"] == 5
     assert (warning.details["first"], warning.details["second"]) == ("a", "ground")
     assert warning.details["depth"] == pytest.approx(1.5, rel=1e-12)
-
-
-def test_tunnelling_reach_of_a_box_is_its_half_width() -> None:
-    scene = loads(
-        "[[wall]]\nname = 'w'\npoints = [[5, -1], [5, 1]]\nthickness = 0.1\n"
-        "[[box]]\nname = 'b'\nposition = [0, 0]\nvelocity = [30, 0]\nsize = [2.0, 0.5]\n"
-    )
-    (passage,) = tunnelling_risks(scene)
-    assert passage.reach == pytest.approx(0.25 + 0.05, rel=1e-15)  # a sum
 
 
 def test_speed_of_a_pendulum_is_bounded_by_its_length() -> None:
@@ -601,22 +545,13 @@ def test_first_order_flight_is_noted_with_its_error() -> None:
     )
     (note,) = [each for each in notes(scene) if each.kind == "flight"]
     assert note.details == {"body": "b", "error": pytest.approx(0.5 * 10 * 0.08 * 2.0, rel=1e-12)}  # rounding of a root
-    falling = loads(
-        "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[ball]]\nposition = [0, 0]\nradius = 1\n"
-    )
-    error = run(falling, audit=False).position[-1, 0, 1] + 0.5 * 10 * 2.0**2
-    assert error == pytest.approx(float(note.details["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
     exact = scene.model_copy(update={"solver": scene.solver.replace(integrator="velocity_verlet", detection="bisect")})
     assert "flight" not in [each.kind for each in notes(exact)]
 
 
-BALL_ABOVE = {"position": [0, 1], "radius": 0.5}
-
-
 def test_settings_are_noted_by_their_names_in_pymunk_with_its_defaults_where_they_differ() -> None:
-    scene = from_document(
-        {"ball": [{"position": [0, 1], "radius": 0.5}], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
-    )
+    table = {"ball": [{"position": [0, 1], "radius": 0.5}], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
+    scene = from_document(table)
     (note,) = (each for each in notes(scene, "pymunk") if each.kind == "pymunk")
     assert "space.collision_slop = 0.005 (pymunk's default: 0.1)" in note.message
     assert "space.iterations = 10, " in note.message  # the same in pymunk
@@ -624,12 +559,9 @@ def test_settings_are_noted_by_their_names_in_pymunk_with_its_defaults_where_the
     for name in ("iterations", "collision_bias", "collision_persistence"):
         assert note.details[name] == pytest.approx(getattr(space, name), rel=1e-5)  # pymunk rounds to 32 bits
     assert not [each for each in notes(scene) if each.kind == "pymunk"]
-
-
-def test_slop_that_is_large_for_the_bodies_is_noted_on_any_engine() -> None:
-    table = {"ball": [BALL_ABOVE], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
+    # A slop that is large for the bodies is noted on any engine.
     (note,) = (each for each in notes(from_document({**table, "solver": {"slop": 0.1}})) if each.kind == "pymunk")
-    assert "overlap by 20 % of the narrowest half width" in note.message
+    assert "20 %" in note.message
 
 
 @pytest.mark.parametrize("stiffness", [5e6, 1e30])

@@ -28,7 +28,6 @@ GAS = (
     "radius = 0.05\norigin = [-0.8, 0.8]\ncolumns = 4\nrows = 2\nspacing = [0.4, 0.3]\nvelocity_jitter = 1.0\n"
     "restitution = 0.9\nfriction = 0.2\n[[ball]]\nname = 'anchor'\nposition = [0.0, 2.0]\nradius = 0.1\nfixed = true\n"
 )
-FLIGHT = "[world]\ngravity = [0, -9.81]\nduration = 2.0\n[[ball]]\nname = 'shell'\nposition = [0, 0]\nradius = 0.1\n"
 BOXES = (
     "[world]\ngravity = [0, -5]\nduration = 0.6\nlinear_drag = 0.1\n[solver]\ndt = 0.01\n" + BOX + "[[box]]\n"
     "name = 'ship'\nposition = [0, 0.5]\nsize = [0.3, 0.2]\n[[box]]\nposition = [0.1, 1.2]\nsize = [0.2, 0.2]\n"
@@ -56,14 +55,23 @@ def single_run(scene: Scene, engine: str, seed: int, vary: dict[str, float], m: 
     return sandbox.run(varied, engine, audit=False, **changes)
 
 
-@pytest.mark.parametrize("engine", ["exact", "reference", "pymunk"])
+VARY = {"ball.*.velocity": 0.5, "grid.atom.position": 0.01, "ball.*.angular_velocity": 0.3}
+TURN = {"*.*.velocity": 0.5, "*.*.angle": 0.2, "*.*.angular_velocity": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("engine", "text", "vary"),
+    [("exact", GAS, VARY), ("reference", GAS, VARY), ("pymunk", GAS, VARY), ("reference", BOXES, TURN),
+     ("reference", PENDULUM, TURN)],
+    ids=["exact", "reference", "pymunk", "boxes", "pendulum"],
+)  # fmt: skip
 @settings(max_examples=5)
 @given(seed=st.integers(0, 2**40), duration=st.sampled_from([0.005, 0.3, 0.7351]))
-def test_every_run_is_an_ordinary_run(engine: str, seed: int, duration: float) -> None:
-    scene = loads(GAS)
+def test_every_run_is_an_ordinary_run(engine, text, vary, seed, duration):
+    scene = loads(text)
     scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
-    vary = {"ball.*.velocity": 0.5, "grid.atom.position": 0.01, "ball.*.angular_velocity": 0.3}
     found = sandbox.ensemble(scene, 4, vary=vary, engine=engine, seed=seed)
+    assert vary is VARY or duration != 0.3 or found.compiled.all() == COMPILED  # of whole steps
     for m in range(4):
         expected = single_run(scene, engine, seed, vary, m)
         assert found.status[m] == expected.status
@@ -72,19 +80,6 @@ def test_every_run_is_an_ordinary_run(engine: str, seed: int, duration: float) -
                 assert getattr(found, name)[m].tobytes() == getattr(expected, name)[-1].tobytes(), name
         else:
             assert np.isnan(found.position[m]).all()
-
-
-@pytest.mark.parametrize("text", [BOXES, PENDULUM], ids=["boxes", "pendulum"])
-@settings(max_examples=5)
-@given(seed=st.integers(0, 2**40))
-def test_every_run_of_boxes_and_joints_is_an_ordinary_run(text: str, seed: int) -> None:
-    scene, vary = loads(text), {"*.*.velocity": 0.5, "*.*.angle": 0.2, "*.*.angular_velocity": 1.0}
-    found = sandbox.ensemble(scene, 3, vary=vary, engine="reference", seed=seed)
-    assert found.compiled.all() == COMPILED
-    for m in range(3):
-        expected = single_run(scene, "reference", seed, vary, m)
-        for name in FIELDS:
-            assert getattr(found, name)[m].tobytes() == getattr(expected, name)[-1].tobytes(), name
 
 
 @pytest.mark.parametrize("engine", ["exact", "reference"])
@@ -119,20 +114,6 @@ def test_frames_and_contacts_are_those_of_the_runs() -> None:
         assert with_contacts.contact_pair[of_run].tobytes() == expected.contact_pair.tobytes()
         assert with_contacts.contact_impulse[of_run].tobytes() == expected.contact_impulse.tobytes()
     assert with_frames.time.tolist() == expected.time.tolist()
-
-
-@pytest.mark.parametrize("engine", ["exact", "reference"])
-def test_spread_in_free_flight_has_its_closed_form(engine: str) -> None:
-    """Independent errors of position and velocity: σ² = σ_x² + (σ_v T)² after a time T, in each direction."""
-    count, position, velocity, duration = 4000, 0.3, 0.2, 2.0
-    vary = {"ball.shell.position": position, "ball.shell.velocity": velocity}
-    found = sandbox.ensemble(loads(FLIGHT), count, vary=vary, engine=engine)
-    expected = math.hypot(position, velocity * duration)
-    # The deviation of a sample of n has the relative error 1/√(2n) = 1.1 %, here of two independent components.
-    np.testing.assert_allclose(found.position[:, 0].std(axis=0), expected, rtol=5 / math.sqrt(2 * count))
-    mean_error = 5 * expected / math.sqrt(count)
-    np.testing.assert_allclose(found.position[:, 0, 0].mean(), 0.0, atol=mean_error)
-    assert "4,000 runs" in repr(found)
 
 
 def test_starts_are_normally_distributed_and_independent() -> None:

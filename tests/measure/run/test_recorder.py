@@ -4,21 +4,19 @@ import math
 import re
 import subprocess
 import sys
-from decimal import Decimal
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.contract import Exhaustion
 from sandbox.measure.run import recorder
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.measure.run.recorder import Recorder, TooLargeError, bytes_per_frame, recorded_frames
-from sandbox.resource_limits import FREE_FRACTION, free_memory
+from sandbox.resource_limits import FREE_FRACTION
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings, World
-from sandbox.scene.files.load import loads
 from sandbox.schedule import frame_count
 from sandbox.trajectory import Frame
 from tests.runs_by_hand import DROP, scene_of
@@ -26,15 +24,6 @@ from tests.runs_by_hand import DROP, scene_of
 
 def scene_lasting(duration: float) -> Scene:
     return Scene(world=World(duration=duration))
-
-
-@given(st.integers(1, 10**6), st.integers(1, 9999), st.integers(-6, 0))
-@example(3, 1, -1)  # 0.3 / 0.1 = 2.9999999999999996
-def test_duration_of_whole_steps_has_no_partial_step(steps: int, digits: int, power: int) -> None:
-    dt = Decimal(digits).scaleb(power)
-    if not Decimal("1e-9") <= dt <= 10:
-        dt = Decimal("0.01")
-    assert frame_count(scene_lasting(float(steps * dt)), Settings(dt=float(dt))) == (steps, 0.0)
 
 
 @given(st.floats(1e-300, 1e9), st.floats(1e-9, 10.0))
@@ -80,25 +69,11 @@ def test_error_if_two_frames_do_not_fit_asks_for_fewer_bodies(monkeypatch: pytes
         Recorder(scene_lasting(1.0), Settings(), 1000)
 
 
-def test_message_states_needed_and_available_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recorder, "free_memory", lambda: int(1e9))
-    with pytest.raises(TooLargeError) as caught:
-        Recorder(scene_lasting(1.0), Settings(dt=1e-8, record_every=2), 1)
-    assert str(caught.value) == (
-        "50,000,001 frames of 1 body take 2.8 GB, but only 0.6 GB are available; "
-        "solver.record_every = 10 would fit (now 2)"
-    )
-
-
 def test_energy_account_counts_as_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: int(200 * 56 / FREE_FRACTION))
     assert recorder.require_memory(scene_lasting(1.0), Settings(), 1) == 101
     with pytest.raises(TooLargeError, match="record_every"):
         recorder.require_memory(scene_lasting(1.0), Settings(), 1, causes=13)
-
-
-def test_free_memory_is_a_positive_number_of_bytes() -> None:
-    assert 2**20 < free_memory() < 2**60
 
 
 def test_free_memory_is_within_the_limit_of_address_space() -> None:
@@ -135,12 +110,6 @@ def test_frame_at_an_early_end_is_recorded_once() -> None:
     assert recording.arrays(1)["time"].tolist() == [0.0, 0.01]
 
 
-def test_scene_without_bodies_has_frames() -> None:
-    recording = Recorder(loads('title = "Nobody"'), Settings(), 0)
-    recording.record(frame_at(0.0, 0))
-    assert recording.arrays(0)["position"].shape == (1, 0, 2)
-
-
 def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
     recording = Recorder(scene_lasting(0.05), Settings(), 1)
     for k, count in enumerate((1, 1, 5, 6)):
@@ -153,18 +122,10 @@ def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: 
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
-def test_counted_cost_is_reproducible_and_grows_with_the_steps(engine: str) -> None:
-    scene = scene_of(DROP)
-    (_, once), (_, again) = (bounded_run(scene, engine, scene.solver, math.inf) for _ in range(2))
-    _, finer = bounded_run(scene, engine, scene.solver.replace(dt=0.005), math.inf)
-    assert once == again > 0.0
-    assert 2.0 * once < finer
-
-
-@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
 def test_run_beyond_the_work_limit_is_stopped_on_any_machine(engine: str) -> None:
     scene = scene_of(DROP)
     found, counted = bounded_run(scene, engine, scene.solver, math.inf)
+    assert 0.0 < 2.0 * counted < bounded_run(scene, engine, scene.solver.replace(dt=0.005), math.inf)[1]
     again, _ = bounded_run(scene, engine, scene.solver, counted)
     assert again.info["state_hash"] == found.info["state_hash"]
     with pytest.raises(RunTimeoutError, match="counted work"):

@@ -60,18 +60,6 @@ def test_contacts_are_recorded_as_without_a_game() -> None:
         assert alone.info["state_hash"] == game.trajectory.info["state_hash"]
 
 
-def test_frames_include_bodies_spawned_by_the_rules() -> None:
-    game = play_out(toy_scene(duration=6.0), "none")
-    run_of = game.trajectory
-    spawned = [action for action in game.recording.actions if action.kind == "spawn"]
-    assert len(spawned) >= 2
-    assert run_of.position.shape[1] == 1 + len(spawned)
-    for k, action in enumerate(spawned, start=1):
-        present = np.isfinite(run_of.position[:, k, 0])
-        assert (run_of.time[present] > action.time).all()
-        assert (run_of.time[~present] <= action.time).all()
-
-
 class Short(Toy):
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)

@@ -165,19 +165,12 @@ def test_ball_collisions_are_kept_if_balls_collide_in_a_second_scene(monkeypatch
     assert not [each for each in proposed(monkeypatch, SEPARATE, colliding, tolerance=10.0) if "fixed" in each.what]
 
 
-def test_only_negligible_damping_can_be_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
-    document = DROP.replace("duration = 0.4", "duration = 0.2\ndamping = {}")
-    weak, strong = (proposed(monkeypatch, document.format(each), tolerance=2e-3) for each in ("0.9999", "0.01"))
-    assert "no damping" in [each.what for each in weak]
-    assert "no damping" not in [each.what for each in strong]
-
-
-def test_only_negligible_drag_can_be_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
-    weak, strong = (proposed(monkeypatch, DRAGGED.format(drag), tolerance=2e-3) for drag in ("1e-4", "5.0"))
-    assert "no drag" in [each.what for each in weak]
-    assert "no drag" not in [each.what for each in strong]
-    (sentence,) = [each.sentence for each in weak if each.what == "no drag"]
-    assert sentence.startswith("the scene can also be simulated without drag: max_position ")
+@pytest.mark.parametrize(("key", "weak", "strong"), [("linear_drag", "1e-4", "5.0"), ("damping", "0.9999", "0.01")])
+def test_only_negligible_losses_can_be_omitted(key: str, weak: str, strong: str, monkeypatch) -> None:
+    without = f"no {key.removeprefix('linear_')}"
+    for value, is_negligible in ((weak, True), (strong, False)):
+        found = proposed(monkeypatch, DRAGGED.format(value).replace("linear_drag", key), tolerance=2e-3)
+        assert (without in [each.what for each in found]) == is_negligible
 
 
 def test_closed_form_is_proposed_first(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -194,13 +187,10 @@ def test_nothing_beyond_the_tolerance_is_proposed(monkeypatch: pytest.MonkeyPatc
             assert all(each.error <= tolerance for each in proposed(monkeypatch, text, tolerance=tolerance))
 
 
-def test_simplification_that_is_no_cheaper_is_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simplification_that_is_no_cheaper_or_not_measured_is_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert proposed(monkeypatch, SEPARATE, tolerance=10.0, metric="joint_error") == []
     monkeypatch.setattr(module, "MAX_COST_RATIO", 0.0)
     assert proposed(monkeypatch, SEPARATE, tolerance=10.0) == []
-
-
-def test_undefined_metric_yields_no_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert proposed(monkeypatch, SEPARATE, tolerance=10.0, metric="joint_error") == []
 
 
 def test_scene_without_removable_features_has_no_proposals(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -120,16 +120,10 @@ def test_scene_without_random_parts_has_one_seed() -> None:
 
 
 def test_refused_engine_is_a_point_with_its_reason() -> None:
-    found = study(scene_of(SWING), "pymunk", "exact", most=2)
-    (refused,) = [point for point in found.points if point.engine == "exact"]
-    assert refused.status == "refused"
-    assert "rod" in (refused.reason or "")
-    assert (refused.error, refused.cost) == (None, None)
-
-
-def test_study_without_a_suitable_engine_has_an_answer() -> None:
     found = study(scene_of(SWING), "exact")
-    assert [point.status for point in found.points] == ["refused"]
+    (refused,) = found.points
+    assert (refused.status, refused.error, refused.cost) == ("refused", None, None)
+    assert "rod" in (refused.reason or "")
     assert (found.pareto, found.within_tolerance) == ((), None)
     assert "none of the 1" in found.answers()[0]
 
@@ -144,12 +138,6 @@ def test_settings_that_diverge_are_points_with_a_reason() -> None:
     assert all(point.reason and point.error is None and not point.is_usable for point in failed)
     assert not set(map(id, failed)) & set(map(id, found.pareto))
     json.dumps(found.document(), allow_nan=False)
-
-
-def test_work_counters_are_reproducible() -> None:
-    first, second = (study(scene_of(DROP), most=3) for _ in range(2))
-    assert [point.work for point in first.points] == [point.work for point in second.points]
-    assert all(point.work for point in first.points)
 
 
 def test_machine_speed_and_load_do_not_change_the_result(monkeypatch):
@@ -207,16 +195,6 @@ def test_nearest_is_given_if_nothing_meets_the_tolerance_or_budget() -> None:
     assert document["nearest_to_tolerance"]["sentence"] in document["answers"][0]
 
 
-def test_metric_and_its_reason_are_stated() -> None:
-    found = study(scene_of(DROP), most=1)
-    assert (found.metric.name, found.metric_reason) == (
-        "max_position",
-        "the truth (closed form) is trusted to the end, 0.4 s",
-    )
-    assert found.document()["metric_reason"] == found.metric_reason
-    assert study(scene_of(DROP), most=1, metric="energy").metric_reason == "it was requested"
-
-
 def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> None:
     why = "reference, dt halved 8 times; pymunk contradicts it from 0 s on"
     found = study(scene_of(DROP), most=2, truth=why)
@@ -246,12 +224,6 @@ def test_unknown_names_are_rejected_before_any_run(monkeypatch: pytest.MonkeyPat
         tradeoff(scene_of(DROP), metric="beauty")
     with pytest.raises(UnknownEngineError, match="engines: pymunk"):
         tradeoff(scene_of(DROP), ["unity"])
-
-
-def test_default_tolerance_of_missed_contacts_is_zero() -> None:
-    found = study(scene_of(DROP), metric="missed_contacts", most=3)
-    assert found.tolerance == 0.0
-    assert found.within_tolerance.point.error == 0.0
 
 
 def test_scene_without_moving_bodies_can_be_studied() -> None:
@@ -285,7 +257,7 @@ def test_recommended_setting_that_may_tunnel_is_warned_of_with_safe_substeps() -
     scene = scene_of(BULLET)
     found = study(scene, metric="missed_contacts", budget=100.0, most=30)
     recommendation = found.within_tolerance
-    assert recommendation.point.error == 0.0
+    assert found.tolerance == recommendation.point.error == 0.0  # by default, for this metric
     (warning,) = tunnelling(recommendation)
     safe = warning.details["safe_substeps"]
     assert isinstance(safe, int)
@@ -296,16 +268,12 @@ def test_recommended_setting_that_may_tunnel_is_warned_of_with_safe_substeps() -
     document = json.loads(json.dumps(found.document(), allow_nan=False))
     assert document["within_tolerance"]["warnings"][0]["safe_substeps"] == safe
     assert tunnelling(found.cheapest_by_engine["pymunk"] or recommendation) == [warning]
-    assert not any(
-        each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(recommendation, safe))
-    )
-    assert any(
-        each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(recommendation, safe - 1))
-    )
-
-
-def with_substeps(recommendation: Recommendation, substeps: int) -> Settings:
-    return recommendation.point.asked.replace(substeps=substeps)
+    for substeps, is_warned in ((safe, False), (safe - 1, True)):
+        kinds = {
+            each.kind
+            for each in setting_warnings(scene, "pymunk", recommendation.point.asked.replace(substeps=substeps))
+        }
+        assert ("tunnelling" in kinds) == is_warned
 
 
 def test_warnings_are_those_of_check_for_the_same_settings() -> None:
@@ -328,12 +296,7 @@ def test_max_dt_is_a_frame_or_the_step_of_the_scene() -> None:
     scene = scene_of(BULLET)
     found = study(scene, most=12)
     assert found.max_dt == FRAME_TOLERANCE / 60.0
-    assert found.document()["max_dt"] == found.max_dt
     assert any(point.settings.dt > found.max_dt for point in found.points)
-    recommendations = [found.within_tolerance, found.nearest_to_tolerance, *found.cheapest_by_engine.values()]
-    assert all(
-        recommendation.point.settings.dt <= found.max_dt
-        for recommendation in recommendations
-        if recommendation is not None
-    )
+    for each in (found.within_tolerance, found.nearest_to_tolerance, *found.cheapest_by_engine.values()):
+        assert each is None or each.point.settings.dt <= found.max_dt
     assert study(scene, most=1, dt=0.1).max_dt == 0.1

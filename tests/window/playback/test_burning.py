@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pygame
 import pytest
 
 from sandbox.action import Throttle
@@ -11,10 +10,10 @@ from sandbox.scene.files.load import loads
 from sandbox.window.camera import Camera
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
-from sandbox.window.playback.snapshot import LONG, Snapshot, active_thrusters
+from sandbox.window.playback.snapshot import LONG, active_thrusters
 from sandbox.window.render.palette import ORANGE
-from sandbox.window.render.renderer import Renderer
 from tests.toml_text import toml
+from tests.window.render.drawn import render, snapshot
 
 SHIP = (
     toml(title="Ship")
@@ -57,18 +56,12 @@ def test_snapshot_of_a_live_view_contains_active_flames() -> None:
 
 
 def test_flame_is_drawn_behind_the_nozzle_and_rotates_with_the_body() -> None:
-    pygame.font.init()
-    surface = pygame.Surface((400, 400))
     camera = Camera((1.0, 1.0), 40.0, (400, 400))
-    bodies = SCENE.bodies
-    flames = active_thrusters(SCENE, bodies, throttle(1.0), 0.0)
-    live = LiveView(Session(SCENE))
-    Renderer().draw(surface, camera, Snapshot(SCENE, bodies, live.frame, flames=flames))
-    orange = np.abs(pygame.surfarray.array3d(surface).astype(int) - ORANGE).sum(axis=2) < 10
-    centre = live.frame.position[0]
+    flames = active_thrusters(SCENE, SCENE.bodies, throttle(1.0), 0.0)
+    orange = np.abs(render(snapshot(SCENE, flames=flames), camera).astype(int) - ORANGE).sum(axis=2) < 10
+    centre = SCENE.bodies.position[0]
     along = np.array((math.cos(0.5), math.sin(0.5)))
     for fraction, is_flame in ((0.9, True), (1.2, False)):  # of its length behind the edge of the body
         point = centre - along * (1.0 + fraction * LONG * REACH)
         x, y = camera.to_screen(point[None])[0].round().astype(int)
         assert orange[x - 3 : x + 4, y - 3 : y + 4].any() == is_flame
-    live.close()

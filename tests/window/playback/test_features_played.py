@@ -1,6 +1,5 @@
 """Breaking joints and zones in a session: shown and reproduced as at first, however a time is reached."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from sandbox.action import Force, Impulse, Switch
 from sandbox.measure.run.runner import run
 from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import HELD
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, load, loads
@@ -24,7 +22,7 @@ from sandbox.window.playback.snapshot import Snapshot
 from tests.toml_text import toml
 
 ALL = frozenset({"shapes", "joints"})
-CLOTH = (
+CLOTH = loads(
     toml(title="Rag")
     + toml("world", gravity=[0.0, -10.0], duration=1.0)
     + toml("solver", dt=0.01, substeps=2)
@@ -44,18 +42,6 @@ CLOTH = (
 """The uppermost threads carry 3 N at rest, and more while the cloth swings."""
 
 
-@pytest.fixture(autouse=True)
-def no_step_budget(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Remove the time budget of steps, so that no test depends on the speed of the machine."""
-    monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)
-    monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
-    return iter(())
-
-
-def cloth() -> Scene:
-    return loads(CLOTH)
-
-
 def snapshot(view: LiveView | RecordedView) -> Snapshot:
     return view.snapshot(ALL)
 
@@ -68,10 +54,10 @@ def seek_to(view: LiveView, step: int) -> LiveView:
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_joints_are_shown_until_they_break_and_again_after_seeking_back(engine: str) -> None:
-    view = LiveView(Session(cloth(), engine))
-    assert len(snapshot(view).links) == len(cloth().links)
+    view = LiveView(Session(CLOTH, engine))
+    assert len(snapshot(view).links) == len(CLOTH.links)
     joint_counts = [len(snapshot(seek_to(view, step)).links) for step in range(0, 61, 5)]
-    assert joint_counts[0] == len(cloth().links) > joint_counts[-1]
+    assert joint_counts[0] == len(CLOTH.links) > joint_counts[-1]
     assert joint_counts == sorted(joint_counts, reverse=True)
     break_times = view.session.break_times[np.isfinite(view.session.break_times)]
     assert len(break_times) == joint_counts[0] - joint_counts[-1]
@@ -83,17 +69,17 @@ def test_joints_are_shown_until_they_break_and_again_after_seeking_back(engine: 
 
 
 def test_energy_of_a_live_view_excludes_broken_joints() -> None:
-    view, trajectory = seek_to(LiveView(Session(cloth())), 60), run(cloth())
+    view, trajectory = seek_to(LiveView(Session(CLOTH)), 60), run(CLOTH)
     stored = RecordedView(RecordedRun(trajectory))
     stored.scrub(0.6)
     assert view.energy() == pytest.approx(stored.energy(), rel=1e-12)  # the same frame, computed twice
     assert snapshot(view).links.names == snapshot(stored).links.names
-    assert len(snapshot(stored).links) < len(cloth().links)
+    assert len(snapshot(stored).links) < len(CLOTH.links)
     view.close()
 
 
 def test_action_in_the_past_discards_later_breaks() -> None:
-    view = seek_to(LiveView(Session(cloth())), 60)
+    view = seek_to(LiveView(Session(CLOTH)), 60)
     assert np.isfinite(view.session.break_times).any()
     seek_to(view, 0)
     assert np.isfinite(view.session.break_times).any()  # seeking alone keeps the recorded future
@@ -103,16 +89,18 @@ def test_action_in_the_past_discards_later_breaks() -> None:
 
 
 def test_joints_keep_their_bodies_after_an_engine_switch_without_broken_ones() -> None:
-    view = seek_to(LiveView(Session(cloth())), 60)
+    view = seek_to(LiveView(Session(CLOTH)), 60)
     links = snapshot(view).links
     view.apply(Switch(time=0.0, engine="reference"))
     assert np.array_equal(snapshot(view).links.b, links.b)
-    assert len(snapshot(seek_to(view, 0)).links) == len(cloth().links)
+    assert len(snapshot(seek_to(view, 0)).links) == len(CLOTH.links)
     view.close()
 
 
-def test_breaks_are_notified_at_once_and_then_once_a_second() -> None:
-    view = LiveView(Session(cloth()))
+def test_breaks_are_notified_at_once_and_then_once_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)  # s, so that the speed of the machine does not matter
+    monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
+    view = LiveView(Session(CLOTH))
     for _ in range(60):
         view.update(0.01, paused=False)
     notifications = [text for _, text in view.notifications if text.endswith("broke")]
@@ -121,7 +109,7 @@ def test_breaks_are_notified_at_once_and_then_once_a_second() -> None:
 
 
 def test_recorded_run_refuses_joints_that_differ_from_the_scene() -> None:
-    trajectory = run(cloth())
+    trajectory = run(CLOTH)
     mismatched = Trajectory(**{**vars(trajectory), "broken_time": np.full(3, np.nan)})
     with pytest.raises(SceneError, match="broken_time: the run had 3 joints"):
         RecordedRun(mismatched)
@@ -134,24 +122,19 @@ HOLES: list[dict[str, Any]] = [
 ]
 
 
-def run_session(scene: Scene, steps: int, kick: int | None = None) -> Session:
-    session = Session(scene)
-    while session.step_number < steps:
-        session.advance()
-        if session.step_number == kick:
-            session.apply(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
-    return session
-
-
-def course() -> Scene:
-    ball = {"name": "ball", "position": [0, 0], "velocity": [1.5, 0], "radius": 0.1}
-    return from_document({"ball": [ball], "zone": HOLES})
+COURSE = from_document(
+    {"ball": [{"name": "ball", "position": [0, 0], "velocity": [1.5, 0], "radius": 0.1}], "zone": HOLES}
+)
 
 
 @pytest.mark.parametrize("name", ["holes", "overpass"])
 def test_seeking_back_and_forth_reproduces_the_same_visits(name: str) -> None:
     """The run is long enough for checkpoints, also inside zones; each state is compared with the first pass."""
-    session = run_session(course() if name == "holes" else load(find(name)), 320, kick=200)
+    session = Session(COURSE if name == "holes" else load(find(name)))
+    while session.step_number < 320:
+        session.advance()
+        if session.step_number == 200:
+            session.apply(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
     known = {k: session.history.get(k) for k in range(321)}
     assert session.history.keyframe_steps
     assert {int(mark) for frame in known.values() if frame is not None for mark in np.unique(frame.visits)} >= {0, 1}

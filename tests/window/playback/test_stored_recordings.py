@@ -21,7 +21,7 @@ def test_recordings_exist_for_every_kind() -> None:
 
 @pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
-def test_stored_recording_replays_without_a_window(file: Path) -> None:
+def test_stored_recording_replays_headless_and_in_a_session_of_the_window(file: Path) -> None:
     recording = Recording.load(file)
     run = rerun(recording, audit=False)
     assert recording.state_hash is not None
@@ -29,12 +29,6 @@ def test_stored_recording_replays_without_a_window(file: Path) -> None:
     game = run.info.get("game", {})
     assert game.get("score") == recording.score
     assert game.get("otherwise") is None
-
-
-@pytest.mark.fail_slow(30)
-@pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
-def test_stored_recording_replays_in_a_session_of_the_window(file: Path) -> None:
-    recording = Recording.load(file)
     live = session_of_recording(recording)
     try:
         live.finish_seek()

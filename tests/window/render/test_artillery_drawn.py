@@ -15,19 +15,15 @@ from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView
 from sandbox.games.players import NoInput
 from sandbox.games.session import HeadlessGame
 from sandbox.measure.run.runner import run
-from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.trajectory import Frame
 from sandbox.window.app import App
 from sandbox.window.camera import Camera
-from sandbox.window.capture.image_files import offscreen
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun
-from sandbox.window.playback.snapshot import Snapshot
-from sandbox.window.render.renderer import Renderer
 from tests.toml_text import toml
 from tests.window.pressing import key, key_up
+from tests.window.render import drawn
 from tests.window.windowed import open_window, run_frame
 
 SIZE = (400, 240)
@@ -52,12 +48,11 @@ def duel(edges: str = "open") -> Scene:
 
 
 def render(scene: Scene, view_state: ArtilleryViewState | None = None, camera: Camera = CAMERA) -> np.ndarray:
-    bodies = scene.bodies
-    columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
-    frame = Frame(0.0, *(each.copy() for each in columns), np.ones(len(bodies), np.bool_))
-    surface = offscreen(SIZE)
-    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, game=view_state))
-    return pygame.surfarray.array3d(surface).astype(int)
+    return drawn.render(drawn.snapshot(scene, game=view_state), camera).astype(int)
+
+
+def sky() -> np.ndarray:
+    return pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
 
 
 def pixel(x: float, y: float) -> tuple[int, int]:
@@ -65,8 +60,16 @@ def pixel(x: float, y: float) -> tuple[int, int]:
     return int(across), int(down)
 
 
+def rules_at_aim(scene: Scene) -> ArtilleryRules:
+    rules = ArtilleryRules(scene, scene.bodies)
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": AIM_TIME})})
+    run(short, bout=HeadlessGame(rules, NoInput(), "none"))
+    assert rules.phase == "aim"
+    return rules
+
+
 def test_terrain_is_drawn_below_its_surface_and_sky_above() -> None:
-    picture, above = render(duel()), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
+    picture, above = render(duel()), sky()
     for x in (35.0, 50.0, 65.0):
         assert (picture[pixel(x, 16.0)] == above[pixel(x, 16.0)]).all()
         red, _, blue = picture[pixel(x, 8.5)].tolist()
@@ -80,7 +83,7 @@ def test_crater_shows_the_sky_behind_it() -> None:
     heights[45:55] = [2.0] * 10
     wall = scene.walls[0].model_copy(update={"points": course_of(heights, 100.0)})
     picture = render(scene.model_copy(update={"walls": (wall,)}))
-    above = pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
+    above = sky()
     assert (picture[pixel(50.0, 6.0)] == above[pixel(50.0, 6.0)]).all()
     assert (picture[pixel(40.0, 6.0)] != above[pixel(40.0, 6.0)]).any()
 
@@ -99,7 +102,7 @@ def test_falling_dirt_is_drawn_in_the_air() -> None:
     plain = rules.view_state(0.0)
     clod = FallingDirt(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
     falling = ArtilleryViewState(plain.guns, plain.size, 0.0, clods=(clod,))
-    picture, above = render(scene, falling), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
+    picture, above = render(scene, falling), sky()
     red, _, blue = picture[pixel(50.0, 23.0)].tolist()
     assert red > blue
     assert (picture[pixel(50.0, 9.0)] == above[pixel(50.0, 9.0)]).all()  # its final position is still empty
@@ -107,8 +110,7 @@ def test_falling_dirt_is_drawn_in_the_air() -> None:
 
 def test_tanks_and_explosions_are_drawn_at_their_positions() -> None:
     scene = duel()
-    rules = ArtilleryRules(scene, scene.bodies)
-    run_to_aim(rules, scene)
+    rules = rules_at_aim(scene)
     view_state = rules.view_state(AIM_TIME)
     assert [gun.name for gun in view_state.guns] == ["Red", "Blue"]
     assert [gun.aiming for gun in view_state.guns] == [True, False]
@@ -125,18 +127,11 @@ def test_tanks_and_explosions_are_drawn_at_their_positions() -> None:
 
 def test_view_state_of_the_past_has_only_guns() -> None:
     scene = duel()
-    rules = ArtilleryRules(scene, scene.bodies)
-    run_to_aim(rules, scene)
+    rules = rules_at_aim(scene)
     past, between = rules.view_state(0.0), rules.view_state(AIM_TIME - 0.5 * scene.solver.dt)
     assert [(gun.name, gun.health, gun.aiming) for gun in past.guns] == [("Red", None, False), ("Blue", None, False)]
     assert (past.wind, past.tracer) == (None, None)
     assert between.wind is not None
-
-
-def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
-    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": AIM_TIME})})
-    run(short, bout=HeadlessGame(rules, NoInput(), "none"))
-    assert rules.phase == "aim"
 
 
 @pytest.mark.parametrize(
@@ -144,8 +139,7 @@ def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
 )
 def test_any_camera_draws_the_state_over_the_same_landscape(centre: tuple[float, float], scale: float) -> None:
     scene = duel("rubber")
-    rules = ArtilleryRules(scene, scene.bodies)
-    run_to_aim(rules, scene)
+    rules = rules_at_aim(scene)
     clods = (FallingDirt(48.0, 52.0, 22.0, 26.0, 8.0),)
     path = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
     state = rules.view_state(AIM_TIME)
@@ -185,7 +179,7 @@ def frame_rules(window: App, *events: pygame.event.Event) -> ArtilleryRules:
     return rules
 
 
-def test_keys_aim_and_fire_and_seeking_back_undoes_the_shot(window: App, tmp_path: Path) -> None:
+def test_keys_aim_and_fire_and_seeking_back_undoes_the_shot(window: App) -> None:
     rules = frame_rules(window)
     red = rules.shooter
     angle, power = red.angle, red.power
@@ -206,11 +200,7 @@ def test_keys_aim_and_fire_and_seeking_back_undoes_the_shot(window: App, tmp_pat
     assert rules.phase == "settle"
     assert rules.field.ground.points == crater
     assert any("shell: landed at" in text for _, text in window.app_state.messages.visible())
-    recording = tmp_path / "duel.json"
-    session = live.session.recording()
-    session.save(recording)
-    assert session.score == rules.score
-    assert Recording.load(recording).presses == session.presses
+    assert live.session.recording().score == rules.score
     live.seek(fire_step)
     live.finish_seek()
     rules = frame_rules(window)

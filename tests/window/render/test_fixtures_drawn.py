@@ -136,19 +136,15 @@ def test_arrows_show_the_passing_direction_of_a_one_way_wall(direction):
     assert ((column - SIZE[0] / 2) * direction <= 0).all()  # on the left side of its direction
 
 
-def test_post_with_a_kick_has_a_ring():
-    post = {"position": [0, 0], "radius": 1.0}
-    ring = changed_pixels(render_static(post=[{**post, "kick": {"speed": 1}}]), render_static(post=[post]))
-    column, row = np.nonzero(ring)
-    distance = np.hypot(column + 0.5 - SIZE[0] / 2, row + 0.5 - SIZE[1] / 2) / CAMERA.scale
+def test_a_post_is_a_filled_circle_with_a_ring_if_it_has_a_kick():
+    post = {"position": [1, 1], "radius": 1.0}
+    plain, kicking = render_static(post=[post]), render_static(post=[{**post, "kick": {"speed": 1}}])
+    area = changed_pixels(plain, np.full_like(plain, BACKGROUND)).sum()
+    assert area == pytest.approx(math.pi * 20**2, rel=0.08)  # pixels at the rim count in full
+    assert colour_at(plain, 1.0, 1.0) != BACKGROUND
+    column, row = np.nonzero(changed_pixels(kicking, plain))
+    distance = np.hypot(column + 0.5 - 120, row + 0.5 - 40) / CAMERA.scale
     assert 0.55 < distance.max() < 0.65
-
-
-def test_a_post_is_a_filled_circle():
-    picture = render_static(post=[{"position": [1, 1], "radius": 0.5}])
-    area = changed_pixels(picture, np.full_like(picture, BACKGROUND)).sum()
-    assert area == pytest.approx(math.pi * 10**2, rel=0.15)  # pixels at the rim count in full
-    assert colour_at(picture, 1.0, 1.0) != BACKGROUND
 
 
 def test_bounds_overlay_draws_a_dashed_rectangle():

@@ -37,28 +37,20 @@ def scene_with(*joints: dict) -> Scene:
     return scene(balls=TWO, joint=list(joints))
 
 
-def joint_pixels(model: Scene, *overlays: str, **more: object) -> np.ndarray:
+def joint_pixels(model: Scene, *overlays: str) -> np.ndarray:
     """Return which pixels change by drawing the joints."""
-    return changed_pixels(render(snapshot(scene(balls=TWO)), **more), render(snapshot(model, *overlays), **more))
+    return changed_pixels(render(snapshot(scene(balls=TWO))), render(snapshot(model, *overlays)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_rods_slides_and_springs_are_drawn_without_the_overlay(kind):
-    assert joint_pixels(scene_with(KINDS[kind])).any() == (kind in WITHOUT_OVERLAY)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_broken_joints_are_not_drawn(kind):
+def test_every_kind_is_drawn_in_the_overlay_and_lines_also_without_until_they_break(kind):
+    model = scene_with(KINDS[kind])
+    assert joint_pixels(model).any() == (kind in WITHOUT_OVERLAY)
+    for antialias in (True, False):
+        pictures = [render(snapshot(model, *shown), antialias=antialias) for shown in ((), ("joints",))]
+        assert changed_pixels(*pictures).sum() > 10
     bare = render(snapshot(scene(balls=TWO), "joints"))
-    assert not changed_pixels(bare, render(snapshot(scene_with(KINDS[kind]), "joints", broken=[0]))).any()
-
-
-@pytest.mark.parametrize("antialias", [True, False])
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_has_a_mark_in_the_overlay(kind, antialias):
-    without = render(snapshot(scene_with(KINDS[kind])), antialias=antialias)
-    differ = changed_pixels(without, render(snapshot(scene_with(KINDS[kind]), "joints"), antialias=antialias))
-    assert differ.sum() > 10
+    assert not changed_pixels(bare, render(snapshot(model, "joints", broken=[0]))).any()
 
 
 def test_kinds_of_joints_differ_in_shape():
@@ -129,19 +121,9 @@ def test_strain_colours_go_from_blue_over_grey_to_orange():
     assert (none == SHADES[61]).all() or np.abs(none - ORANGE).max() <= 20
 
 
-def cloth(columns: int, rows: int) -> Scene:
-    def name(column: int, row: int) -> str:
-        return f"g-{row * columns + column + 1}"
-
-    across = [(name(c, r), name(c + 1, r)) for r in range(rows) for c in range(columns - 1)]
-    down = [(name(c, r), name(c, r + 1)) for r in range(rows - 1) for c in range(columns)]
-    springs = [{"kind": "spring", "between": list(pair), "stiffness": 1.0} for pair in across + down]
-    grid = {"name": "g", "origin": [-4.0, -2.0], "columns": columns, "rows": rows, "spacing": [0.4, 0.4]}
-    return scene(grid=[grid | {"radius": 0.001}], joint=springs)
-
-
 def test_springs_of_a_cloth_are_lines():
-    model = cloth(20, 16)
+    grid = {"corner": [-4.0, 4.0], "columns": 20, "rows": 16, "spacing": [0.4, 0.4], "radius": 0.001}
+    model = scene(cloth=[grid | {"name": "rag", "stiffness": 1.0, "mass": 1.0}])
     assert len(model.links) > COILED
     picture = render(snapshot(model))
     differ = changed_pixels(picture, render(snapshot(scene(world={}))))
@@ -192,6 +174,11 @@ def differing_points(differ):
     return np.column_stack(((columns + 0.5) / 20.0 - 5.0, 3.0 - (rows + 0.5) / 20.0))
 
 
+def overlay_points(model):
+    """Return the positions of the pixels that the overlay of joints changes, m, (N, 2)."""
+    return differing_points(changed_pixels(render(snapshot(model)), render(snapshot(model, "joints"))))
+
+
 def test_hinge_is_drawn_as_a_pin_at_the_pivot():
     bare, driven = (render(snapshot(scene(box=[BAR], **more))) for more in ({}, {"drive": [TORQUE]}))
     found = differing_points(changed_pixels(bare, driven))
@@ -200,14 +187,8 @@ def test_hinge_is_drawn_as_a_pin_at_the_pivot():
     assert sum(colour_at(driven, 0.0, 0.0)) > sum(BACKGROUND)
 
 
-def test_plunger_has_no_hinge():
-    bare, driven = (render(snapshot(scene(box=[BAR], **more))) for more in ({}, {"drive": [PLUNGER]}))
-    assert not changed_pixels(bare, driven).any()
-
-
 def test_stops_are_drawn_as_an_arc_about_the_hinge():
-    model = scene(box=[BAR], drive=[TORQUE])
-    found = differing_points(changed_pixels(render(snapshot(model)), render(snapshot(model, "joints"))))
+    found = overlay_points(scene(box=[BAR], drive=[TORQUE]))
     angle = np.arctan2(found[:, 1], found[:, 0])
     far = np.hypot(*found.T) > 1.35  # m: beyond the pointer of the bar; the arc has a radius of 1.5 m
     assert -0.1 < angle[far].min() < 0.05
@@ -226,9 +207,10 @@ def test_pointer_rotates_with_the_body_and_shows_the_level():
     assert np.abs(np.arctan2(found[:, 1], found[:, 0]) - 0.5).max() < 0.2
 
 
-def test_plunger_is_drawn_as_a_line_of_its_travel():
+def test_plunger_is_drawn_as_a_line_of_its_travel_without_a_hinge():
     model = scene(box=[BAR], drive=[PLUNGER])
-    found = differing_points(changed_pixels(render(snapshot(model)), render(snapshot(model, "joints"))))
+    assert not changed_pixels(render(snapshot(scene(box=[BAR]))), render(snapshot(model))).any()
+    found = overlay_points(model)
     assert np.abs(found[:, 0] - 1.0).max() < 0.5
     assert found[:, 1].max() < 0.2
     assert -2.2 < found[:, 1].min() < -1.95

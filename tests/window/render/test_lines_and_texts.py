@@ -59,17 +59,10 @@ def test_lines_that_miss_the_picture_or_are_not_finite_draw_nothing(a, b, width,
 
 @given(angle=st.floats(0.0, 2.0 * math.pi), length=st.floats(20.0, 1e9), antialias=st.booleans())
 def test_lines_through_the_picture_are_drawn(angle, length, antialias):
-    step = np.asarray((math.cos(angle), math.sin(angle))) * 0.5 * length
+    middle, step = np.asarray((15.5, 10.5)), np.asarray((math.cos(angle), math.sin(angle))) * 0.5 * length
     for draw in (draw_line, draw_arrow):
         surface = pygame.Surface((30, 20))
-        draw(
-            surface,
-            tuple(np.asarray((15.5, 10.5)) - step),
-            tuple(np.asarray((15.5, 10.5)) + step),
-            WHITE,
-            2.0,
-            antialias,
-        )
+        draw(surface, tuple(middle - step), tuple(middle + step), WHITE, 2.0, antialias)
         assert covered(surface)[13:18, 8:13].any()  # px, around the middle of the line
 
 
@@ -103,11 +96,8 @@ def test_dashes_keep_their_phase_when_the_start_is_clipped():
 
 
 def ink_rect(surface: pygame.Surface) -> pygame.Rect:
-    return (
-        pygame.mask.from_threshold(surface, WHITE, (200, 200, 200))
-        .get_bounding_rects()[0]
-        .unionall(pygame.mask.from_threshold(surface, WHITE, (200, 200, 200)).get_bounding_rects())
-    )
+    first, *others = pygame.mask.from_threshold(surface, WHITE, (200, 200, 200)).get_bounding_rects()
+    return first.unionall(others)
 
 
 @pytest.mark.parametrize("anchor", ["topleft", "midright", "center", "bottomright", "midbottom"])

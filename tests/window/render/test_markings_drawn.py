@@ -135,16 +135,11 @@ def test_zone_is_tinted_inside_and_not_outside(shape: str, antialias: bool) -> N
     assert colour_at(picture, *outside) == colour_at(plain, *outside)
 
 
-def test_zones_are_drawn_below_bodies() -> None:
-    balls = [ball(0.0, 0.0, 1.0, colour="#123456")]
-    picture = render(snapshot(scene(balls=balls, zone=[{"position": [0, 0], "radius": 2}])))
-    assert colour_at(picture, 0.0, 0.0) == (18, 52, 86)
-
-
-def test_distant_and_large_zones_are_drawn() -> None:
+def test_distant_and_large_zones_are_drawn_below_bodies() -> None:
     zones = [{"position": [1e15, 0], "radius": 1e9}, {"points": [[-1e15, 0], [1e15, 1]], "thickness": 1e8}]
-    picture = render(snapshot(scene(balls=[ball(0, 0)], zone=zones)))
+    picture = render(snapshot(scene(balls=[ball(0.0, 0.0, 1.0, colour="#123456")], zone=zones)))
     assert colour_at(picture, 3.0, 2.0) != BACKGROUND
+    assert colour_at(picture, 0.0, 0.0) == (18, 52, 86)
 
 
 def test_walls_of_other_layers_are_translucent_above_the_ground() -> None:
@@ -156,9 +151,8 @@ def test_walls_of_other_layers_are_translucent_above_the_ground() -> None:
         ("over it", ["up"], "ground"),
         ("beside it", ["up"], "up"),
     ):
-        picture = render(snapshot(layered := scene(balls=[{**red, "layer": layer}], wall=[{**wall, "layers": layers}])))
-        state = frame(layered, layer=layered.bodies.layer)
-        picture = render(snapshot(layered, frame=state))
+        layered = scene(balls=[{**red, "layer": layer}], wall=[{**wall, "layers": layers}])
+        picture = render(snapshot(layered, frame=frame(layered, layer=layered.bodies.layer)))
         colours[name] = colour_at(picture, 0.0, 0.0)
     assert colours["below"] == colours["beside it"] == (255, 0, 0)
     assert SOLID[0] < colours["over it"][0] < 255

@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests.window.render.drawn import changed_pixels, frame, render, snapshot
 
@@ -18,19 +17,6 @@ OBJECTS: dict[str, dict[str, Any]] = {
     "capsule": {"capsule": [{"position": [0.0, 0.0], "length": 2.0, "radius": 0.5}]},
     "ball": {"ball": [{"position": [0.0, 0.0], "radius": 1.0}]},
 }
-
-
-def scene_of(name: str, speed: float) -> Scene:
-    """Return a scene of one object with a surface speed, m/s."""
-    (kind, (table,)) = next(iter(OBJECTS[name].items()))
-    return from_document({kind: [{**table, "surface_speed": speed}]})
-
-
-def test_chevrons_point_along_the_motion() -> None:
-    """On the upper side of a wall they point right for a positive speed: mirrored for a negative one."""
-    pictures = [render(snapshot(scene_of("wall", speed))) for speed in (0.0, 1.0, -1.0)]
-    right, left = (np.asarray(changed_pixels(pictures[0], each)) for each in pictures[1:])
-    assert (right != left).any()
 
 
 @pytest.mark.parametrize(
@@ -52,15 +38,17 @@ def test_moving_surfaces_have_chevrons_that_travel_at_their_edges(name: str, mot
         assert all(np.hypot(column - x, row - y).min() < 12 for x, y in np.argwhere(chevrons))
 
 
-def test_chevrons_of_a_velocity_point_along_it_on_both_sides() -> None:
-    """Above and below a wall they are mirror images, which those of a speed are not."""
-    still, moving = (
+def test_chevrons_of_a_velocity_are_mirror_images_on_both_sides_and_those_of_a_speed_are_not() -> None:
+    """Chevrons point along the motion, which a negative speed reverses."""
+    still, velocity, speed, reversed_speed = (
         render(snapshot(from_document({"wall": [{"points": [[-2.0, 0.0], [2.0, 0.0]], "thickness": 0.8} | more]})))
-        for more in ({}, {"surface_velocity": [1.0, 0.0]})
+        for more in ({}, {"surface_velocity": [1.0, 0.0]}, {"surface_speed": 1.0}, {"surface_speed": -1.0})
     )
-    changed = np.asarray(changed_pixels(still, moving))
+    changed = changed_pixels(still, velocity)
     assert changed.any()
     assert (changed == changed[:, ::-1]).mean() > 0.99
+    assert changed_pixels(speed, speed[:, ::-1]).any()
+    assert changed_pixels(speed, reversed_speed).any()
 
 
 def test_surfaces_far_away_are_not_drawn() -> None:

@@ -82,6 +82,7 @@ def force(newtons: float, model=HEAVY, seconds=0.01) -> np.ndarray:
 def test_impulse_arrows_are_scaled_by_the_weight_and_limited_in_length():
     arrows = [pixel_box(force(newtons)[96:104]) for newtons in (WEIGHT, 2.0 * WEIGHT, 3.0 * WEIGHT, 1e9)]
     assert [box[3] - box[1] for box in arrows] == pytest.approx([26, 52, 78, 80], abs=2.5)  # smooth ends
+    assert not force(1.0, seconds=0.0).any()  # an impulse without a duration is no force
 
 
 def test_impulse_arrows_without_gravity_are_scaled_by_the_largest():
@@ -96,10 +97,6 @@ def test_impulse_arrows_without_gravity_are_scaled_by_the_largest():
     differ = overlay_pixels(model, "impulses", contacts=rows, seconds=0.1)
     left, right = pixel_box(differ[36:44]), pixel_box(differ[156:164])
     assert (left[3] - left[1]) / (right[3] - right[1]) == pytest.approx(2.0, abs=0.15)  # smooth ends
-
-
-def test_impulses_of_zero_duration_are_not_drawn():
-    assert not force(1.0, seconds=0.0).any()
 
 
 BOX = scene(box=[{"position": [0, 0], "size": [4, 2], "angle": math.pi / 2}])
@@ -188,12 +185,9 @@ def test_ghost_is_hollow_and_connected_to_its_body():
     assert differ[130, 58:62].any(), "the connecting line"
 
 
-def test_ghost_close_to_its_body_has_no_line():
+def test_ghost_close_to_its_body_has_no_line_and_a_fixed_body_no_ghost():
     ghost = frame(ONE, position=np.asarray([[0.1, 0.0]]))
     assert not overlay_pixels(ONE, ghost=ghost)[95:105, 55:65].any()
-
-
-def test_fixed_body_has_no_ghost():
     model = scene(balls=[ball(0, 0, fixed=True)])
     assert not overlay_pixels(model, ghost=frame(model)).any()
 

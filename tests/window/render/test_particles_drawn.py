@@ -14,7 +14,6 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.camera import Camera
 from sandbox.window.render import particles as module
 from sandbox.window.render.particles import SHADES, LifetimeColours, ParticleRenderer, fade_colours, packed_pixels
-from sandbox.window.render.renderer import Renderer
 from tests.window.render.drawn import colour_at, frame, render, scene, snapshot
 
 CAMERA = Camera((3.0, -2.0), 10.0, (64, 48))
@@ -80,25 +79,18 @@ def test_drawn_pixels_of_an_alpha_surface_are_opaque():
 
 
 @pytest.mark.parametrize("side", [1, 2, 3])
-def test_drawing_on_a_subsurface_changes_no_other_pixels(side):
-    whole = pygame.Surface((100, 90))
+def test_subsurface_and_clip_limit_the_drawn_pixels(side):
     position = np.random.default_rng(2).uniform((-1.0, -6.0), (7.0, 2.0), (500, 2))
+    whole, clipped = pygame.Surface((100, 90)), pygame.Surface(CAMERA.size)
     render_points(whole.subsurface((10, 20, *CAMERA.size)), position, side=side)
-    picture = (pygame.surfarray.array3d(whole) > 0).all(2)
-    assert (picture[10 : 10 + 64, 20 : 20 + 48] == expected(position, CAMERA, side)).all()
-    picture[10 : 10 + 64, 20 : 20 + 48] = False
-    assert not picture.any()
-
-
-@pytest.mark.parametrize("side", [1, 2, 3])
-def test_clip_of_a_surface_is_respected(side):
-    surface = pygame.Surface(CAMERA.size)
-    surface.set_clip((5, 6, 20, 10))
-    position = np.random.default_rng(3).uniform((-1.0, -6.0), (7.0, 2.0), (500, 2))
+    clipped.set_clip((5, 6, 20, 10))
+    render_points(clipped, position, side=side)
     reference = expected(position, CAMERA, side)
-    inside = np.zeros_like(reference)
-    inside[5:25, 6:16] = True
-    assert ((render_points(surface, position, side=side) > 0).all(2) == (reference & inside)).all()
+    framed, inside = np.zeros((100, 90), bool), np.zeros_like(reference)
+    framed[10 : 10 + 64, 20 : 20 + 48] = reference
+    inside[5:25, 6:16] = reference[5:25, 6:16]
+    for surface, covered in ((whole, framed), (clipped, inside)):
+        assert ((pygame.surfarray.array3d(surface) > 0).all(2) == covered).all()
 
 
 def test_absent_bodies_are_omitted():
@@ -147,11 +139,6 @@ def test_compiled_and_numpy_draw_the_same_pixels(seed: int, side: int, with_abse
     )
 
 
-def test_one_particle_covers_nine_pixels() -> None:
-    camera = Camera((0.0, 0.0), 10.0, CLIPPED)
-    assert np.count_nonzero(render_clipped(0, np.zeros((1, 2)), None, 3, camera)) == 9
-
-
 FADING = {
     "velocity_min": [0.0, 0.0],
     "velocity_max": [0.0, 0.0],
@@ -179,18 +166,13 @@ def test_fade_colours_are_evenly_spaced_and_reach_both_ends():
 
 
 @pytest.mark.parametrize("radius", [0.02, 1.0])
-def test_particle_has_the_colour_of_its_age(radius):
+def test_particle_has_the_colour_of_its_age_since_its_birth(radius):
     model = scene(emitter=[particle(0.0, radius)])
     assert drawn_colour(model, 0.0) == (255, 0, 0)
     red, green, blue = drawn_colour(model, 1.0)
     assert max(red, blue) <= 9 and green >= 245  # half-way is between two of 64 shades
     assert drawn_colour(model, 1.999) == (0, 0, 255)
     assert drawn_colour(model, 5.0) == (0, 0, 255)  # a particle that is not retired keeps its last colour
-
-
-@pytest.mark.parametrize("radius", [0.02, 1.0])
-def test_age_is_counted_from_the_birth_time(radius):
-    model = scene(emitter=[particle(0.0, radius)])
     later = replace(model.bodies, born=np.asarray([7.0]))
     assert drawn_colour(model, 7.0, bodies=later) == (255, 0, 0)
     assert drawn_colour(model, 8.999, bodies=later) == (0, 0, 255)
@@ -219,13 +201,6 @@ def test_contact_colours_override_age_colours():
     model = scene(emitter=[particle(0.0, 1.0)])
     shown = render(snapshot(model, overlapping=np.asarray([False])))
     assert colour_at(shown, 0.0, 0.0) != (255, 0, 0)
-
-
-def test_reused_renderer_draws_the_current_age():
-    model, renderer = scene(emitter=[particle(0.0, 0.02)]), Renderer()
-    for time in (0.0, 1.999, 0.0):
-        shown = snapshot(model, frame=frame(model, time=time))
-        assert (render(shown, renderer=renderer) == render(shown)).all()
 
 
 def test_compiled_and_numpy_fading_agree(monkeypatch):

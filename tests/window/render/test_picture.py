@@ -15,7 +15,6 @@ from sandbox.window.render.palette import (
     SOLID,
     TOUCHING,
     colour_of,
-    colour_of_fixed,
     hex_colour,
     mix_colours,
 )
@@ -23,6 +22,8 @@ from sandbox.window.render.renderer import Renderer
 from tests.window.render.drawn import CAMERA, SIZE, ball, changed_pixels, colour_at, frame, render, scene, snapshot
 
 FLOOR = [{"point": [0.0, -2.0], "normal": [0.0, 1.0]}]
+SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
+FADING = {"count": 1, "radius": 0.02, "lifetime": 2.0, "colours": ["#ff0000", "#0000ff"]}
 
 
 class UnculledCamera(Camera):
@@ -39,16 +40,11 @@ def test_ball_has_its_colour_at_its_centre(antialias):
     assert colour_at(picture, 2.0, 1.0) == ACCENTS[1]
 
 
-def test_y_axis_points_up():
-    empty, picture = render(snapshot(scene(world={}))), render(snapshot(scene(balls=[ball(0, 2, 0.5)])))
-    _, row = np.nonzero(changed_pixels(empty, picture))
-    assert (row + 0.5).mean() == pytest.approx(60 - 2 * 20, abs=0.1)  # the rim's pixels, in quarters
-
-
 def test_bodies_outside_the_picture_change_no_pixel():
     inside = render(snapshot(scene(balls=[ball(0, 0)])))
     outside = [ball(0, 0), ball(6.01, 0), ball(-7, 0), ball(0, 4.01), ball(0, -5), ball(1e15, 1e15, 1e9)]
-    assert not changed_pixels(inside, render(snapshot(scene(balls=outside)), antialias=True)).any()
+    boxes = [{"position": [x, y], "size": [1, 1]} for x, y in ((7, 0), (-6, 3), (0, 4), (1e12, -1e12), (0, -9))]
+    assert not changed_pixels(inside, render(snapshot(scene(balls=outside, box=boxes)))).any()
 
 
 @pytest.mark.parametrize("antialias", [True, False])
@@ -60,22 +56,20 @@ def test_culling_changes_no_pixel(antialias):
     assert not changed_pixels(render(shown, antialias=antialias), render(shown, unculled, antialias=antialias)).any()
 
 
-def test_picture_does_not_depend_on_earlier_pictures_of_the_renderer():
+def test_reused_renderer_draws_as_a_new_one():
+    """Cameras, scenes, sizes, bodies and ages of particles change; each picture is also drawn by a new renderer."""
     shown = snapshot(scene(balls=[ball(0, 0), ball(1, 1, 0.02)], plane=FLOOR), "centres")
+    grown, spark = scene(balls=[ball(0, 0), ball(3, 0)]), scene(emitter=[SPARKS | FADING])
+    pictures = [(shown, Camera((0.1 * k, 0.0), 20.0 + k, SIZE)) for k in range(1, 30)]
+    pictures += [(shown, CAMERA), (snapshot(scene(world={})), CAMERA), (shown, Camera((0.0, 0.0), 20.0, (300, 200)))]
+    model = scene(balls=[ball(0, 0)])
+    spawned = snapshot(model, bodies=grown.bodies, frame=frame(grown))
+    pictures += [(snapshot(model), CAMERA), (spawned, CAMERA)]
+    pictures += [(snapshot(spark, frame=frame(spark, time=t)), CAMERA) for t in (0.0, 1.9, 0.0)]
     renderer = Renderer()
-    for k in range(1, 30):
-        camera = Camera((0.1 * k, 0.0), 20.0 + k, SIZE)
-        assert not changed_pixels(render(shown, camera, renderer=renderer), render(shown, camera)).any()
-    assert not changed_pixels(render(shown, renderer=renderer), render(shown)).any()
-
-
-def test_renderer_detects_a_new_scene_or_size():
-    renderer = Renderer()
-    render(snapshot(scene(plane=FLOOR)), renderer=renderer)
-    assert colour_at(render(snapshot(scene(world={})), renderer=renderer), 0.0, -2.5) != SOLID
-    larger = Camera(CAMERA.centre, CAMERA.scale, (300, 200))
-    shown = snapshot(scene(plane=FLOOR))
-    assert not changed_pixels(render(shown, larger, renderer=renderer), render(shown, larger)).any()
+    for each, camera in pictures:
+        assert not changed_pixels(render(each, camera, renderer=renderer), render(each, camera)).any()
+    assert colour_at(render(spawned, renderer=renderer), 3.0, 0.0) == ACCENTS[1]
 
 
 def test_without_shapes_bodies_are_hidden_and_static_bodies_are_not():
@@ -131,22 +125,6 @@ def test_unit_scales_the_marks():
     assert changed_pixels(render(shown), render(shown, ui_scale=2.0)).any()
 
 
-def test_a_spawned_body_is_drawn():
-    model = scene(balls=[ball(0, 0)])
-    bodies = model.bodies.joined_by(scene(balls=[ball(3, 0)]).balls[0], "more")
-    grown = frame(
-        model,
-        position=bodies.position,
-        velocity=bodies.velocity,
-        angle=bodies.angle,
-        angular_velocity=bodies.angular_velocity,
-        present=np.ones(2, np.bool_),
-    )
-    renderer = Renderer()
-    render(snapshot(model), renderer=renderer)
-    assert colour_at(render(snapshot(model, bodies=bodies, frame=grown), renderer=renderer), 3.0, 0.0) == ACCENTS[1]
-
-
 @pytest.mark.parametrize("depth", [8, 16, 24, 32])
 def test_any_surface_format_is_supported(depth):
     surface = pygame.Surface(SIZE, 0, depth)
@@ -164,22 +142,12 @@ def test_sprite_cache_does_not_grow_with_the_camera_position():
     assert len(sprites) <= 16  # offsets of a quarter of a pixel in x and y
 
 
-SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
-
-
-def test_stated_colour_overrides_the_colour_cycle():
-    bodies = scene(balls=[ball(0, 0, colour="#102030"), ball(3, 0)]).bodies
-    assert colour_of(bodies).tolist() == [[16, 32, 48], list(ACCENTS[1])]
-
-
-def test_seven_balls_have_distinct_colours():
-    bodies = scene(balls=[ball(3 * k, 0) for k in range(7)]).bodies
-    assert len({tuple(colour) for colour in colour_of(bodies).tolist()}) == 7
-
-
-def test_fixed_balls_are_neutral():
-    bodies = scene(balls=[ball(0, 0, fixed=True), ball(3, 0, fixed=True, colour="#ff0000")]).bodies
-    assert colour_of(bodies).tolist() == [list(NEUTRAL), [255, 0, 0]]
+def test_balls_have_distinct_colours_and_fixed_ones_are_neutral_unless_they_state_one():
+    keys = [*[{}] * 7, {"colour": "#102030"}, {"fixed": True}, {"fixed": True, "colour": "#ff0000"}]
+    colours = colour_of(scene(balls=[ball(3 * k, 0, **more) for k, more in enumerate(keys)]).bodies).tolist()
+    assert [tuple(colour) for colour in colours[:7]] == list(ACCENTS)
+    assert len(set(ACCENTS)) == 7
+    assert colours[7:] == [[16, 32, 48], list(NEUTRAL), [255, 0, 0]]
 
 
 def test_large_generators_share_shades_and_small_ones_use_the_cycle():
@@ -197,10 +165,6 @@ def test_spawned_bodies_do_not_change_the_colours_of_others():
     assert (colour_of(grown)[: len(bodies)] == colour_of(bodies)).all()
 
 
-def test_no_bodies_have_no_colours():
-    assert colour_of(scene(world={"gravity": [0.0, -1.0]}).bodies).shape == (0, 3)
-
-
 @pytest.mark.parametrize(("text", "colour"), [("#000000", (0, 0, 0)), ("#fF8001", (255, 128, 1))])
 def test_hex_colour(text, colour):
     assert hex_colour(text) == colour
@@ -209,11 +173,3 @@ def test_hex_colour(text, colour):
 def test_mix_colours_reaches_both_ends():
     assert mix_colours((0, 10, 20), (100, 110, 120), 0.0) == (0, 10, 20)
     assert mix_colours((0, 10, 20), (100, 110, 120), 1.0) == (100, 110, 120)
-
-
-def test_static_bodies_use_their_stated_colour():
-    plane, other = scene(
-        plane=[{"point": [0, 0], "normal": [0, 1], "colour": "#010203"}, {"point": [0, 0], "normal": [1, 0]}]
-    ).planes
-    assert colour_of_fixed(plane) == (1, 2, 3)
-    assert colour_of_fixed(other, (9, 9, 9)) == (9, 9, 9)

@@ -44,14 +44,6 @@ AREAS = {
     "hammer": 2.0 + 2.0 - 0.25,
     "abutting": 8.0,
 }
-PERIMETERS = {
-    "box": 12.0,
-    "triangle": 4.0 + 2.0 * math.sqrt(13.0),
-    "capsule": 6.0 + 2.0 * math.pi,
-    "star": 10.0 * math.dist(*STAR[:2]),
-    "hammer": 13.0,
-    "abutting": 12.0,
-}
 assert kernels.rasterise_polygons, "imported before a test patches COMPILED"
 
 
@@ -78,11 +70,6 @@ def coverage(
 def test_drawn_area_equals_the_area_of_the_shape(shape):
     area = coverage(scene(**SHAPES[shape]), few=0).sum()
     assert area == pytest.approx(AREAS[shape] * 400, rel=0.012)  # 8 bits a pixel
-
-
-@pytest.mark.parametrize("shape", AREAS)
-def test_area_by_pygame_differs_by_less_than_a_pixel_along_the_edge(shape):
-    assert abs(coverage(scene(**SHAPES[shape]), few=100).sum() - AREAS[shape] * 400) < PERIMETERS[shape] * 20
 
 
 @pytest.mark.parametrize("shape", SHAPES)
@@ -140,19 +127,14 @@ def test_many_boxes_without_numba_are_drawn_at_their_positions(antialias, monkey
 
 @pytest.mark.parametrize("few", [0, 100])
 @pytest.mark.parametrize(("body", "inside"), [(ABUTTING, (0.0, 0.5)), (HAMMER, (1.5, 0.0)), (FLUSH, (0.5, 0.3))])
-def test_compound_body_has_no_inner_edges(body, inside, few):
+def test_compound_body_has_outer_edges_and_no_inner_ones(body, inside, few):
     model = scene(body=[body])
     assert (coverage(model, few=few)[100:140, 118:122] == 1.0).all()
     hollow = coverage(model, few=few, hollow=True)
     x, y = (np.asarray(inside) - model.bodies.position[0]) * (20, -20) + 120.3
     assert hollow[round(x) - 3 : round(x) + 3, round(y) - 2 : round(y) + 2].max() == 0.0
-
-
-@pytest.mark.parametrize("few", [0, 100])
-def test_flush_outer_edges_of_two_pieces_are_drawn(few):
-    hollow = coverage(scene(body=[FLUSH]), few=few, hollow=True)
-    rows = hollow[75:165].max(axis=1)
-    assert rows.min() > 0.9  # 5 m, 100 px; a line 2 px wide nearly covers one pixel of each row
+    if body is FLUSH:  # 5 m, 100 px; a line 2 px wide nearly covers one pixel of each row
+        assert hollow[75:165].max(axis=1).min() > 0.9
 
 
 def test_polygon_has_its_colour_and_a_darker_rim_and_is_neutral_if_fixed():
@@ -177,13 +159,6 @@ def test_only_nearly_round_polygons_have_a_spoke():
     for points, has in ((corners, True), (corners[::4], False)):
         model = scene(polygon=[{"position": [0, 0], "points": points}], plane=plane)
         assert (colour_at(render(snapshot(model)), 0.6, 0.0) != ACCENTS[0]) is has
-
-
-def test_boxes_outside_the_picture_change_no_pixel():
-    inside = [{"position": [0, 0], "size": [1, 1]}]
-    outside = [{"position": [x, y], "size": [1, 1]} for x, y in ((7, 0), (-6, 3), (0, 4), (1e12, -1e12), (0, -9))]
-    one, other = (render(snapshot(scene(box=boxes))) for boxes in (inside, inside + outside))
-    assert not changed_pixels(one, other).any()
 
 
 @pytest.mark.parametrize("size", [1e3, 1e6, 1e9])

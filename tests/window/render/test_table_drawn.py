@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pygame
 import pytest
 
 from sandbox.games.billiards.tables import TABLES
@@ -14,9 +13,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
-from sandbox.window.playback.snapshot import Snapshot
-from sandbox.window.render.renderer import Renderer
 from sandbox.window.view_bounds import area_bounds, shorter_side, view_bounds
+from tests.window.render import drawn
 
 SIZE = (700, 400)
 AT_REST = """
@@ -29,20 +27,10 @@ cue = [0.5, 0.5]
 """
 
 
-def frame_of(scene: Scene, position: np.ndarray | None = None, time: float = 0.0) -> Frame:
-    bodies = scene.bodies
-    positions = bodies.position if position is None else position
-    none = np.zeros((len(bodies), 2))
-    return Frame(
-        time, positions.copy(), none, bodies.angle, np.zeros(len(bodies)), np.ones(len(bodies), np.bool_), none
-    )
-
-
-def render(scene: Scene, frame: Frame, aim: CueAim | None = None, turned: bool = True) -> tuple[np.ndarray, Camera]:
+def render(scene: Scene, aim: CueAim | None = None, turned: bool = True, **state: object) -> tuple[np.ndarray, Camera]:
     camera = Camera.fitting(view_bounds(scene), SIZE, turned=turned)
-    surface = pygame.Surface(SIZE)
-    Renderer().draw(surface, camera, Snapshot(scene, scene.bodies, frame, game=aim))
-    return pygame.surfarray.array3d(surface).astype(int), camera
+    frame = drawn.frame(scene, roll=np.zeros((len(scene.bodies), 2)), **state)
+    return drawn.render(drawn.snapshot(scene, frame=frame, game=aim), camera).astype(int), camera
 
 
 def colour_at(picture: np.ndarray, camera: Camera, point: tuple[float, float]) -> np.ndarray:
@@ -53,7 +41,7 @@ def colour_at(picture: np.ndarray, camera: Camera, point: tuple[float, float]) -
 @pytest.mark.parametrize("turned", [True, False])
 def test_balls_are_drawn_at_their_positions_on_the_cloth(turned: bool) -> None:
     scene = loads(AT_REST)
-    picture, camera = render(scene, frame_of(scene), turned=turned)
+    picture, camera = render(scene, turned=turned)
     white, black = colour_at(picture, camera, (0.505, 0.495)), colour_at(picture, camera, (0.72, 1.2))
     assert white.min() > 110
     assert black.max() < white.min()
@@ -71,7 +59,7 @@ def test_cloth_has_the_colour_of_the_game(table: str, game: str, colours: object
     scene = loads(f'title = "t"\n[billiards]\ntable = "{table}"\ngame = "{game}"\n')
     assert scene.play.area is not None
     x, y = scene.play.area[1]
-    picture, camera = render(scene, frame_of(scene))
+    picture, camera = render(scene)
     assert np.abs(colour_at(picture, camera, (0.8 * x, 0.61 * y)) - colours[0]).max() < 30  # as above
 
 
@@ -79,17 +67,17 @@ def test_ball_in_a_pocket_is_not_drawn() -> None:
     scene = loads(AT_REST)
     position = scene.bodies.position.copy()
     position[0] = scene.pockets[2].position
-    picture, camera = render(scene, frame_of(scene, position, time=3.0))
+    picture, camera = render(scene, position=position, time=3.0)
     assert colour_at(picture, camera, scene.pockets[2].position).max() < 20
 
 
 def test_cue_is_drawn_behind_the_ball() -> None:
     scene = loads(AT_REST)
     cue = scene.bodies.names.index("cue")
-    without, camera = render(scene, frame_of(scene))
-    picture, _ = render(scene, frame_of(scene), CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.0))
+    without, camera = render(scene)
+    picture, _ = render(scene, CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.0))
     assert np.abs(colour_at(picture, camera, (0.3, 0.5)) - colour_at(without, camera, (0.3, 0.5))).max() > 60
-    back, _ = render(scene, frame_of(scene), CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.2))
+    back, _ = render(scene, CueAim(cue, (0.5, 0.5), 0.0, 0.0, 0.2))
     beside = (0.5 - 0.0286 - 0.1, 0.5)  # uncovered when the cue is drawn back
     assert np.abs(colour_at(back, camera, beside) - colour_at(without, camera, beside)).max() < 40
 
@@ -106,9 +94,9 @@ def test_numbers_and_stripes_are_painted_on_the_ball() -> None:
     assert paint_texture(stripe, side, 20.0)[0] == pytest.approx(stripe.colour, abs=1e-9)
 
 
-def table_of(name: str) -> Scene:
+def table_of(name: str, more: str = "") -> Scene:
     ball = "white" if name.startswith("carom") else "cue"
-    return loads(f'title = "t"\n[billiards]\ntable = "{name}"\n[billiards.place]\n{ball} = [0.5, 0.5]\n')
+    return loads(f'title = "t"\n[billiards]\ntable = "{name}"\n[billiards.place]\n{ball} = [0.5, 0.5]\n{more}')
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -126,6 +114,7 @@ def test_every_cushion_is_found_between_playing_area_and_rail(name: str) -> None
             out = max(left - x, x - right, bottom - y, y - top)
             assert -1e-9 < out < max(depth, 0.1)
     assert area_bounds(area)[0][0] < left - depth
+    assert other_walls(scene, area) == ((), ())
 
 
 def test_cushion_noses_are_tangent_to_the_jaws() -> None:
@@ -142,36 +131,13 @@ def test_cushion_noses_are_tangent_to_the_jaws() -> None:
         assert len(each.nose) - len(on_jaws) == 2  # the far ends of the facings
 
 
-def test_cushions_without_jaws_share_their_corners() -> None:
-    scene = table_of("carom-10ft")
+def test_cushions_without_jaws_share_their_corners_and_other_walls_are_not_cushions() -> None:
+    scene = table_of("carom-10ft", "[[wall]]\npoints = [[0.2, 0.2], [0.2, 0.6]]\nheight = 0.037\n")
     assert scene.play.area is not None
-    corners = {point for each in cushion_outlines(scene, scene.play.area) for point in each.outline[2:]}
-    assert len({(round(x, 9), round(y, 9)) for x, y in corners}) == 4
-
-
-def test_other_walls_are_not_cushions() -> None:
-    scene = loads(
-        """
-title = "t"
-[billiards]
-table = "carom-10ft"
-[billiards.place]
-white = [0.5, 0.5]
-[[wall]]
-points = [[0.2, 0.2], [0.2, 0.6]]
-height = 0.037
-"""
-    )
-    assert scene.play.area is not None
-    assert len(cushion_outlines(scene, scene.play.area)) == 4
+    found = cushion_outlines(scene, scene.play.area)
+    assert len(found) == 4
+    assert len({(round(x, 9), round(y, 9)) for each in found for x, y in each.outline[2:]}) == 4
     assert other_walls(scene, scene.play.area) == ((scene.walls[0],), ())
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_tables_have_no_other_walls(name: str) -> None:
-    scene = table_of(name)
-    assert scene.play.area is not None
-    assert other_walls(scene, scene.play.area) == ((), ())
 
 
 RADIUS = 0.03

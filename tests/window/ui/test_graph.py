@@ -23,25 +23,15 @@ def filled_graph(seconds: float = 5.0) -> EnergyGraph:
     return graph
 
 
-def test_earlier_time_discards_later_samples() -> None:
+def test_earlier_or_equal_time_discards_later_samples() -> None:
     graph = filled_graph(5.0)
     graph.add(2.0, 1.0, 2.0, 3.0)
     times = [sample[0] for sample in graph.samples]
     assert times == sorted(times)
     assert graph.samples[-1] == (2.0, 1.0, 2.0, 3.0)
-
-
-def test_sample_of_the_same_time_is_replaced() -> None:
-    graph = EnergyGraph()
-    graph.add(0.0, 1.0, 1.0, 2.0)
-    graph.add(0.0, 3.0, 4.0, 7.0)
-    assert graph.samples == [(0.0, 3.0, 4.0, 7.0)]
-
-
-def test_restart_keeps_only_the_first_sample() -> None:
-    graph = filled_graph(5.0)
-    graph.add(0.0, 1.0, 2.0, 3.0)
-    assert len(graph.samples) == 1
+    for sample in ((0.0, 1.0, 1.0, 2.0), (0.0, 3.0, 4.0, 7.0)):
+        graph.add(*sample)
+        assert graph.samples == [sample]
 
 
 def test_clear_resets_samples_and_limits() -> None:

@@ -68,15 +68,10 @@ def test_initials_are_entered_at_the_end_of_a_game_and_saved() -> None:
     assert dialog.entry is None  # a game is entered only once
 
 
-def test_enter_without_letters_saves_no_score() -> None:
+def test_enter_without_letters_and_escape_save_no_score() -> None:
     dialog = dialog_at_end()
     assert press(dialog, pygame.K_RETURN) == [True]
-    assert opened().of(TABLE) == ()
     assert dialog.entry is not None
-
-
-def test_escape_saves_no_score() -> None:
-    dialog = dialog_at_end()
     assert press(dialog, "a", pygame.K_ESCAPE, pygame.K_ESCAPE) == [True, True, False]
     assert opened().of(TABLE) == ()
 

@@ -48,20 +48,13 @@ class RecordedPanel:
         return x + self.panel.size[0] - self.panel.width, y
 
 
-def test_click_within_one_frame_makes_one_callback() -> None:
+def test_click_on_any_widget_within_one_frame_makes_one_callback() -> None:
     recorded = RecordedPanel()
-    for name in ("play", "trails", "integrator"):
+    for name in (*BUTTONS, *TOGGLES, "integrator"):
         assert recorded.panel.handle_event(press(*recorded.centre(name)))
         assert recorded.panel.handle_event(release(*recorded.centre(name)))
-    assert recorded.calls == [("button", "play"), ("toggle", "trails", True), ("change", "integrator", "a", True)]
-
-
-@pytest.mark.parametrize("name", [*BUTTONS, *TOGGLES])
-def test_every_button_and_checkbox_can_be_clicked(name: str) -> None:
-    recorded = RecordedPanel()
-    recorded.panel.handle_event(press(*recorded.centre(name)))
-    recorded.panel.handle_event(release(*recorded.centre(name)))
-    assert [call[1] for call in recorded.calls] == [name]
+    buttons, toggles = [("button", name) for name in BUTTONS], [("toggle", name, True) for name in TOGGLES]
+    assert recorded.calls == [*buttons, *toggles, ("change", "integrator", "a", True)]
 
 
 def test_slider_stays_held_while_the_mouse_is_over_the_picture() -> None:

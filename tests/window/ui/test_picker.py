@@ -62,20 +62,14 @@ def test_all_files_are_read_and_only_visible_ones_drawn(files: list[tuple[str, P
     assert (picker.cards[3].title, picker.cards[3].folder, picker.cards[3].about) == ("Scene 3", "mine", "odd")
 
 
-def test_faulty_file_shows_its_first_fault(files: list[tuple[str, Path]]) -> None:
-    found = read_scene(files[-1][1])
-    assert found.scene is None
-    assert found.fault.startswith("line 3: ball[0].radius")
-
-
-def test_missing_file_is_a_fault(tmp_path: Path) -> None:
-    assert "no file" in read_scene(tmp_path / "none.toml").fault
-
-
-def test_scatter_that_does_not_fit_is_a_fault(tmp_path: Path) -> None:
-    path = tmp_path / "crowd.toml"
-    path.write_text("[[scatter]]\ncount = 50\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.5\n")
-    assert read_scene(path).fault
+def test_faulty_file_shows_its_first_fault(files: list[tuple[str, Path]], tmp_path: Path) -> None:
+    crowd = tmp_path / "crowd.toml"
+    crowd.write_text("[[scatter]]\ncount = 50\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.5\n")
+    for path, fault in ((files[-1][1], "line 3: ball[0].radius"), (tmp_path / "none.toml", "no file"), (crowd, "")):
+        found = read_scene(path)
+        assert found.scene is None
+        assert found.fault
+        assert fault in found.fault
 
 
 def test_arrows_and_enter_select_a_scene(files: list[tuple[str, Path]]) -> None:
@@ -90,13 +84,6 @@ def test_arrows_and_enter_select_a_scene(files: list[tuple[str, Path]]) -> None:
     assert picker.handle_event(key(pygame.K_KP_ENTER)) == files[0][1]
     picker.handle_event(key(pygame.K_END))
     assert picker.handle_event(key(pygame.K_RETURN)) == files[-1][1]
-
-
-def test_selected_card_is_scrolled_into_view(files: list[tuple[str, Path]]) -> None:
-    picker = draw_picker(files, (400, 400))
-    picker.handle_event(key(pygame.K_END))
-    picker.draw(pygame.Surface((400, 400)), 1.0)
-    assert picker._rects[-1][1].bottom <= 400
 
 
 def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> None:
@@ -136,12 +123,15 @@ def test_click_selects_the_card_below(files: list[tuple[str, Path]]) -> None:
     assert picker.chosen == 4
 
 
-def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
+def test_wheel_scrolls_and_a_selected_card_is_scrolled_into_view(files: list[tuple[str, Path]]) -> None:
     picker = draw_picker(files, (400, 400))
     top = picker._rects[0][1].top
     picker.handle_event(wheel(-1))
     picker.draw(pygame.Surface((400, 400)), 1.0)
     assert picker._rects[0][1].top < top
+    picker.handle_event(key(pygame.K_END))
+    picker.draw(pygame.Surface((400, 400)), 1.0)
+    assert picker._rects[-1][1].bottom <= 400
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])

@@ -1,8 +1,5 @@
 """Widgets: clicks and drags by events, within one or several frames."""
 
-import gc
-import weakref
-
 import pygame
 import pytest
 
@@ -56,11 +53,20 @@ def test_press_and_release_in_one_frame_change_the_value() -> None:
     assert not widget.held
 
 
-def test_press_on_the_handle_without_moving_changes_nothing() -> None:
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ([3], []),
+        ([4, 5], [(0.51, False), (0.51, True)]),  # no jump to the press
+        ([0, 40, 0], [(0.9, False), (0.5, False), (0.5, True)]),
+    ],
+)
+def test_handle_moves_as_far_as_the_mouse(path: list[int], expected: list[tuple[float, bool]]) -> None:
     widget = slider()
     x, y = track_point(widget, 0.25)
-    send(widget, press(x + 3, y), release(x + 3, y))
-    assert changes(widget) == []
+    send(widget, press(x + path[0], y), *(move(x + each, y, held=True) for each in path[1:]))
+    send(widget, release(x + path[-1], y))
+    assert changes(widget) == expected
 
 
 def test_drag_continues_outside_and_is_exact_at_the_ends() -> None:
@@ -71,42 +77,17 @@ def test_drag_continues_outside_and_is_exact_at_the_ends() -> None:
     assert changes(widget) == [(1.0, False), (2.0, False), (0.0, False), (2.0, False), (2.0, True)]
 
 
-def test_press_beside_the_centre_of_the_handle_does_not_jump() -> None:
+@pytest.mark.parametrize(("delay", "expected", "fraction"), [(0, [(0.3, True)], 0.15), (DOUBLE_CLICK_MS + 1, [], 0.9)])
+def test_second_click_restores_the_default_if_it_comes_soon(
+    delay: int, expected: list[tuple[float, bool]], fraction: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     widget = slider()
-    x, y = track_point(widget, 0.25)
-    send(widget, press(x + 4, y), move(x + 5, y, held=True), release(x + 5, y))
-    assert changes(widget) == [(0.51, False), (0.51, True)]
-
-
-def test_drag_back_to_the_start_ends_with_a_final_event() -> None:
-    widget = slider()
-    x, y = track_point(widget, 0.25)
-    send(widget, press(x, y), move(x + 40, y, held=True), move(x, y, held=True), release(x, y))
-    assert changes(widget) == [(0.9, False), (0.5, False), (0.5, True)]
-
-
-def test_logarithmic_slider_reaches_its_exact_ends() -> None:
-    widget = slider(Parameter("dt", "dt", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"))
-    send(widget, press(*track_point(widget, 0.5)), move(-900, 0, held=True), move(900, 0, held=True), release(900, 0))
-    assert [value for value, _ in changes(widget)][1:] == [1e-4, 0.1, 0.1]
-
-
-def test_double_click_restores_the_default() -> None:
-    widget = slider()
-    send(widget, press(*track_point(widget, 0.9)), release(*track_point(widget, 0.9)))
-    widget.events.clear()
-    send(widget, press(*track_point(widget, 0.9)), release(*track_point(widget, 0.9)))
-    assert changes(widget) == [(0.3, True)]
-    assert widget.fraction == 0.15
-
-
-def test_slow_second_click_is_no_double_click(monkeypatch: pytest.MonkeyPatch) -> None:
-    widget = slider()
-    monkeypatch.setattr(pygame.time, "get_ticks", lambda: 1000)
-    send(widget, press(*track_point(widget, 0.9)), release(*track_point(widget, 0.9)))
-    monkeypatch.setattr(pygame.time, "get_ticks", lambda: 1001 + DOUBLE_CLICK_MS)
-    send(widget, press(*track_point(widget, 0.9)), release(*track_point(widget, 0.9)))
-    assert widget.value == 1.8
+    for time in (1000, 1000 + delay):
+        monkeypatch.setattr(pygame.time, "get_ticks", lambda now=time: now)
+        widget.events.clear()
+        send(widget, press(*track_point(widget, 0.9)), release(*track_point(widget, 0.9)))
+    assert changes(widget) == expected
+    assert widget.fraction == fraction
 
 
 def test_disabled_slider_keeps_its_value_and_shows_the_reason() -> None:
@@ -162,22 +143,6 @@ def test_click_that_starts_or_ends_outside_is_ignored() -> None:
         send(widget, press(ROW.right + 9, ROW.bottom + 9), release(*ROW.center))
         send(widget, press(*ROW.center, button=3), release(*ROW.center, button=3))
         assert widget.events == []
-
-
-def test_button_reports_its_name() -> None:
-    widget = PushButton(pygame.Surface((300, 100)), "play", "Go on")
-    with_rect(widget)
-    send(widget, press(*ROW.center), release(*ROW.center))
-    assert widget.events == [WidgetEvent("button", "play")]
-
-
-def test_widgets_are_released_without_references() -> None:
-    surface = pygame.Surface((9, 9))
-    widgets = [slider(), OptionButton(surface, PARAMETER), Checkbox(surface, "a", True), PushButton(surface, "b")]
-    references = [weakref.ref(widget) for widget in widgets]
-    del widgets
-    gc.collect()
-    assert [ref() for ref in references] == [None] * 4
 
 
 @pytest.mark.parametrize("name", ICON_NAMES)
