@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
@@ -247,7 +247,6 @@ KEYS: dict[str, st.SearchStrategy[Any]] = {
 }  # fmt: skip
 
 
-@settings(max_examples=60)
 @given(st.data())
 def test_start_states_are_those_of_the_scenes(data: st.DataObject) -> None:
     keys = tuple(data.draw(st.lists(st.sampled_from(sorted(KEYS)), min_size=1, unique=True)))

@@ -73,6 +73,7 @@ def test_a_million_equal_seeds_are_one_run(scene: tuple[str, str]) -> None:
     assert len(large) == 1
 
 
+@pytest.mark.nightly  # 11 s
 def test_ten_million_runs_take_no_memory(scene: tuple[str, str]) -> None:
     ranges = [SampledRange.parse("ball.a.mass=1:2"), SampledRange.parse("ball.a.radius=0.5:2:log")]
     sample = sampled_axis([each for each in ranges if each is not None], Sampling.parse("10000:sobol"))

@@ -86,7 +86,7 @@ def scene(tmp_path: Path) -> str:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("runs", "times"),
-    [pytest.param(60, 3, marks=pytest.mark.fail_slow(60)), pytest.param(400, 19, marks=pytest.mark.nightly)],
+    [pytest.param(60, 2, marks=pytest.mark.fail_slow(60)), pytest.param(400, 19, marks=pytest.mark.nightly)],
 )
 def test_killed_driver_is_resumed_and_makes_exactly_the_missing_runs(runs, times, scene, tmp_path):
     folder, rng = tmp_path / "runs", random.Random(4)

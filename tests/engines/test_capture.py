@@ -316,7 +316,6 @@ joint_kinds = st.sampled_from(list(JOINTS))
 limits = st.tuples(st.sampled_from((math.inf, 0.0, 300.0, 2e4)), st.sampled_from((math.inf, 0.0, 2.0)))
 
 
-@settings(max_examples=25)
 @given(st.lists(st.tuples(joint_kinds, limits, st.floats(0, 1), st.floats(0.05, 2)), min_size=1, max_size=8))
 def test_random_joints_with_limits_continue_to_the_same_bits(
     drawn: list[tuple[str, tuple[float, float], float, float]],
@@ -408,7 +407,6 @@ def test_body_joined_to_the_world_passes_its_walls_only_without_collide_bodies(c
 shapes = st.sampled_from(("circle", "segment", "box", "triangle"))
 
 
-@settings(max_examples=25)
 @given(st.lists(st.tuples(shapes, st.floats(-80, 80), st.floats(20, 200), st.floats(-3, 3)), min_size=1, max_size=12))
 def test_random_spaces_continue_to_the_same_bits(drawn: list[tuple[str, float, float, float]]) -> None:
     space = space_with_walls()
@@ -530,7 +528,7 @@ def test_filters_that_a_scene_can_state_are_kept(names: tuple[str, ...]) -> None
         assert max(differences) == 0.0 and not captured.inexact
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     filters=st.lists(st.tuples(st.integers(0, 0b1111), st.integers(0, 0b1111)), min_size=3, max_size=6),
     walls=st.tuples(st.integers(0, 0b1111), st.integers(0, 0b1111)),

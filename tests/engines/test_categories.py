@@ -55,7 +55,6 @@ def ball(x: float, vx: float = 0.0, **more: Any) -> dict[str, Any]:
 
 @every_engine
 @given(first=FILTERS, second=FILTERS)
-@settings(max_examples=25, deadline=None)
 def test_balls_exchange_velocities_only_if_their_filters_allow_it(engine: str, first: Filter, second: Filter) -> None:
     scene = scene_with(ball=[ball(0.0, 2.0, **first), ball(0.5, **second)])
     end = sandbox.run(scene, engine).velocity[-1, :2, 0]
@@ -75,7 +74,7 @@ def test_balls_exchange_velocities_only_if_their_filters_allow_it(engine: str, f
     ids=lambda each: next(iter(each)),
 )
 @given(first=FILTERS, second=FILTERS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_static_objects_stop_only_balls_that_their_filters_name(
     engine: str, collider: dict[str, Any], first: Filter, second: Filter
 ) -> None:

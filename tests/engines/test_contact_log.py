@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog
@@ -50,7 +50,6 @@ def record_contacts(script: list[Interval], joints: bool, impulses_only: bool) -
 
 @pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("joints", [False, True])
-@settings(max_examples=200)
 @given(intervals())
 def test_impulses_only_records_are_bit_identical_to_full_records(joints: bool, script: list[Interval]) -> None:
     if not joints:  # each pair then occurs once

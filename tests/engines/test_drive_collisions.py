@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines import switching
@@ -105,7 +105,6 @@ each_impact = given(
 )
 
 
-@settings(max_examples=20, deadline=None)
 @each_impact
 def test_ball_and_free_bar_rebound_by_the_closed_form(start, arm, speed, e, mass, side):
     """J = (1 + e) v / (1/m + r²/I), about the hinge: v' = v − J/m, ω = J r / I."""
@@ -119,7 +118,6 @@ def test_ball_and_free_bar_rebound_by_the_closed_form(start, arm, speed, e, mass
     assert frame.angular_velocity[1] == pytest.approx(-side * impulse * arm / BAR_MOMENT, rel=1e-10)
 
 
-@settings(max_examples=20, deadline=None)
 @each_impact
 def test_angular_momentum_about_the_hinge_is_conserved(start, arm, speed, e, mass, side):
     """Includes friction, with half of the bar's width as lever: the hinge takes momentum but no angular momentum."""

@@ -220,7 +220,7 @@ def test_ball_rests_on_a_flipper_without_jitter(start, held):
     assert 0.0 < frame.position[0, 1] - 0.01 < BALL_RADIUS
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(1.0, 8.0)), min_size=4, max_size=4))
 def test_no_ball_passes_a_flapping_flipper(start, throws):
     """Balls thrown onto a flipper in motion, at 1 kHz: none changes sides of its middle line in one step."""

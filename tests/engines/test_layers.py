@@ -57,7 +57,7 @@ def scene_of(*scatters: dict[str, Any], **more: Any) -> Scene:
 @given(seed=st.floats(-1.0, 1.0), jitter=st.integers(0, 1000))
 @example(seed=1.0, jitter=0)  # 32-bit rounding in Box2D
 @example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance and separate between two frames
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_each_layer_runs_as_if_alone(engine: str, seed: float, jitter: int) -> None:
     """The random numbers of generators depend on their order in the file, so the compared generator comes first."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}

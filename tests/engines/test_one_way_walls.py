@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.action import Remove, Spawn, Switch
@@ -113,7 +113,6 @@ def test_box_passes_without_contact(engine: str) -> None:
 
 @pytest.mark.fail_slow(30)
 @every_engine
-@settings(max_examples=25, deadline=None)
 @given(st.floats(-1.2, 1.2), st.floats(-0.5, 0.5), st.floats(0.2, 20.0))
 def test_no_ball_passes_from_left_to_right_or_loses_energy(engine: str, y: float, up: float, speed: float) -> None:
     # Elastic and frictionless: contacts with sides and ends conserve its speed.

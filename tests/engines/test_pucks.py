@@ -82,7 +82,6 @@ def test_curling_puck_does_not_depend_on_the_step() -> None:
     assert coarse.position == pytest.approx(fine.position, abs=1e-8)
 
 
-@settings(max_examples=25)
 @given(
     spins=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3)),
     offset=st.floats(-0.25, 0.25),

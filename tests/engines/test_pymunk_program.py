@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pymunk
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
@@ -326,7 +326,6 @@ def test_space_scene_program_space_round_trip(make: Callable[[], pymunk.Space]) 
     assert ends[0] == ends[1]
 
 
-@settings(max_examples=60, deadline=None)
 @given(_documents())
 def test_random_scenes_have_the_states_of_the_engine(document: dict[str, Any]) -> None:
     scene = from_document(document)

@@ -220,7 +220,6 @@ def test_middle_profile_has_its_largest_kick_in_the_middle_and_none_at_the_ends(
     assert kicked(speed, 0.1, False, fraction, 0.1) == 0.0
 
 
-@settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=3, max_size=6, unique=True), st.booleans())
 def test_segment_fractions_are_contiguous_from_zero_to_one(points: list[tuple[float, float]], closed: bool) -> None:
     parts = segment_fractions((*points, points[0]) if closed else points)
@@ -248,7 +247,7 @@ def test_penalty_refuses_falloff_and_kicks() -> None:
 
 @pytest.mark.fail_slow(30)
 @pytest.mark.parametrize("engine", ENGINES)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(x=st.floats(-0.2, 0.2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), g=st.floats(0, 2))
 def test_ledger_closes_in_a_kicking_box(engine: str, x: float, vx: float, vy: float, g: float) -> None:
     rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.6}

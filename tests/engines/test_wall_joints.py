@@ -81,7 +81,7 @@ def wall_points(pieces: int, rise: float = 0.0, reverse: bool = False) -> list[l
     reverse=st.booleans(),
     one_way=st.booleans(),
 )
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 def test_straight_wall_in_pieces_is_bit_identical_to_one_wall(
     engine: str,
     kind: str,

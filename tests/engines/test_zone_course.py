@@ -81,14 +81,13 @@ def test_engines_agree_on_the_whole_course() -> None:
 
 
 @given(st.floats(0.6, 3.0), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_engines_agree_on_courses_with_random_velocity_and_gravity(along: float, across: float, gravity: float) -> None:
     scene = course((along, across), duration=4.0, gravity=[gravity, 0.1])
     assert_runs_agree(*(sandbox.run(scene, engine, audit=False) for engine in ("pymunk", "reference")))
 
 
 @given(st.integers(0, 1_000_000))
-@settings(max_examples=25, deadline=None)
 def test_engines_agree_on_straight_gates(seed: int) -> None:
     """A ball flies along a random curve to a gate; exactly on the line of a gate rounding would decide.
 

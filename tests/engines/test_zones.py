@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
@@ -90,7 +90,6 @@ def test_entry_is_recorded_in_the_substep_in_which_the_centre_enters(engine: str
     speed=st.floats(0.5, 4.0),
     phase=st.floats(0.0, 1.0),
 )
-@settings(max_examples=40, deadline=None)
 def test_entry_into_a_circle_is_recorded_on_any_chord(
     engine: str, angle: float, offset: float, speed: float, phase: float
 ) -> None:

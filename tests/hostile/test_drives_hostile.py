@@ -52,7 +52,7 @@ def start_with(scene, config):
 
 
 @pytest.mark.parametrize("config", CONFIGS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(sessions())
 def test_driven_bodies_stay_within_the_limits_of_their_drives(config, session):
     scene, levels = session

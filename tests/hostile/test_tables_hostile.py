@@ -112,7 +112,7 @@ def play(running: SwitchableSimulation, actions: TimedActions, steps: int = STEP
 tables = st.integers(0, 2**32).map(random.Random)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(tables)
 def test_energy_account_closes_with_any_elements_and_actions(r: random.Random) -> None:
     scene, actions = from_document(table(r)), table_actions(r)

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.engines.tabletop.collisions import HAN2005, MATHAVAN2010, SIMPLE, Five, collide_cushion
@@ -24,7 +24,6 @@ def energy(motion: Five) -> float:
 
 
 @pytest.mark.parametrize("model", [SIMPLE, HAN2005, MATHAVAN2010])
-@settings(max_examples=60, deadline=None)
 @given(fractions, frictions, frictions, noses, st.floats(-1.5, 1.5), st.tuples(spins, spins, spins))
 @example(0.85, 1000.0, 1000.0, 1.5, 1.2, (1.0, -2.0, 3.0))  # the slip changed sign in each step, with growing magnitude
 @example(1.0, 0.2, 0.2, 1e-17, 0.1, (0.0, 0.0, 0.0))  # a nose at floor height exerts no normal impulse

@@ -41,7 +41,7 @@ def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize("cushion", ["simple", "han2005", "mathavan2010"])
 @pytest.mark.parametrize("ball_ball", ["elastic", "frictional"])
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(aim=st.floats(0.0, 6.28), speed=st.floats(0.5, 1.5), side=offsets, height=offsets)
 def test_engines_agree_over_the_first_hits(
     engine: str, ball_ball: str, cushion: str, aim: float, **stroke: float

@@ -140,6 +140,7 @@ def test_rattle_is_of_second_order_and_impulses_of_first():
         assert fitted == pytest.approx(order, abs=0.15)  # three steps; the next order is not negligible at the largest
 
 
+@pytest.mark.nightly  # 14 s
 def test_double_pendulum_conserves_energy():
     """Case 5: the error is in a band that decreases as h² on RATTLE, over ten chaotic seconds."""
     bodies = [

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
@@ -21,7 +21,6 @@ from tests.scene.touching import (
 )
 
 
-@settings(max_examples=50)
 @given(touching_scenes())
 def test_contact_matrix_equals_a_brute_force_search_over_pairs(scene: Scene) -> None:
     matrix = contact_matrix(scene)

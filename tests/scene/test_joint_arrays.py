@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.scene import Scene
@@ -95,7 +95,6 @@ def test_links_list_bodies_held_turned_and_excluded_from_collision() -> None:
     assert links.of(LinkKind.MOTOR).names == ("joint-3",)
 
 
-@settings(max_examples=25)
 @given(strategies.solid_scenes())
 def test_links_among_fewer_bodies_are_renumbered_or_dropped(scene: Scene) -> None:
     names = scene.bodies.names

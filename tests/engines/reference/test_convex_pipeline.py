@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
@@ -60,7 +60,6 @@ def find_contacts(scene, broad_phase):
     return [column.copy() for column in contacts], finder.work
 
 
-@settings(deadline=None, max_examples=60)
 @given(crowds())
 def test_every_broad_phase_finds_the_same_contacts(scene):
     contacts, _ = find_contacts(scene, "all_pairs")
@@ -70,7 +69,6 @@ def test_every_broad_phase_finds_the_same_contacts(scene):
             np.testing.assert_array_equal(ours, theirs)
 
 
-@settings(deadline=None, max_examples=60)
 @given(crowds())
 def test_contacts_are_sorted_by_key_and_never_within_one_body(scene):
     (key, first, second, normal, separation, *_), _ = find_contacts(scene, "grid")
@@ -81,7 +79,6 @@ def test_contacts_are_sorted_by_key_and_never_within_one_body(scene):
     assert not scene.bodies.fixed[first[second < 0]].any()
 
 
-@settings(deadline=None, max_examples=60)
 @given(crowds())
 def test_lever_arms_end_on_both_surfaces(scene):
     """The contact points on the two bodies differ by the separation along the normal."""

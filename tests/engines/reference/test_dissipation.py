@@ -56,7 +56,7 @@ def kinetic_energy(run: sandbox.Trajectory, scene: Scene) -> np.ndarray:
 @given(st.integers(0, 10**6), st.integers(1, 4), st.floats(0, 1), st.floats(0, 2))
 @example(seed=4, count=4, e=0.0, mu=1.0)  # the iterations without restitution end before convergence
 @example(seed=4, count=2, e=0.0, mu=1.0)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_dissipative_impacts_never_create_energy(seed: int, count: int, e: float, mu: float) -> None:
     scene = thrown_bodies(seed, count, e, mu, impact="dissipative")
     for integrator, detection in (("explicit_euler", "discrete"), ("velocity_verlet", "bisect")):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
@@ -148,7 +148,6 @@ def test_energy_gained_in_a_gravity_zone_is_booked_as_drives(integrator: str) ->
     st.floats(-1.2, 1.2),
     st.floats(-1.2, 1.2),
 )
-@settings(max_examples=100, deadline=None)
 def test_is_inside_agrees_with_contains_for_star_outlines(
     spokes: list[tuple[float, float]], x: float, y: float
 ) -> None:
@@ -170,7 +169,6 @@ def test_is_inside_agrees_with_contains_for_star_outlines(
 
 
 @given(st.floats(-0.9, 0.6), st.floats(0.3, 30.0))
-@settings(max_examples=30, deadline=None)
 def test_closed_gate_admits_bodies_from_outside_and_stops_them_inside(height: float, speed: float) -> None:
     """A closed gate with its left side inside: a body enters without contact and never leaves.
 

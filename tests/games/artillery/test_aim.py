@@ -44,7 +44,6 @@ def test_full_skill_hits_within_the_crater(case: tuple[Any, ...]) -> None:
 
 
 @pytest.mark.nightly
-@settings(max_examples=60)
 @given(CASES)
 def test_full_skill_hits_from_any_position(case: tuple[Any, ...]) -> None:
     assert_hit(*case)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -85,7 +85,6 @@ def test_range_with_quadratic_drag(quadratic: float, wind: float, distance: floa
         assert found == (pytest.approx(distance, abs=5e-5), pytest.approx(time, abs=5e-6))  # as documented
 
 
-@settings(max_examples=20)
 @given(st.floats(0.0, 10.0), st.sampled_from([(0.0, 0.0), (0.3, 0.0), (0.0, 0.01), (0.1, 0.005)]))
 def test_a_flight_can_be_continued_from_any_of_its_points(time: float, drags: tuple[float, float]) -> None:
     air = world(*drags, 6.0)

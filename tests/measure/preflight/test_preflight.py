@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pymunk
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.measure.preflight import (
@@ -177,7 +177,6 @@ def test_posts_planes_and_fixed_balls_have_individual_depths() -> None:
     assert passage.reach == 1.1  # half the smaller side of the box, and half the thickness of the wall
 
 
-@settings(max_examples=30)  # each example is a run
 @given(st.floats(0.0, 50.0), st.floats(-10.0, 10.0), st.floats(0.1, 20.0), st.floats(0.0, 1.0))
 def test_speed_above_a_level_floor_is_bounded_by_the_drop(height: float, up: float, g: float, e: float) -> None:
     scene = loads(

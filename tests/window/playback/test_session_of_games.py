@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Switch
@@ -230,7 +230,6 @@ OPERATIONS = st.lists(
 
 
 @pytest.mark.nightly
-@settings(max_examples=25, deadline=None)
 @given(operations=OPERATIONS)
 def test_any_order_of_operations_replays(operations: list[tuple[str, Any]]) -> None:
     session = session_of()

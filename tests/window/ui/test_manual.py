@@ -2,7 +2,7 @@
 
 import pygame
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.window.input.keymap import BINDINGS
@@ -82,7 +82,6 @@ def test_help_fits_into_common_window_sizes(size: tuple[int, int], ui_scale: flo
 @given(
     st.integers(1, 700), st.integers(1, 500), st.floats(0.25, 4), st.lists(st.tuples(st.text(), st.text()), max_size=30)
 )
-@settings(max_examples=30, deadline=None)
 def test_help_is_drawn_on_any_size(width: int, height: int, ui_scale: float, scene_keys: list[tuple[str, str]]) -> None:
     surface = pygame.Surface((width, height))
     HelpOverlay().draw(surface, ui_scale, scene_keys)

@@ -5,7 +5,7 @@ import weakref
 
 import pygame
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.window.playback.parameters import Parameter
@@ -223,7 +223,6 @@ def test_widgets_do_not_overlap_and_stay_inside(size: tuple[int, int], unit: flo
 
 
 @given(st.integers(1, 500), st.integers(1, 400), st.floats(0.25, 4), st.integers(0, 4))
-@settings(max_examples=40, deadline=None)
 def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count: int) -> None:
     panel = SidePanel((width, height), unit)
     panel.visible = True  # a small window hides it

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.exact.tabletop.shots import Table
@@ -31,7 +31,6 @@ def cluster(**more: Any) -> Scene:
 
 
 @pytest.mark.parametrize("friction", WITH_FRICTION)
-@settings(max_examples=25, deadline=None)
 @given(stroke=strokes)
 def test_energy_never_rises_and_its_ledger_closes(friction: bool, stroke: Stroke) -> None:
     shot = {"aim": stroke.aim, "speed": stroke.speed, "side": stroke.side, "height": stroke.height}
@@ -43,7 +42,6 @@ def test_energy_never_rises_and_its_ledger_closes(friction: bool, stroke: Stroke
     assert np.abs(residual).max() <= 1e-13 * energy[0]  # rounding of some hundreds of entries
 
 
-@settings(max_examples=25, deadline=None)
 @given(stroke=strokes)
 def test_mirrored_shots_stay_mirrored_until_chaos(stroke: Stroke) -> None:
     left = Table(table(ball("cue", 0.3, 0.5), ball("1", 0.5, 1.1)))
@@ -55,7 +53,6 @@ def test_mirrored_shots_stay_mirrored_until_chaos(stroke: Stroke) -> None:
     np.testing.assert_allclose(a.position, mirrored, atol=1e-9)  # m: rounding, amplified by a few collisions
 
 
-@settings(max_examples=25, deadline=None)
 @given(stroke=strokes)
 def test_balls_stay_on_the_table_without_overlap(stroke: Stroke) -> None:
     shot = Table(cluster()).shoot(stroke, record_paths=True)
