@@ -10,8 +10,9 @@ from hypothesis import settings
 ON_CI = bool(os.environ.get("CI"))
 
 # No deadline: no test asserts on time. CI draws the same examples in every run, so that a failure is due to the change
-# under test. `.ci/nightly` draws many new ones, and prints how to repeat a failure.
+# under test. `.ci/nightly` draws new ones, and prints how to repeat a failure.
 settings.register_profile("sandbox", deadline=None, max_examples=20, derandomize=ON_CI)
+settings.register_profile("fresh", deadline=None, max_examples=60, print_blob=True)
 settings.register_profile("nightly", deadline=None, max_examples=300, print_blob=True)
 settings.load_profile("sandbox")
 
