@@ -21,7 +21,7 @@ from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import shipped
 from tests.toy_game import TOY, Toy
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def play_episode(env: SandboxEnv, seed: int | None, action_seed: int = 1) -> list[tuple[bytes, float, bool, bool]]:

@@ -11,7 +11,7 @@ import sandbox
 from sandbox.notebook import FIT_HEIGHT, MAX_CHARACTERS, html_of
 from tests.toml_text import toml
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 HOSTILE = '</iframe><script>alert("1")</script>'
 TEXT = (

@@ -13,7 +13,7 @@ import pytest
 from sandbox.cli.main import call
 from sandbox.signals import defer_interrupt, reraise_interrupt
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 @pytest.fixture(autouse=True)

@@ -17,7 +17,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
 from tests.toml_text import toml
 
-pytestmark = pytest.mark.fail_slow(30)  # many episodes one after the other
+pytestmark = pytest.mark.fail_slow(60)  # many episodes one after the other
 
 COUNT = 12
 

@@ -24,7 +24,7 @@ from sandbox.trajectory import Trajectory
 from tests.batch.fetching import run_or_fetch
 from tests.batch.test_store import files
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SCENE = loads("""
 title = "Two"

@@ -371,7 +371,7 @@ def test_settings_and_details_are_columns_on_request(runs: StoredRuns) -> None:
     assert table["solver.substeps"].tolist() == [1] * 4
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_hundred_thousand_runs_are_grouped(tmp_path: Path) -> None:
     synthetic(tmp_path, 100_000, energy_end=float, **{"a.b": lambda k: k % 10, "solver.dt": lambda k: 0.01 + k % 3})
     with open_store(tmp_path) as runs:

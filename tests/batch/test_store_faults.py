@@ -20,7 +20,7 @@ from sandbox.signals import defer_interrupt
 from tests.batch.test_store import ID, OTHER, files, sample_run
 from tests.environment import with_root_on_path
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SAVING = """
 import sys

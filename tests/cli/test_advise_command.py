@@ -14,7 +14,7 @@ from sandbox.measure.advice import scoring, study
 from sandbox.recording import Recording
 from tests.cli.calling import DROP, FAULTY, json_of, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # command lines that run long
 
 QUICK = ("--effort", "0.2", "--repeats", "1")
 BULLET = """

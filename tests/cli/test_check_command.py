@@ -14,7 +14,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
 from tests.cli.calling import DROP, FAULTY, document_from, json_of, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def test_json_of_a_valid_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -7,7 +7,7 @@ import pytest
 from sandbox.cli.main import call
 from tests.cli.calling import DIVERGING, FAULTY, document_from, document_of, json_of, lines_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def test_json_has_the_errors(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -12,7 +12,7 @@ from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.files.shipped_scenes import shipped
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SCENE = """
 [world]

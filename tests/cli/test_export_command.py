@@ -25,7 +25,7 @@ from tests.cli.calling import DROP, document_from, json_of, lines_of, output_of,
 from tests.films import gif_frames, mp4_frames
 from tests.interruptible import interrupted
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SCENE = loads(DROP)
 SMALL = ("--size", "160x90")

@@ -13,7 +13,7 @@ import pytest
 from tests.cli.calling import json_of, lines_of, process
 from tests.interruptible import interruptible
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
 

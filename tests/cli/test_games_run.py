@@ -15,7 +15,7 @@ from sandbox.trajectory import Trajectory
 from tests.cli.calling import json_of, lines_of, process, write_scene
 from tests.toy_game import TOY, Toy
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 @pytest.fixture(autouse=True)

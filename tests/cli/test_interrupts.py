@@ -11,7 +11,7 @@ import sandbox.games.billiards.shots.study as studying
 import sandbox.measure.compare.comparison as comparing
 from tests.cli.calling import json_of, lines_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: int) -> None:

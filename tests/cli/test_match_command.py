@@ -10,7 +10,7 @@ from sandbox.games.billiards.headless import FrameRecord, MatchTable, NoRestErro
 from sandbox.games.billiards.match import Match
 from tests.cli.calling import json_of, lines_of
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
 

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.calling import DROP, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # modules of all commands are imported
+pytestmark = pytest.mark.fail_slow(60)  # modules of all commands are imported
 
 SLINGSHOT = "[pinball]\n[[pinball.slingshot]]\npoints = [[0.0, 0.0], [0.1, 0.0]]\n"
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"

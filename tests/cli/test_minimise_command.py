@@ -11,7 +11,7 @@ from sandbox.progress import Progress
 from sandbox.scene.files.load import load
 from tests.cli.calling import document_of, json_of, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 TUNNEL = """
 title = "Tunnel"

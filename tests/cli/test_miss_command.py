@@ -7,7 +7,7 @@ import pytest
 
 from tests.cli.calling import json_of, lines_of
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 AIR = """
 [world]

@@ -17,7 +17,7 @@ from sandbox.cli.main import COMMANDS
 from sandbox.engines.common.compile_clock import ANNOUNCEMENT
 from tests.cli.calling import DROP, document_of, json_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 UNICODE_DROP = DROP.replace('title = "Drop"', 'title = "μ − 🎱 é"').replace("duration = 0.5", "duration = 0.05")

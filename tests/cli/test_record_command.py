@@ -85,7 +85,7 @@ def test_wrong_arguments(game: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["record", "--force", str(game)]) == 0
 
 
-@pytest.mark.fail_slow(30)  # a child process
+@pytest.mark.fail_slow(60)  # a child process
 def test_interrupt_keeps_what_was_played(game: Path) -> None:
     handler = "import os, signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell may ignore it
     game.write_text(GAME + handler + "os.kill(os.getpid(), signal.SIGINT)\nspace.step(1)\n")

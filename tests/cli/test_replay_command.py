@@ -15,7 +15,7 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
 from tests.cli.calling import DROP
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 SCENE = loads(DROP)
 KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))

@@ -10,7 +10,7 @@ from sandbox.measure.run.recorder import TooLargeError
 from sandbox.scene.compile.scene import Scene
 from tests.cli.calling import DROP, FAULTY, document_from, json_of, lines_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 PYMUNK_ONLY = ("--engine", "pymunk")
 

@@ -17,7 +17,7 @@ from sandbox.trajectory import Trajectory
 from tests.cli.calling import DROP, SPARKS, document_from, document_of, json_of, lines_of, output_of, write_scene
 from tests.interruptible import interrupted
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def stored(folder: Path) -> list[dict[str, Any]]:

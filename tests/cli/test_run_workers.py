@@ -20,7 +20,7 @@ from sandbox.trajectory import Trajectory
 from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
 from tests.interruptible import interrupted, interruptible, worker_processes
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 TIMING_KEYS = ("seconds", "steps_per_second", "realtime_factor")
 """Keys of a row that depend on the machine."""

@@ -8,7 +8,7 @@ from sandbox.cli.main import call
 from sandbox.scene.files.json_schema import dumps, schema
 from tests.cli.calling import json_of, lines_of, output_of
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def test_schema_without_a_table_prints_the_json_schema(capfd: pytest.CaptureFixture[str]) -> None:

@@ -16,7 +16,7 @@ from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
 from tests.cli.calling import document_from, document_of, json_of, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 POT = """
 title = "Pot"

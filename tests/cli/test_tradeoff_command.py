@@ -17,7 +17,7 @@ from sandbox.measure.tradeoff.result import Tradeoff
 from sandbox.scene.files import toml_edit as rewrite
 from tests.cli.calling import DROP, FAULTY, document_of, json_of, lines_of, output_of, write_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 QUICK = ("--engine", "pymunk", "--points", "6", "--repeats", "1")
 """Options for a quick search that finds a setting."""

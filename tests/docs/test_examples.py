@@ -6,7 +6,7 @@ import pytest
 
 from tests.docs.examples import PAGES, ROOT, examples, processes, run_page
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 MAX_PROCESSES = 1
 """Largest number of commands of a page in the fast tests; each takes a second or more."""

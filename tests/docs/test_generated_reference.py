@@ -10,7 +10,7 @@ from sandbox.run_file import SHAPES
 from sandbox.scene.files.json_schema import schema
 from sandbox.trajectory import Trajectory
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and pages
+pytestmark = pytest.mark.fail_slow(60)  # child processes and pages
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "```{generated}" in page.read_text(encoding="utf-8"))

@@ -17,7 +17,7 @@ from sandbox.cli.main import COMMANDS, call
 from sandbox.recording import Recording
 from tests.cli.json_validation import assert_valid_document
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
 NO_DOCUMENT = {"play", "replay", "schema"}

@@ -620,7 +620,7 @@ print("RESULT", max(differences), bool(captured.omitted), bool(captured.inexact)
 """
 
 
-@pytest.mark.fail_slow(30)  # child processes
+@pytest.mark.fail_slow(60)  # child processes
 @pytest.mark.parametrize(
     "name", [EXAMPLES[0], *(pytest.param(each, marks=pytest.mark.nightly) for each in EXAMPLES[1:])]
 )

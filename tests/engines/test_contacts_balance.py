@@ -18,7 +18,7 @@ from sandbox.trajectory import Contacts
 from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 GRAVITY = np.array([0.0, -9.81])
 

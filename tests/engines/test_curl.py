@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from sandbox.engines.tabletop.motion import SHORT, curled, figures_of, rolled
 from sandbox.scene.description.surface import Floor
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 G, MU = 9.81, 0.01
 DECELERATION = MU * G

@@ -15,7 +15,7 @@ from sandbox.scene.files.load import from_document
 from tests import accounts
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 # Rounding of a few hundreds of sums.
 closed_account = partial(accounts.closed_account, engine="pymunk", closes=1e-11)

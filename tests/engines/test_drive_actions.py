@@ -15,7 +15,7 @@ from sandbox.scene.description.discs import Ball
 from tests.engines.flippers import ball, flipper, press, scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TABLES = flipper(), {"ball": [ball(0.05, 0.2)]}
 PLUNGER = {

@@ -12,7 +12,7 @@ from sandbox.engines.common.energy_balance import total_energy
 from tests.engines.flippers import BALL_RADIUS, BAR_MOMENT, MASS, MOMENT, REST, ball, bar, flipper, press, scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ROD = {
     "box": [{"name": "rod", "size": [0.02, 0.1], "position": [0.0, -0.05]}],

@@ -117,7 +117,7 @@ def test_stroke_is_as_fast_as_in_visual_pinball(start):
     assert down == pytest.approx(returning[0], rel=0.01)
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("moment", "hold_ratio", "within", "ramp", "return_ratio"),
     [

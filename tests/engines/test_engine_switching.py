@@ -24,7 +24,7 @@ from sandbox.trajectory import Contacts, Frame
 from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 SCENES = {each.name: load(each.path) for each in shipped()}
 SHORT = ("tutorial/bounce", "tutorial/fireworks", "benchmark/newtons_cradle", "benchmark/gas", "benchmark/incline")

@@ -462,7 +462,7 @@ RECORDED_EXAMPLES = (
 """Examples that pymunk ships, played with simulated clicks, drags and keys"""
 
 
-@pytest.mark.fail_slow(30)  # child processes
+@pytest.mark.fail_slow(60)  # child processes
 @pytest.mark.parametrize(
     "name",
     [pytest.param(each, marks=[] if each == "playground" else [pytest.mark.nightly]) for each in RECORDED_EXAMPLES],

@@ -19,7 +19,7 @@ from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
 

@@ -11,7 +11,7 @@ from tests.engines.stepping import advance
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"], indirect=True, scope="module")
 """engines that model kinematic drives; the others of this folder's fixture model drives by torque as well"""
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TRAVEL, SPEED = 0.043, 1.03  # m, m/s: of a pinball machine
 RATE, RETURN_RATE = 20.0, 5.0  # rad/s

@@ -21,7 +21,7 @@ from sandbox.scene.files.load import dumps, from_document, loads
 from sandbox.trajectory import Frame
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 G, MU, MUS, R, MASS = 9.81, 0.05, 0.004, 0.145, 19.96
 ENGINES = ["pymunk", "exact"]

@@ -19,7 +19,7 @@ from sandbox.scene.description.surface import struck
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 MASS, RADIUS, G = 0.170097, 0.028575, 9.81
 SLIDE, ROLL, SPIN = 0.2, 0.01, 0.0127

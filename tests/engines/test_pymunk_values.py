@@ -15,7 +15,7 @@ from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 from tests.strategies import numbers
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 MATERIALS = ("a", "b", "c", "d")

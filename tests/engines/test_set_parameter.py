@@ -19,7 +19,7 @@ from sandbox.scene.files.overrides import assign, change_value
 from sandbox.scene.files.shipped_scenes import find
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # hundreds of combinations
+pytestmark = pytest.mark.fail_slow(60)  # hundreds of combinations
 
 SCENES = (
     "benchmark/incline",

@@ -95,7 +95,7 @@ def test_ball_inside_a_wall_that_becomes_solid_is_pushed_out_or_refused() -> Non
     assert height_after(on_pymunk, 900) == pytest.approx(1.0 + R, abs=2e-3)
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     "how",
     [

@@ -14,7 +14,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ENGINES = "pymunk", "reference"
 

@@ -15,7 +15,7 @@ from sandbox.scene.files.load import from_document
 from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 H = 0.002
 """Substep, s."""

@@ -64,7 +64,7 @@ def test_bot_lands_on_every_engine(engine: str) -> None:
     assert game.trajectory.status == "ok"
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 3, 4))])
 def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     scene = load(find("landing"), [("world.seed", seed)])

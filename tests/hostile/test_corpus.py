@@ -8,7 +8,7 @@ import pytest
 from tools.fuzzing.isolated import Case, Limits, Outcome, run_cases
 from tools.fuzzing.scene_mutants import argument, scene_cases
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 
 SEED = 1

@@ -5,7 +5,7 @@ import pytest
 from tools.fuzzing.damaged_files import KINDS, argument, file_cases
 from tools.fuzzing.isolated import Case, Limits, run_cases
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 
 def failures(cases: list[Case], workers: int = 1) -> list[str]:

@@ -4,7 +4,7 @@ import pytest
 
 from tests.hostile.ordeal import INTERPRETER_FLAGS, cases_of, lambdas_of, run_isolated
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 CASES = """
 radius 1e-9 beside 1e9 | done | fall(ball(0, radius=1e-9), ball(2e9, radius=1e9), ball(0, y=5, radius=1e-9))

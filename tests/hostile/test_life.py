@@ -4,7 +4,7 @@ import pytest
 
 from tests.hostile.ordeal import INTERPRETER_FLAGS, run_isolated
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 SETTING = """
 def pile(**world):

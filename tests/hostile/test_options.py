@@ -10,7 +10,7 @@ import pytest
 
 from sandbox.cli.main import COMMANDS, call, cli
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 LONG = 10**6
 """characters of a long value"""

@@ -14,7 +14,7 @@ from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.playback.session import Session
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 Document = dict[str, Any]
 

@@ -16,7 +16,7 @@ from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # fuzzing and inputs at the ends of their ranges
+pytestmark = pytest.mark.fail_slow(60)  # fuzzing and inputs at the ends of their ranges
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])

@@ -65,7 +65,7 @@ def test_bounce_from_5_m(config):
     assert first == pytest.approx(1.0096376, abs=5e-8 if config.engine == "exact" else 2 * h)  # eight digits are given
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @each_config(IMPULSE_CONFIGS)
 def test_elastic_ball_keeps_its_energy_for_100_s(config):
     """Case 8: the energy stays within the band of the scheme."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from sandbox.engines.tabletop.collisions import HAN2005, MATHAVAN2010, SIMPLE, Five, collide_cushion
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 R = 0.03
 

@@ -41,7 +41,7 @@ from tests.engines.stepping import advance, advanced, assert_same_frames, contin
 from tests.laws.features import BODIES, FEATURES, document, scene_with
 from tests.samples import each_shipped_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # pile and fireworks are large, and kernels compile on first use
+pytestmark = pytest.mark.fail_slow(60)  # pile and fireworks are large, and kernels compile on first use
 
 STEPS = 30
 """in each part of a run; two balls fall on a wall after about 14"""

@@ -12,7 +12,7 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 R = 0.0285
 RAIL = {"height": 0.036, "restitution": 0.85, "friction": 0.2}

@@ -20,7 +20,7 @@ def collide(config: EngineConfig, scene):
     return result, result.velocity[0], result.velocity[-1]
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @each_config(IMPULSE_CONFIGS)
 @settings(max_examples=12)
 @given(e=restitutions, mass=masses, offset=offsets, speed=speeds)
@@ -36,7 +36,7 @@ def test_momentum_is_conserved_and_separation_speed_is_e_times_approach(config, 
     assert np.abs((now - before) @ tangent).max() <= rounding * speed  # no friction
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @each_config(IMPULSE_CONFIGS)
 @settings(max_examples=8)
 @given(e=restitutions, mass=masses, offset=offsets, speed=speeds, mu=st.sampled_from([0.05, 0.5, 10.0]))

@@ -17,7 +17,7 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.playback.session import Session
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def with_duration(scene: Scene, duration: float) -> Scene:

@@ -8,7 +8,7 @@ import pytest
 from sandbox.scene.files.load import from_document
 from tests.laws.engine_configs import EngineConfig, each_config
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 G = 9.81
 SOLID = [

@@ -39,7 +39,7 @@ def state(result, order=(0, 1, 2, 3)):
     return result.position[-1][by_name], result.velocity[-1][by_name], result.angular_velocity[-1][by_name]
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
     expected = config.run(four_balls())

@@ -123,7 +123,7 @@ def test_time_after_the_trusted_time_is_marked() -> None:
     assert "from the start" in draw_energy(comparison).axes[1].get_ylabel()
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
     paths = plot_comparison(PROJECTILES, tmp_path)
     assert [path.name for path in paths] == ["trajectories.png", "error.png", "energy.png"]

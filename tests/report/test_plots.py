@@ -14,7 +14,7 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 HEAD = 'title = "Trial"\n[world]\ngravity = [0.0, -10.0]\n[solver]\ndt = 0.1\n'
 GROUND = "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"

@@ -18,7 +18,7 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from tests import strategies
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 KEYS = sorted(

@@ -28,7 +28,7 @@ print(*sorted(name for name in sys.modules if name.startswith("sandbox.games."))
 """
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("scene", "folders"),
     [

@@ -17,7 +17,7 @@ from sandbox.scene.files.load import from_document, loads
 from sandbox.scene.files.overrides import AddressError, parse_assignment, parse_path
 from sandbox.scene.files.shipped_scenes import scenes_in
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 BALL: dict[str, Any] = {"ball": [{"position": [0, 1], "radius": 0.5}]}
 

@@ -17,7 +17,7 @@ from sandbox.scene.files.toml_edit import statements, with_solver, write_solver,
 from tests.samples import each_shipped_scene
 from tests.strategies import documents, rendered
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 BALL = '[[ball]]\nname = "a"  # it falls\nposition = [0.0, 1.0]\nradius = 0.5\n'
 CHANGES = {"dt": 0.002, "substeps": 4, "iterations": None, "integrator": "rk4"}

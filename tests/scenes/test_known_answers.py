@@ -18,7 +18,7 @@ from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 G = 9.81
 SIN, COS = 0.5, math.sqrt(0.75)

@@ -21,7 +21,7 @@ from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TABLES = ("pinball/classic", "pinball/full")
 RADIUS = 0.01349

@@ -8,7 +8,7 @@ import sandbox
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 STAGES = [
     ("marble", "domino-1"), ("domino-1", "domino-2"), ("domino-8", "domino-9"), ("domino-9", "pusher"),

@@ -14,7 +14,7 @@ from sandbox.scene.files.shipped_scenes import SCHEMA, ShippedScene, find, shipp
 from sandbox.trajectory import Contacts, Frame
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 SCENES = shipped()
 G = 9.81

@@ -8,7 +8,7 @@ from sandbox.scene.files.load import from_document
 from tools.calibration.forecast import Observation, confusion, halves, observe, shares, summary
 from tools.calibration.random_scenes import KINDS, document
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def row(foretold: bool, happened: bool, formulas: bool = False) -> Observation:

@@ -14,7 +14,7 @@ from tests.toml_text import toml
 from tests.window.pressing import key, key_up, press, release
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.fail_slow(30)  # every shipped scene
+pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
 
 LEAVING = (
     'title = "Leaving"\n'

@@ -21,7 +21,7 @@ from sandbox.window.view_bounds import field_rect, view_bounds
 from tests.samples import each_shipped_scene
 from tests.window.windowed import open_window
 
-pytestmark = pytest.mark.fail_slow(30)  # every shipped scene
+pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
 
 SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
 """Width and height, px, and the scale of text and widgets."""

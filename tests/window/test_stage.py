@@ -18,7 +18,7 @@ from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 from tests.toml_text import toml
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 GOOD = (
     toml(title="{name}")

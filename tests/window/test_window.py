@@ -24,7 +24,7 @@ from sandbox.window.ui.status import hud_status
 from tests.toml_text import toml
 from tests.window.pressing import FOCUS_LOST, key, key_up, move, press, release
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 SIZE = (900, 600)
 PICTURE = pygame.Rect(0, 165, 630, 235)

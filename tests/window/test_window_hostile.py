@@ -10,7 +10,7 @@ from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from tests.window.pressing import key
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ROOM = """
 title = {title}

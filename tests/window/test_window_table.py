@@ -20,7 +20,7 @@ from sandbox.window.ui.help import help_groups
 from tests.toml_text import toml
 from tests.window.pressing import key, key_up, move, press, release
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 SIZE = (1000, 620)
 FRAME_TIME = 1.0 / 60.0

@@ -16,7 +16,7 @@ from tests.toml_text import toml
 from tests.window.pressing import FOCUS_LOST, key, key_up, press
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 MOVING = (
     'title = "Moving"\n'

@@ -11,7 +11,7 @@ from sandbox.engines.exact.engine import ExactEngine
 from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 G = 9.81
 mpmath.mp.dps = 40

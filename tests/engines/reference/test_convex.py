@@ -333,7 +333,7 @@ print(digest.hexdigest())
 """
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_results_are_bit_identical_with_and_without_compiled_kernels():
     digests = set()
     for disabled in ("0", "1"):

@@ -13,7 +13,7 @@ from sandbox.engines.reference.collision import ConvexPipeline
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 BROAD_PHASES = ("all_pairs", "circles", "sweep", "grid", "oriented")
 

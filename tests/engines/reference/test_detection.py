@@ -15,7 +15,7 @@ from sandbox.scene.description.bodies import Box
 from tests.engines.builders import EARTH, FLOOR, ball, scene_of, shipped, simulation_of
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # hundreds of combinations
+pytestmark = pytest.mark.fail_slow(60)  # hundreds of combinations
 
 NON_CONTINUOUS, CONTINUOUS = ["discrete", "bisect"], ["swept", "shrink"]
 

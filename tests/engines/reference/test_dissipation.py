@@ -14,7 +14,7 @@ from sandbox.scene.files.load import from_document
 from tests.accounts import ledger
 from tests.engines.builders import make_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ROOM_PLANES = [
     {"point": [0, -2], "normal": [0, 1]},

@@ -18,7 +18,7 @@ from sandbox.scene.files.shipped_scenes import find
 from tests.accounts import ledger
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 CLOSED = 1e-9  # the documented bound; measured: rounding of sums, 1e-11 at most
 G = 9.81

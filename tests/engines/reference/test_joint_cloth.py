@@ -10,7 +10,7 @@ from sandbox.engines.reference.joints import MAX_STRETCH
 from sandbox.scene.compile.joint_arrays import LinkKind
 from tests.engines.reference.joint_rig import G, Rig, compile_joints, link
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def discrete_sag(links=20, span=1.0, length=1.4):

@@ -8,7 +8,7 @@ import pytest
 from sandbox.engines.common.force_field import add_attraction, add_thrust
 from tests.engines.reference.joint_rig import Rig, compile_joints
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def attraction(inverse_mass, *, target=-1, point=(0.0, 0.0), strength=1.0, softening=0.0):

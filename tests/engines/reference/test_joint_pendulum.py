@@ -10,7 +10,7 @@ from scipy.special import ellipk
 from sandbox.scene.compile.joint_arrays import LinkKind
 from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 PERIODS = {5: 2.0070219, 90: 2.3678419, 170: 4.8935243}
 """Period by amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m."""

@@ -13,7 +13,7 @@ import pytest
 
 from tests.engines.builders import ROOT
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and pages
+pytestmark = pytest.mark.fail_slow(60)  # child processes and pages
 
 HERE = Path(__file__).resolve().parent
 

@@ -19,7 +19,7 @@ from sandbox.scene.description.discs import Ball
 from tests.engines.builders import EARTH, FLOOR, PYMUNK_SETTINGS, ball, scene_of, shipped, side_by_side, simulation_of
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 def difference(theirs, ours):

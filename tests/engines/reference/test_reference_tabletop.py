@@ -28,7 +28,7 @@ def table(*balls: dict[str, Any], dt: float = 0.005, **more: Any) -> Scene:
     return from_document({"world": {"duration": 5.0}, **document})
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("speed", [3.0, 300.0])
 def test_no_ball_tunnels_through_another(speed: float) -> None:
     """At 300 m/s a ball moves 25 diameters in a step."""

@@ -60,7 +60,7 @@ def rebound_speed(e, name, **settings):
     return float(advance(simulation, 15).frame().velocity[0, 1])
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.8, 1.0])
 def test_run_with_short_steps_rebounds_with_the_stated_restitution(name, e):
@@ -73,7 +73,7 @@ def test_explicit_damping_overrides_restitution():
     assert rebound == pytest.approx(math.exp(-2.0), abs=0.02)  # as above
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_resting_ball_penetrates_by_its_weight_over_the_stiffness():
     scene = scene_of(ball(0, 0.5, mass=2.0, restitution=0.1), world=EARTH, plane=[FLOOR], solver={"dt": 0.01})
     simulation = simulation_of(scene, response="penalty", stiffness=2e4, substeps=20)

@@ -13,7 +13,7 @@ from sandbox.engines.reference.penalty import smallest_reduced_mass
 from sandbox.engines.registry import ENGINES
 from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 REFERENCE = ENGINES["reference"]
 

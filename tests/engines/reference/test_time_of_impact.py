@@ -13,7 +13,7 @@ from sandbox.engines.reference.manifold import KIND, circle_segment
 from sandbox.engines.reference.time_of_impact import NEVER, touch_circle, touch_line, touch_segment
 from tests.engines.builders import FLOOR, ball, body_store_of, scene_of
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 def doubles(bound):

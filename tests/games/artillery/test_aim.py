@@ -18,7 +18,7 @@ from sandbox.scene.files.load import loads
 from tests.games.artillery.grounds import hills, world
 from tests.toml_text import toml
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius

@@ -15,7 +15,7 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import loads
 from tests.games.artillery.dueling import two_tanks
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 

@@ -26,7 +26,7 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts, Trajectory
 from tests.games.artillery.dueling import two_tanks
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 WORLD, GAME = "linear_drag = 0.03\nduration = 14.0\nseed = 2", "speed = 60.0\nwind = 6.0"
 TEXT, BOTS = two_tanks(WORLD, GAME), two_tanks(WORLD, GAME, red="bot = 1.0", blue="bot = 0.9")

@@ -16,7 +16,7 @@ from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
 from tests.games.artillery.grounds import G, flat, hills, shot, world
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 def range_and_time(air: World, velocity: np.ndarray) -> tuple[float, float]:

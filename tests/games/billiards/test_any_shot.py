@@ -12,7 +12,7 @@ from sandbox.games.billiards.rules.base import BallEvent, GameError, Ruleset, Ru
 from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.rules.snooker import SnookerState, remaining
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 POCKETS = ("left", "right")
 CAROM = ("three-cushion", "straight-rail")

@@ -13,7 +13,7 @@ from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
 from tests.games.billiards.tables_by_hand import match, match_with_balls_at, table
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
 

@@ -22,7 +22,7 @@ from sandbox.scene.files.load import load
 from sandbox.trajectory import Contacts
 from tests.games.billiards.tables_by_hand import match, table
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 UP = 0.5 * math.pi
 

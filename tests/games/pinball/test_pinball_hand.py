@@ -50,7 +50,7 @@ def test_rising_and_far_balls_are_ignored(position: tuple[float, float] | None, 
     assert not let_play(game, PinballBot(1, 1.0), 1.0)
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_skill_is_the_fraction_of_balls_that_are_flipped() -> None:
     flipped = 0
     for seed in range(60):

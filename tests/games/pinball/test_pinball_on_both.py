@@ -15,7 +15,7 @@ from sandbox.recording import Recording
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import load
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TABLES = [
     pytest.param(path, id=path.stem, marks=[] if path.stem == "full" else [pytest.mark.nightly])

@@ -16,7 +16,7 @@ from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Contacts, Trajectory
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def plain(duration: float = 60.0, seed: int = 1, ball: bool = True) -> Scene:

@@ -25,7 +25,7 @@ from sandbox.scene.files.load import load
 from sandbox.trajectory import Frame
 from tests.games.pinball.passing_watch import TIP, PassageObserver
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 

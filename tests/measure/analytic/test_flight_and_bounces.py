@@ -22,7 +22,7 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
 from tests import runs_by_hand
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 G = 9.81
 GROUND = "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 3.0]\n"

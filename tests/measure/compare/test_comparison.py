@@ -17,7 +17,7 @@ from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
 from tests.measure.compare.altered_engines import AlteredPymunk, install
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 BOUNCE = load(find("bounce"), ["world.duration=2.0"])
 

@@ -15,7 +15,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, loads
 from tests.measure.compare.altered_engines import AlteredPymunk, install
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 DROP = """
 [world]

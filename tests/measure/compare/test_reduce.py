@@ -15,7 +15,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import shipped
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 TUNNEL = """
 title = "Tunnel"

@@ -10,7 +10,7 @@ from sandbox.cli.compare import _accuracy_lines, _joint_order
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def test_free_flight_with_quadratic_drag_is_refined_by_rk4() -> None:

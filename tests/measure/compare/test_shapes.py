@@ -15,7 +15,7 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 PENDULUM = (
     "[world]\ngravity = [0.0, -9.81]\nduration = 1.0\n[solver]\ndt = 0.01\n"

@@ -7,7 +7,7 @@ import pytest
 import sandbox
 from sandbox.scene.compile.scene import Scene
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 FALL = """
 title = "Fall"

@@ -8,7 +8,7 @@ import pytest
 from sandbox.measure.extremes.isolation import MAX_ATTEMPTS, IsolatedWorker, WorkerError
 from sandbox.measure.extremes.outcome import Task
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 MISBEHAVING = """
 import ctypes, os, signal, sys, time

@@ -11,7 +11,7 @@ from sandbox.measure.extremes.scenarios import AXES, PAIRS
 from sandbox.measure.extremes.worker import evaluate_task
 from sandbox.scene.files.load import dumps, from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Boundary:

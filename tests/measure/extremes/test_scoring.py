@@ -6,7 +6,7 @@ from sandbox.measure.extremes.outcome import Outcome, Sample, Verdict
 from sandbox.measure.extremes.runner import PredictionScore, prediction_scores
 from sandbox.measure.extremes.scenarios import AXES
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def sample(verdict: Verdict, predicted: tuple[str, ...] = (), rule: str | None = None, axis: str = "speed") -> Sample:

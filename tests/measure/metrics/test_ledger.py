@@ -31,7 +31,7 @@ restitution = 0.5
 """)
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_ledger_has_a_row_for_every_recorded_frame() -> None:
     recorded = ledger(SCENE, "reference")
     assert recorded.time.tolist() == run(SCENE, "reference").time.tolist()

@@ -18,7 +18,7 @@ from sandbox.scene.files.shipped_scenes import find
 from tests.runs_by_hand import run_of, scene_of
 from tests.samples import each_shipped_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def displacements(scene: Scene, **options: Any) -> FloatArray:

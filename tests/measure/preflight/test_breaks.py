@@ -11,7 +11,7 @@ from sandbox.measure.preflight import notes
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 RADIUS = 0.03
 

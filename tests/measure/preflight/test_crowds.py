@@ -14,7 +14,7 @@ from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def heap(positions: list[tuple[float, float]], width: float, friction: float, restitution: float = 0.1) -> Scene:

@@ -24,7 +24,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document, loads
 from tests import strategies
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def bullet(speed: float, radius: float, thickness: float, solver: str = "") -> Scene:

@@ -15,7 +15,7 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from sandbox.window.playback.session import Session
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 SCENE = from_document(
     {

@@ -122,7 +122,7 @@ def test_partial_last_step_follows_the_scheme(steps: tuple[str, int, str], subst
     assert result.velocity[-1, 0] == pytest.approx([float(v) for v in velocity], abs=1e-12)  # likewise
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("duration", "every"), [(0.8, 2), (0.804, 7), (0.8, 79), (0.8099, 80), (0.804, 81), (0.8, 1000)]
 )

@@ -19,7 +19,7 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 from tests.toy_game import TOY, Toy, toy_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 @pytest.fixture(autouse=True)

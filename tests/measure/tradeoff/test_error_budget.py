@@ -15,7 +15,7 @@ from sandbox.scene.description.world import Settings
 from tests.measure.tradeoff.evaluations_by_hand import context_of
 from tests.runs_by_hand import DROP, scene_of
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 FLIGHT = """

@@ -15,7 +15,7 @@ from sandbox.scene.compile.scene import Scene
 from tests.measure.tradeoff.evaluations_by_hand import context_of, point_of
 from tests.runs_by_hand import DROP, SWING, scene_of
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 ErrorFunction = Callable[[Configuration], float | None]
 """Error of a configuration; infinite if it diverges, None if the metric is not defined."""

@@ -27,7 +27,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from tests.runs_by_hand import DROP, SWING, scene_of
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 RANDOM = """
 [world]

@@ -11,7 +11,7 @@ from sandbox.html_repr import HtmlRepr
 from sandbox.measure.compare import Comparison
 from tests.report.html.conftest import Browser
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 PAINTED = """(() => {
   const canvas = document.querySelector("canvas");

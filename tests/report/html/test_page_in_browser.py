@@ -10,7 +10,7 @@ from selenium.webdriver.common.keys import Keys
 from tests.report.html.conftest import Browser
 from tests.report.html.page_documents import HOSTILE
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 Pages = dict[str, Path]
 

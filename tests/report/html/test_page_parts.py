@@ -148,7 +148,7 @@ def test_selected_point_has_its_warnings_and_time_per_frame() -> None:
     assert ">frame" not in safe
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_settings_beyond_a_frame_or_the_budget_are_marked() -> None:
     html = tradeoff_page({**tradeoff_document(), "budget": 0.05}).html()
     front = html[html.index("The Pareto front</bdi>") : html.index("Sources of error")]

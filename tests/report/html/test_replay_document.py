@@ -15,7 +15,7 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 from tests.toml_text import toml
 
-pytestmark = pytest.mark.fail_slow(30)  # child processes and command lines that run long
+pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 FALL = (
     toml("world", gravity=[0.0, -10.0], duration=1.0)

@@ -12,7 +12,7 @@ from sandbox.games.billiards.view.hud import status_line
 from sandbox.measure.run.sessions import rerun
 from tests.window.billiards.seated import FREE, NINE, RADIUS, advance, controls_at, roll_out
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 
 def test_time_stops_until_the_first_stroke() -> None:

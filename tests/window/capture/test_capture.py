@@ -18,7 +18,7 @@ from sandbox.window.capture.image_files import PictureError, fit_image, offscree
 from sandbox.window.capture.recorder import recorder_for, recorder_in, size_within
 from tests.films import gif_frames, mp4_frames
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 SIZE = (96, 54)
 BACKGROUND, BALL = (20, 24, 31), (86, 180, 233)

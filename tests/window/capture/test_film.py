@@ -283,7 +283,7 @@ def stored_run() -> Trajectory:
     return run(scene, audit=False, bout=PlayerSpec("skilled").start_game(scene))
 
 
-@pytest.mark.fail_slow(30)
+@pytest.mark.fail_slow(60)
 def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_path: Path) -> None:
     stored_run.save(tmp_path / "run.npz")
     film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))

@@ -255,7 +255,7 @@ def wait_for_check(hand: Hand) -> None:
     hand.frame()
 
 
-@pytest.mark.fail_slow(30)  # a window
+@pytest.mark.fail_slow(60)  # a window
 def test_remedy_is_applied_to_the_draft_and_undone(open_on: OpenOn) -> None:
     hand = open_on(TEXT)
     view = hand.view
@@ -274,7 +274,7 @@ def test_remedy_is_applied_to_the_draft_and_undone(open_on: OpenOn) -> None:
     assert view.draft.text == TEXT
 
 
-@pytest.mark.fail_slow(30)  # a window
+@pytest.mark.fail_slow(60)  # a window
 def test_plate_leaves_the_toolbar_the_file_and_messages_free(open_on: OpenOn) -> None:
     hand = open_on(TEXT)
     view = hand.view

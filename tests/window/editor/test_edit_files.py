@@ -15,7 +15,7 @@ from tests.window.editor.everything import ATTRACTED
 from tests.window.editor.hand import BALL, CTRL, SHIFT, Hand, OpenOn
 from tests.window.pressing import key, key_up, move, press, release
 
-pytestmark = pytest.mark.fail_slow(30)  # a window
+pytestmark = pytest.mark.fail_slow(60)  # a window
 
 E, S, Z = pygame.K_e, pygame.K_s, pygame.K_z
 AT = (0.0, 2.0)

@@ -18,7 +18,7 @@ from sandbox.window.playback.live import LiveView
 from tests.window.editor.hand import BALL, CTRL, SHIFT, SIZE, Hand, OpenOn
 from tests.window.pressing import move, press, release, wheel
 
-pytestmark = pytest.mark.fail_slow(30)  # a window
+pytestmark = pytest.mark.fail_slow(60)  # a window
 
 
 def test_newtons_cradle_is_built_saved_and_run(hand: Hand, tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ SCENES: dict[str, bytes | None] = {
     "300 bodies": "".join(
         toml("ball", name=f"b{k}", position=[0.5 * (k % 20), 0.5 * (k // 20)], radius=0.2) for k in range(300)
     ).encode(),
-    **{name: find(name).read_bytes() for name in ("billiards/9-ball", "artillery/duel", "tutorial/overpass")},
+    **{name: find(name).read_bytes() for name in ("billiards/9-ball", "tutorial/overpass")},
 }
 
 FRACTION = st.integers(0, 999).map(lambda k: k / 1000)

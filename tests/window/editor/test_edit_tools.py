@@ -18,7 +18,7 @@ from sandbox.scene.files.shipped_scenes import find
 from tests.window.editor.hand import BALL, CTRL, Hand, OpenOn
 from tests.window.pressing import press, release
 
-pytestmark = pytest.mark.fail_slow(30)  # a window
+pytestmark = pytest.mark.fail_slow(60)  # a window
 
 
 def lasting(scene: Scene, duration: float) -> Scene:

@@ -13,7 +13,7 @@ from sandbox.scene.files.shipped_scenes import find
 from tests.window.editor.hand import CTRL, OpenOn
 from tests.window.pressing import press
 
-pytestmark = pytest.mark.fail_slow(30)  # a window
+pytestmark = pytest.mark.fail_slow(60)  # a window
 
 SCENE = '[[ball]]\nname = "a"\nposition = [0.0, 2.0]\nradius = 0.5\n'
 CHANGED = SCENE.replace("0.5", "0.25")

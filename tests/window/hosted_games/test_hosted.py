@@ -28,7 +28,7 @@ from tests.toy_game import TOY, Toy
 from tests.window.pressing import FOCUS_LOST, key, key_up
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 

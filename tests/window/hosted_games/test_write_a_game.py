@@ -27,7 +27,7 @@ from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
 from tests.window.pressing import key
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 PAGE = Path(__file__).parents[3] / "docs/howto/write-a-game.md"
 GOLD, WHITE = (255, 215, 0), (255, 255, 255)

@@ -24,7 +24,7 @@ from tests.toml_text import toml
 from tests.window.pressing import key, key_up, move
 from tests.window.windowed import open_window, run_frame
 
-pytestmark = pytest.mark.fail_slow(30)  # every shipped scene
+pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
 
 REST = 'title = "Rest"\n' + toml("solver", dt=0.01) + toml("ball", name="a", position=[0.0, 0.0], radius=0.4)
 B, R, ESCAPE = pygame.K_b, pygame.K_r, pygame.K_ESCAPE

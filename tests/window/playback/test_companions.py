@@ -27,7 +27,7 @@ from sandbox.window.playback.diagnostics import (
 )
 from sandbox.window.playback.session import Session
 
-pytestmark = pytest.mark.fail_slow(30)  # a window or a film
+pytestmark = pytest.mark.fail_slow(60)  # a window or a film
 
 BOUNCE = load(find("bounce"))
 GAS = load(find("gas"), [("world.duration", 12.0)])

@@ -19,7 +19,7 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ALL = frozenset({"shapes", "trails", "contacts"})
 

@@ -24,7 +24,7 @@ from sandbox.window.playback.history import Keyframe
 from sandbox.window.playback.live import switch_engine
 from sandbox.window.playback.session import ReplayMismatchError, Session
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 SCENES = {name: load(find(name)) for name in ("bounce", "gas", "newtons_cradle")}

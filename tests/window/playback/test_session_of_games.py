@@ -14,7 +14,7 @@ from sandbox.recording import Recording
 from sandbox.window.playback.session import ReplayMismatchError, Session
 from tests.toy_game import Toy, toy_game, toy_scene
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 
 @pytest.fixture(autouse=True)

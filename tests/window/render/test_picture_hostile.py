@@ -11,7 +11,7 @@ from sandbox.window.playback.snapshot import OVERLAYS, MissedContactMarker
 from sandbox.window.render.renderer import Renderer
 from tests.window.render.drawn import ball, contact, frame, render, scene, snapshot
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 FAR = st.floats(-1e16, 1e16)

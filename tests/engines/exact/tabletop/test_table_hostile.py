@@ -17,7 +17,7 @@ from sandbox.scene.description.surface import Stroke
 from sandbox.scene.files.load import from_document, loads
 from tests.engines.exact.tabletop.small_tables import R, ball, table
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 HOLE = {"name": "hole", "position": [0.5, 1.5], "radius": 0.06}
 UPWARDS = Stroke(aim=0.5 * math.pi, speed=1.0)

@@ -17,7 +17,7 @@ from sandbox.scene.description.surface import Stroke
 from tests.engines.exact.tabletop.small_tables import LENGTH, WIDTH, G, R, ball, rack, table
 from tests.engines.stepping import advance
 
-pytestmark = pytest.mark.fail_slow(30)  # property tests with many examples
+pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 MAX_HOP_ENERGY = 5e-8  # J: bound of the energy that one hop of balls pressed together adds
 WITH_FRICTION = [True, False]

@@ -12,7 +12,7 @@ from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import load
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 CASES = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.json"))

@@ -12,7 +12,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 NAMES = ["billiards/8-ball", "billiards/9-ball", "billiards/snooker", "billiards/three-cushion"]
 MAX_OVERLAP = 1e-9  # m: contact tolerance

@@ -9,7 +9,7 @@ from sandbox.games.billiards.shots.predictability import By, ShotSeparation, hor
 from sandbox.games.billiards.shots.shot import Spread, shot_setup
 from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 def test_perturbation_grows_by_gap_over_diameter_at_each_hit() -> None:

@@ -17,7 +17,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke, struck
 from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
-pytestmark = pytest.mark.fail_slow(30)  # long runs and sweeps
+pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 SIGMAS = 4.0
 """Standard deviations that one in 16,000 draws exceeds; besides, the seed is fixed."""
