@@ -105,7 +105,8 @@ def test_entry_into_a_circle_is_recorded_on_any_chord(
     )
     recorded = entries(run_on(engine, scene, audit=False), scene)
     assert len(recorded) == 1
-    assert expected - 1e-9 <= recorded[0][0] <= expected + H + 1e-9
+    rounding = 1e-9 if engine != "box2d" else 1e-5  # s; positions of Box2D have 32 bits
+    assert expected - rounding <= recorded[0][0] <= expected + H + rounding
 
 
 @every_engine

@@ -46,7 +46,9 @@ class Context(NamedTuple):
     hits: frozenset[Hit]
 
     def executes(self, mutant: Mutant) -> bool:
-        """Return whether the test executes the changed text of a mutant, or may do so at import."""
+        """Return whether the test executes the changed text of a mutant; or its module, if that runs at import."""
+        if mutant.runs_at_import:
+            return any(module == mutant.module for module, _ in self.hits)
         if mutant.kernel is not None:
             return (mutant.module, mutant.kernel) in self.hits
         return any((mutant.module, line) in self.hits for line in range(mutant.line, mutant.last_line + 1))

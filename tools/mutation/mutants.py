@@ -59,6 +59,8 @@ class Mutant:
     """last line of the changed text"""
     kernel: str | None
     """compiled function that contains the fault; None in plain Python"""
+    runs_at_import: bool
+    """whether the fault is outside of functions"""
     before: str
     """changed text"""
     after: str
@@ -101,14 +103,17 @@ def _mutants(path: str, source: str) -> Iterator[Mutant]:
     starts = [0]
     for line in source.encode().splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
-    for node, kernel in _nodes(ast.parse(source)):
+    tree = ast.parse(source)
+    inside = {id(each) for node in ast.walk(tree) if isinstance(node, ast.FunctionDef) for each in ast.walk(node)}
+    for node, kernel in _nodes(tree):
         for after in _changed(node):
             begin = starts[node.lineno - 1] + node.col_offset
             end = starts[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0)
             text = source.encode()
             mutated = b"".join((text[:begin], after.encode(), text[end:])).decode()
             before = text[begin:end].decode()
-            yield Mutant(path, node.lineno, node.end_lineno or node.lineno, kernel, before, after, mutated)
+            last_line, at_import = node.end_lineno or node.lineno, id(node) not in inside
+            yield Mutant(path, node.lineno, last_line, kernel, at_import, before, after, mutated)
 
 
 def _nodes(tree: ast.Module) -> Iterator[tuple[ast.expr | ast.stmt, str | None]]:
