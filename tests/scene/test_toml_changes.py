@@ -262,7 +262,7 @@ def test_hundred_changes_of_a_thousand_elements_are_fast() -> None:
     changes: list[Change] = [SetValue(("ball", 9 * k, "position"), [0.25, k]) for k in range(100)]
     begin = time.process_time()
     with_changes(text, changes)
-    assert time.process_time() - begin < 3.0  # 0.2 s; a parse of the text for each change takes ten times the limit
+    assert time.process_time() - begin < 0.6  # 0.2 s; the limit is for busy machines
 
 
 some_values = st.one_of(

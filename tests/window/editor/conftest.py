@@ -13,7 +13,7 @@ from tests.window.editor.hand import SIZE, Hand, OpenOn
 
 @pytest.fixture
 def open_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[OpenOn]:
-    """Return a function that opens a window on a scene, given by its text or file, and edits it unless told not to."""
+    """Return a function that opens a window on a scene, given by its text or file, and edits it by default."""
     monkeypatch.chdir(tmp_path)
     windows: list[App] = []
 
