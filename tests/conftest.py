@@ -1,11 +1,21 @@
 """Settings of all tests: examples of property tests, time budgets, shards of the nightly tests, no skips on CI."""
 
 import os
+import re
 from collections.abc import Iterator
 from hashlib import blake2b
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+
+CORE = "not nightly and not fail_slow"
+"""Expression of the marks of the tests that run by default, see pyproject.toml."""
+
+WHOLE_FILE = re.compile(r"^pytestmark = pytest\.mark\.(?:nightly|fail_slow)", re.MULTILINE)
+"""Text of a file of which no test belongs to the core."""
 
 ON_CI = bool(os.environ.get("CI"))
 
@@ -15,6 +25,9 @@ settings.register_profile("sandbox", deadline=None, max_examples=20, derandomize
 settings.register_profile("fresh", deadline=None, max_examples=60, print_blob=True)
 settings.register_profile("nightly", deadline=None, max_examples=300, print_blob=True)
 settings.load_profile("sandbox")
+
+COMPILE_SECONDS = pytest.StashKey[float]()
+"""s, spent compiling kernels in this process during a test; its time budget leaves this out"""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -28,8 +41,31 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.unregister(plugin)
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not import files without a test of the core, if only the core runs: to import all takes a minute at first."""
+    if config.option.markexpr != CORE or collection_path.suffix != ".py":
+        return None
+    return "exact" in collection_path.parts or WHOLE_FILE.search(collection_path.read_text("utf-8")) is not None or None
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Keep tests of `exact` out of the core: to compile its kernels takes minutes."""
+    folder, _, parameters = item.nodeid.partition("[")
+    if "/exact/" in folder or "exact" in parameters:
+        item.add_marker(pytest.mark.fail_slow(60))
+
+
+WITHOUT_KERNELS = ("docs", "games", "levels", "report", "scene", "window")
+"""Folders whose tests need few kernels."""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the tests of a shard. The digest of a test's name decides, so that other tests do not move it."""
+    """Order the tests, and keep those of a shard.
+
+    Tests that need no kernels are last, because a second worker begins in the middle: so it does not compile what the
+    first one is compiling. The digest of a test's name decides its shard, so that other tests do not move it.
+    """
+    items.sort(key=lambda item: item.nodeid.startswith(tuple(f"tests/{folder}/" for folder in WITHOUT_KERNELS)))
     if shard := config.getoption("--shard"):
         part, count = map(int, shard.split("/"))
         parts: list[list[pytest.Item]] = [[], []]
@@ -41,8 +77,20 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Iterator[None]:
-    """Make a skipped test fail on CI, where every test has to run."""
+def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
+    """Measure the compilation of kernels during a test: any test may be the first to need one."""
+    before = COMPILE_CLOCK.seconds
+    try:
+        return (yield)
+    finally:
+        item.stash[COMPILE_SECONDS] = COMPILE_CLOCK.seconds - before
+
+
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[None]:
+    """Leave compilation out of a test's time, and make a skipped test fail on CI, where every test has to run."""
+    if call.when == "call":
+        call.duration -= item.stash.get(COMPILE_SECONDS, 0.0)
     report = yield
     if ON_CI and report.skipped and not hasattr(report, "wasxfail"):
         report.outcome = "failed"

@@ -11,6 +11,8 @@ import pytest
 
 import sandbox
 
+pytestmark = pytest.mark.fail_slow(60)  # imports all modules in new processes
+
 ROOT = Path(sandbox.__file__).parent
 
 

@@ -5,7 +5,11 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 import sandbox
+
+pytestmark = pytest.mark.fail_slow(60)  # reads all modules
 
 ROOT = Path(sandbox.__file__).parent
 

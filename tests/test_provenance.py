@@ -13,6 +13,8 @@ import pytest
 import sandbox
 from sandbox.provenance import DISPLAY, PACKAGE, versions
 
+pytestmark = pytest.mark.fail_slow(60)  # copies the package
+
 PRINT_VERSIONS = """
 import json, sandbox
 from sandbox.batch.store import run_id

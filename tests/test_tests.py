@@ -5,6 +5,10 @@ from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.fail_slow(60)  # reads all tests
+
 TESTS = Path(__file__).parent
 EXPECTING = frozenset({"raises", "warns", "fail", "check_env"})  # of pytest and gymnasium
 

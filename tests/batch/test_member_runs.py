@@ -30,6 +30,8 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import loads
 from tests.batch.test_driver import ScriptedExecutor
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact` and of many worlds
+
 BALLS = """
 title = "Balls"
 world = { gravity = [0, -9.81], duration = 0.4 }

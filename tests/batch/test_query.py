@@ -149,6 +149,7 @@ def test_wrong_or_hostile_filter_is_refused_and_changes_nothing(where, message, 
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.fail_slow(60)
 @given(st.text(), st.sampled_from(["solver.dt", "ball.stone.restitution"]))
 def test_texts_in_an_expression_are_left_alone(text: str, name: str) -> None:
     quoted = "'" + text.replace("'", "''") + "'"
@@ -323,6 +324,7 @@ def test_invalid_export_of_runs_is_rejected(folder, options, message, study, cap
     assert message in capfd.readouterr().err
 
 
+@pytest.mark.fail_slow(60)
 def test_store_is_read_while_another_process_writes(tmp_path: Path) -> None:
     script = """
 import sys

@@ -22,6 +22,8 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
 from tests.engines.stepping import advanced, assert_same_frames, stepped
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of seconds
+
 BOX = """
 [[plane]]
 point = [0, 0]

@@ -27,6 +27,8 @@ from sandbox.engines.registry import ENGINES
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, loads
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of seconds
+
 STEPS, DT = 300, 1.0 / 60.0
 
 

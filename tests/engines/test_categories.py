@@ -22,6 +22,8 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of seconds
+
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
 
 NAMES = ("player", "enemy", "shot")

@@ -45,6 +45,7 @@ def crowded_scene():
     )  # fmt: skip
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("engine", "settings"),
     [

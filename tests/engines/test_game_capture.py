@@ -20,6 +20,8 @@ from sandbox.measure.run.sessions import read_session, rerun
 from sandbox.recording import Recording
 from tests.engines.test_capture import DT, balls, space_with_walls
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of seconds
+
 STEPS = 200
 
 

@@ -81,6 +81,7 @@ def test_bodies_retire_at_the_first_frame_after_their_lifetime(engine: str) -> N
     assert {retired[n] for n in range(303, 323)} == {30 * 0.01}  # 0.3 < 30·0.01 in binary
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_engines_and_closed_forms_retire_the_same_bodies_at_the_same_frames() -> None:
     scene = scene_of(
         {"count": 200, "lifetime": 0.4, "lifetime_jitter": 0.2},

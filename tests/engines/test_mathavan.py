@@ -9,6 +9,8 @@ import pytest
 from sandbox.engines.tabletop import collisions as module
 from sandbox.engines.tabletop.collisions import MATHAVAN2010, Five, collide_cushion
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of tables
+
 R = 0.028575
 SCALE = np.asarray([1.0, 1.0, R, R, R])  # spins as surface speeds, m/s
 

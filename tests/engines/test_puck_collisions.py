@@ -2,11 +2,14 @@
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pytest import approx
 
 from sandbox.engines.tabletop.collisions import STILL, Five, collide_pucks
+
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of tables
 
 SPEED, SIZE = st.floats(-10, 10), st.floats(0.01, 10)
 MOTION = st.tuples(SPEED, SPEED, st.just(0.0), st.just(0.0), SPEED)

@@ -36,6 +36,8 @@ from tests.engines.test_capture import (
 from tests.samples import each_shipped_scene
 from tests.strategies import OUTLINES, numbers, pairs
 
+pytestmark = pytest.mark.fail_slow(60)  # runs programs in new processes
+
 SUBSTEPS = 300
 
 REFUSED = {

@@ -25,6 +25,7 @@ def scene(dt: float = 1e-3, duration: float = 1.0, gravity: float = G, **documen
     return from_document({"world": world, "solver": {"dt": dt, "iterations": 30}, **document})
 
 
+@pytest.mark.fail_slow(60)
 def test_compound_pendulum_has_the_closed_form_period() -> None:
     parts = [{"size": [0.1, 1.0]}, {"size": [0.5, 0.2], "position": [0, -0.5], "density": 3}]
     hammer = {"name": "hammer", "position": [0, 0], "density": 1, "box": parts, "angle": 0.0}
@@ -85,6 +86,7 @@ def test_jointed_bodies_without_collisions_move_as_those_with_shapes() -> None:
     assert final_hash("all") == final_hash("none")
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("seed", [0, 3])
 @pytest.mark.parametrize("kind", ["box", "compound", "corner"])
 def test_recorded_impulses_sum_to_the_momentum_change(kind: str, seed: int) -> None:

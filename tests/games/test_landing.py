@@ -75,6 +75,7 @@ def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     assert abs(displacement[0]) <= ELSEWHERE + 0.01 * (5.0 + FASTER)  # plus the distance flown in that step
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `reference`
 @pytest.mark.parametrize("engine", able(flat()))
 def test_ship_without_thrust_falls_freely_and_crashes(engine: str) -> None:
     assert_free_fall_crash(play_out(flat(), "none", engine), height=4.0)  # the box is half of 2 m tall
@@ -98,6 +99,7 @@ def test_tilted_contact_is_a_crash() -> None:
     assert 0 < game.score <= FOR_A_CRASH
 
 
+@pytest.mark.fail_slow(60)
 def test_empty_tank_stops_the_engine() -> None:
     game = play_out(flat(200.0), ScriptedInput([Press(0.0, "engine", 1.0)]))
     stop = game.recording.actions[-1]

@@ -14,6 +14,8 @@ from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 from tests.laws.engine_configs import IMPULSE_CONFIGS, EngineConfig, each_config
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of seconds
+
 G, MU, SPEED = 10.0, 0.5, 2.0
 
 BELT: dict[str, dict[str, Any]] = {

@@ -10,6 +10,8 @@ from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.files.load import from_document
 from tests.laws.engine_configs import INTEGRATORS, EngineConfig, drop
 
+pytestmark = pytest.mark.fail_slow(60)  # sweeps of step sizes
+
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 
 

@@ -1,5 +1,7 @@
 """The sample scenes and the features demand all that an engine can be asked for."""
 
+import pytest
+
 from sandbox.scene.compile.demands import Demand, demands
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import load
@@ -13,6 +15,7 @@ def demanded(*names: str) -> set[Demand]:
     return set().union(*(demands(Setup.of(load(find(name)))) for name in names))
 
 
+@pytest.mark.fail_slow(60)
 def test_sample_scenes_demand_all_that_shipped_scenes_demand():
     assert demanded(*SAMPLE_SCENES) == demanded(*(scene.name for scene in shipped()))
 

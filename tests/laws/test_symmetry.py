@@ -49,6 +49,7 @@ def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
             np.testing.assert_allclose(actual, wanted, atol=config.rounding(TOLERANCE), rtol=0)
 
 
+@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_mirror_image_stays_a_mirror_image(config):
     position, velocity, spin = state(config.run(four_balls(gravity=-9.81)))
@@ -70,6 +71,7 @@ def test_motion_is_the_same_in_a_moving_frame(config):
     np.testing.assert_allclose(drifting_spin, spin, atol=config.rounding(1e-10), rtol=0)
 
 
+@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_run_repeats_bit_for_bit(config):
     one, two = config.run(four_balls()), config.run(four_balls())

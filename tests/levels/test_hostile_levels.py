@@ -14,6 +14,8 @@ from sandbox.levels.safe_xml import MAX_XML_DEPTH
 from sandbox.scene.errors import SceneError
 from tests.levels.drawings import FULL, dynamic, faults_of, imported, map_file, objects, svg, tiles
 
+pytestmark = pytest.mark.fail_slow(60)  # large files
+
 LAUGHS = (
     '<?xml version="1.0"?><!DOCTYPE svg [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>'
     '<svg xmlns="http://www.w3.org/2000/svg"><title>&b;</title></svg>'

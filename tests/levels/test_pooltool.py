@@ -70,6 +70,7 @@ RECORDED_CAROM = (
 """The same at 3 m/s from (0.5, 0.7), with a ball of carom, of whose mass the cue's end is not a thirtieth."""
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of tables
 @pytest.mark.parametrize("engine", ["exact", "reference"])
 @pytest.mark.parametrize("case", ["side", "elevated", "carom"])
 def test_shot_moves_as_recorded_by_pooltool(case: str, engine: str) -> None:
@@ -249,6 +250,7 @@ def test_sizes_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         import_pooltool(tmp_path / "a.json")
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_command_writes_a_scene_that_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     shot, target = tmp_path / "draw.json", tmp_path / "draw.toml"
     shot.write_text(text_of(document(ball("cue", 0.5, 0.7), ball("1", 0.5, 0.9), b=-0.3)))

@@ -18,6 +18,8 @@ from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`, and measures many settings
+
 QUICK = {"effort": 0.2, "repeats": 1}
 FPS = 60.0
 

@@ -133,6 +133,7 @@ def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
     assert [path.read_bytes() for path in paths] == before
 
 
+@pytest.mark.fail_slow(60)
 def test_comparison_without_a_run_or_a_body_can_be_drawn(tmp_path: Path) -> None:
     refused = compare(DROP.scene, ["pymunk"], integrator="rk4")
     assert refused.trajectories == {}
@@ -170,6 +171,7 @@ def test_energy_axis_fits_the_truth_and_not_a_diverging_engine() -> None:
         assert high < expected.max() + 2.5 * span  # two ranges, and a margin of 5 %
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_constant_energy_is_a_flat_line_in_the_middle() -> None:
     cradle = compare(load(find("newtons_cradle"), ["world.duration=0.1"]), ["exact"])
     low, high = energy_chart(cradle).axes[0].get_ylim()

@@ -12,6 +12,8 @@ from sandbox.games.billiards.shots.study import ShotStudy, study_shot
 from sandbox.report.shots_plot import draw_aims, draw_rests, plot_shots
 from sandbox.scene.files.load import loads
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 FLOOR = "[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\nspinning_friction = 0.01\n"
 WALLS = "[[wall]]\npoints = [[-0.5, -0.5], [1.5, -0.5], [1.5, 0.5], [-0.5, 0.5]]\nclosed = true\nrestitution = 0.8\n"
 CUE = '[[ball]]\nname = "cue"\nposition = [0, 0]\nradius = 0.03\nrestitution = 1\n'

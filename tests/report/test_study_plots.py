@@ -47,6 +47,7 @@ def test_pairs_have_a_matrix_per_setup() -> None:
     assert [axes.get_title() for axes in figure.axes] == ["pymunk", "pymunk, 4 substeps", "exact"]
 
 
+@pytest.mark.fail_slow(60)
 def test_pictures_are_written(tmp_path: Path) -> None:
     names = [path.name for path in plot_extremes(synthetic_extremes(), tmp_path)]
     assert names == ["extremes.png", "pairs.png"]
@@ -104,6 +105,7 @@ def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any
     assert y > 0.1
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
 def test_file_is_written(document: dict[str, Any], suffix: str, tmp_path: Path) -> None:
     path = plot_tradeoff(document, tmp_path / f"plot{suffix}")

@@ -101,6 +101,7 @@ def test_scene_has_one_fault_with_its_path(document: dict[str, Any], fault: str)
     assert_faults(document, fault)
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     "document",
     [

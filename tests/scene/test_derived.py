@@ -70,6 +70,7 @@ def test_value_of_a_changed_setup_does_not_compile_its_scene() -> None:
     assert "bodies" not in vars(changed.scene)  # cached properties that were not read
 
 
+@pytest.mark.fail_slow(60)
 def test_value_is_released_with_its_scene() -> None:
     class Value:
         pass
@@ -92,6 +93,7 @@ def test_changed_scene_has_its_own_demands_and_matrix() -> None:
     assert contact_matrix(scene).surfaces.of_fixed.tolist() != contact_matrix(bare).surfaces.of_fixed.tolist()
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `reference`
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
 def test_run_does_not_change_the_matrix_of_its_scene(engine: str) -> None:
     scene = loads(TEXT)

@@ -36,8 +36,8 @@ UNCOMPILED = ("tests/engines/reference/", "tests/engines/exact/")
 MAX_UNCOMPILED_COST = 0.5
 """s, of a compiled test that runs without compilation: uncompiled it may take a hundred times as long"""
 
-LIMIT = 1200.0
-"""s, of all tests of a mutant, after which it counts as detected: an endless loop"""
+LIMIT = 900.0
+"""s, added to five times the recorded time of a mutant's tests; after that it counts as detected: an endless loop"""
 
 
 class Checkout:
@@ -87,27 +87,29 @@ class Checkout:
         if old is not None and old != new:
             shutil.rmtree(new)
             old.rename(new)
+        os.utime(new)  # or it would be deleted after an hour as that of earlier sources
 
-    def test(self, mutant: Mutant, contexts: dict[str, Context], only_uncompiled: bool) -> dict[str, Any]:
-        """Return the fate of a mutant."""
+    def test(self, mutant: Mutant, contexts: dict[str, Context], stages: list[str]) -> dict[str, Any]:
+        """Return the fate of a mutant after the stages "uncompiled" and "compiled", or one of them."""
         file = self.folder / mutant.path
         original, status = file.read_bytes(), file.stat()
         file.write_text(mutant.source, encoding="utf-8")
         tests = sorted(
             (test for test, context in contexts.items() if context.executes(mutant)), key=lambda t: contexts[t].seconds
         )
-        start, keeps_kernels = time.monotonic(), mutant.kernel is None and "/engines/" in mutant.path
+        is_engine = "/engines/" in mutant.path
+        start, keeps_kernels = time.monotonic(), mutant.kernel is None and is_engine and "compiled" in stages
         try:
             fate, killer = "passed", ""
             cheap = [t for t in tests if t.startswith(UNCOMPILED) and contexts[t].seconds < MAX_UNCOMPILED_COST]
-            if "/engines/" in mutant.path and cheap:
+            if is_engine and cheap and "uncompiled" in stages:
                 fate, killer = self.run(cheap, 150.0, NUMBA_DISABLE_JIT="1")
                 if "Timeout" in killer or fate == "timeout":
                     fate = "passed"
             if keeps_kernels:
                 self.keep_kernels()
-            if fate == "passed" and tests and not only_uncompiled:
-                fate, killer = self.run(tests, LIMIT)
+            if fate == "passed" and tests and ("compiled" in stages or not is_engine):
+                fate, killer = self.run(tests, LIMIT + 5.0 * sum(contexts[test].seconds for test in tests))
         finally:
             file.write_bytes(original)
             os.utime(file, ns=(status.st_atime_ns, status.st_mtime_ns))  # compiled kernels are valid by these times
@@ -133,7 +135,13 @@ def main() -> None:
     parser.add_argument("--survivors-of", type=Path, help="test only the mutants that survived in this file")
     parser.add_argument("--count", type=int, default=15, help="mutants of each module")
     parser.add_argument("--modules", nargs="*", default=MODULES, help="mutated modules")
-    parser.add_argument("--uncompiled", action="store_true", help="only tests of the engines, without compilation")
+    parser.add_argument(
+        "--stages",
+        nargs="+",
+        choices=("uncompiled", "compiled"),
+        default=["uncompiled", "compiled"],
+        help="for mutants of engines: their cheap tests without compilation, then all tests",
+    )
     parser.add_argument("--in-place", action="store_true", help="mutate this checkout, one mutant after another")
     parser.add_argument("--workers", type=int, default=2, help="copies of the checkout, each with kernels to compile")
     given = parser.parse_args()
@@ -160,7 +168,7 @@ def main() -> None:
                 mutant = left.get_nowait()
             except queue.Empty:
                 return
-            row = checkout.test(mutant, contexts, given.uncompiled)
+            row = checkout.test(mutant, contexts, given.stages)
             print("detected" if row["detected"] else "SURVIVED", row["mutant"], row["by"], sep="  ", flush=True)
             with given.out.open("a", encoding="utf-8") as out:
                 out.write(json.dumps(row) + "\n")

@@ -189,6 +189,7 @@ def mixed_sizes():
     return scene_of(*balls, hill, world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005})
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("scene", "steps", "settings"),
     [

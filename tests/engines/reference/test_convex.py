@@ -46,6 +46,7 @@ def separations_by_error(exact, p, q):
     return sorted(found, key=lambda separation: abs(separation - exact))
 
 
+@pytest.mark.fail_slow(60)
 def test_separations_match_shapely_distances_and_qhull_penetrations():
     overlaps = 0
     for p, q, size in random_pairs(1, PAIRS):
@@ -58,6 +59,7 @@ def test_separations_match_shapely_distances_and_qhull_penetrations():
     assert 0.3 * PAIRS < overlaps < 0.7 * PAIRS
 
 
+@pytest.mark.fail_slow(60)
 def test_separations_are_accurate_from_micrometres_to_a_thousand_kilometres():
     random = np.random.default_rng(2)
     for k in range(PAIRS):
@@ -78,6 +80,7 @@ def test_separations_are_accurate_from_micrometres_to_a_thousand_kilometres():
         assert other == pytest.approx(exact, abs=3 * REFERENCE_FACE_BIAS * scales.min() + rounding)
 
 
+@pytest.mark.fail_slow(60)
 def test_pieces_moved_by_the_separation_along_the_normal_just_touch():
     for p, q, size in random_pairs(3, PAIRS):
         nx, ny, separation = deepest(collide(p, q))[:3]
@@ -256,6 +259,7 @@ def pymunk_contact(p, q):
     return contacts.normal, min(point.distance for point in contacts.points)
 
 
+@pytest.mark.fail_slow(60)
 def test_overlapping_polygons_match_pymunk():
     random = np.random.default_rng(9)
     compared = 0

@@ -40,6 +40,7 @@ def test_no_ball_tunnels_through_another(speed: float) -> None:
     assert simulation.contacts().pair.tolist() == [[0, 1]]
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of tables
 def test_ball_falls_into_a_pocket_and_a_move_returns_it() -> None:
     scene = table(ball("a", 0, 0, 2.0, 0), pocket=[{"position": [0.5, 0.0], "radius": 0.05}])
     simulation = start(scene, "reference")
@@ -79,6 +80,7 @@ def test_only_balls_of_the_same_radius_can_be_added() -> None:
     assert len(simulation.bodies) == 1
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of tables
 def test_observer_sees_balls_in_pockets_as_nan() -> None:
     observed: list[Any] = []
     simulation = start(table(ball("a", 0, 0, 2, 0), pocket=[{"position": [0.1, 0], "radius": 0.05}]), "reference")

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -73,6 +74,7 @@ def test_contacts_are_the_overlapping_pairs(scene):
     assert (contacts.separation < 0).all()
 
 
+@pytest.mark.fail_slow(60)
 def test_walls_far_from_the_origin_are_not_lost_to_rounding():
     random = np.random.default_rng(3)
     count = 0

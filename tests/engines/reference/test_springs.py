@@ -96,6 +96,7 @@ def test_springs_never_pull():
         fastest = speed
 
 
+@pytest.mark.fail_slow(60)
 def test_energy_error_of_elastic_springs_falls_with_the_step():
     errors = []
     for substeps in (30, 60, 120):
@@ -108,6 +109,7 @@ def test_energy_error_of_elastic_springs_falls_with_the_step():
     assert errors[2] < errors[0]
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("response", ["impulse", "penalty"])
 def test_reported_contact_impulses_equal_the_momentum_change(integrator, response):

@@ -10,6 +10,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of many worlds
+
 SHIPS = """
 title = "Two ships that pass through each other, above a wall and a plane"
 [world]

@@ -11,6 +11,8 @@ from sandbox.games.billiards.rules.base import Decision, GameError
 from sandbox.scene.description.surface import Stroke
 from tests.games.billiards.tables_by_hand import match, table
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 TERMS = {"three-cushion": {"distance": 2}, "straight-rail": {"distance": 3}, "snooker": {"misses": True}}
 
 

@@ -14,6 +14,8 @@ from sandbox.games.billiards.rules.base import GameError, ShotCall
 from sandbox.scene.description.surface import Stroke
 from tests.games.billiards.tables_by_hand import match, match_with_balls_at, run_until_rest, table
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 UP = 0.5 * np.pi
 
 

@@ -16,6 +16,8 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of tables
+
 SCENE = load(find("games/curling"))
 assert SCENE.surface is not None
 ICE = Ice.of(SCENE.surface)

@@ -17,6 +17,8 @@ from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from tests.games.curling.ice import Rink, sheet
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of tables
+
 
 @pytest.fixture
 def rink() -> Rink:
@@ -144,6 +146,7 @@ def test_a_copy_of_the_rules_is_independent(rink: Rink) -> None:
     assert rink.rules._score.thrown == 1
 
 
+@pytest.mark.fail_slow(60)
 def test_a_scripted_game_with_sweeping_replays_to_the_same_state() -> None:
     scene = sheet("world.duration=60.0")
     script = [Press(0.5, "right", 1.0), Press(1.5, "right", 0.0), Press(2.0, "throw", 1.0), Press(6.0, "sweep", 1.0)]
@@ -160,6 +163,7 @@ def test_a_scripted_game_with_sweeping_replays_to_the_same_state() -> None:
     assert rules._score.thrown == 2
 
 
+@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     ("duration", "thrown"),
     [(60.0, 3), pytest.param(1e4, 16, marks=pytest.mark.nightly)],

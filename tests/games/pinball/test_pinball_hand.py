@@ -69,6 +69,7 @@ def test_ball_in_the_lane_is_plunged() -> None:
     assert len(pressed) == 2  # the bot waits for the spring
 
 
+@pytest.mark.fail_slow(60)
 def test_bot_depends_only_on_its_seed() -> None:
     def plays(seed: int) -> list[tuple[float, str, float]]:
         return let_play(ball_at_flipper(), PinballBot(seed, 0.3), 3.0)

@@ -66,6 +66,7 @@ def test_full_nudge_warns_and_the_third_tilts(game: Table) -> None:
     assert game.lines()[""] == "TILT!"
 
 
+@pytest.mark.fail_slow(60)
 def test_light_nudges_do_not_warn(game: Table) -> None:
     for _ in range(10):
         game.press("nudge", 0.13)  # an undamped bob trips at 0.1413
@@ -167,6 +168,7 @@ def test_no_search_while_a_ball_waits_is_held_or_moves(game: Table, state: str) 
     assert drives(game.wait(19.0)) == []
 
 
+@pytest.mark.fail_slow(60)
 def test_search_depends_only_on_the_seed() -> None:
     def kick(seed: int) -> tuple[float, float]:
         scene = table()

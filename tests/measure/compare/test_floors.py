@@ -2,9 +2,13 @@
 
 from typing import Any
 
+import pytest
+
 from sandbox.measure.analytic import solution
 from sandbox.measure.compare import compare
 from sandbox.scene.files.load import from_document
+
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 
 R = 0.028575
 BALL: dict[str, Any] = {"name": "a", "position": [0.0, 0.0], "velocity": [0.4, 1.0], "radius": R, "mass": 0.17}

@@ -36,6 +36,7 @@ def work_of(name: str, seconds: float, engine: str) -> Mapping[str, int]:
     return found.info["work"]
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_work_of_a_single_collision_equals_a_hand_count() -> None:
     # 500 substeps of 1 ms, one pair tested in each and at the start, one impact of 10 iterations.
     assert work_of("two_balls", 0.5, "reference") == {
@@ -52,6 +53,7 @@ def test_work_of_a_single_collision_equals_a_hand_count() -> None:
     assert work_of("two_balls", 0.5, "exact") == {"events": 1, "predictions": 4, "pair_tests": 8}
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_impact_through_five_balls_is_four_events_with_two_predictions_each() -> None:
     assert work_of("newtons_cradle", 0.5, "exact") == {"events": 4, "predictions": 5 + 2 * 4, "pair_tests": 13 * 5}
 

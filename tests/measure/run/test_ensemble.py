@@ -130,6 +130,7 @@ def test_starts_are_normally_distributed_and_independent() -> None:
     assert (starts.position[:, ~moves] == own.position[~moves]).all()
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_start_that_overlaps_is_refused_by_exact_alone() -> None:
     scene = loads(GAS)
     found = sandbox.ensemble(scene, 30, vary={"ball.*.position": 0.2}, engine="exact")
@@ -177,6 +178,7 @@ def test_results_that_exceed_memory_are_refused_before_the_first_run() -> None:
         sandbox.ensemble(loads(GAS), 10_000_000, vary={"ball.*.velocity": 0.1}, keep="frames")
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_progress_ends_at_one_and_unknown_engine_is_refused() -> None:
     fractions: list[float] = []
     vary = {"ball.*.velocity": 0.1}

@@ -307,6 +307,7 @@ def test_unknown_engine_and_invalid_settings_raise() -> None:
             run(scene, **wrong)
 
 
+@pytest.mark.fail_slow(60)
 def test_run_too_large_for_memory_is_rejected_before_its_first_step() -> None:
     states: list[Progress] = []
     scene = loads("[world]\nduration = 1.0\n[[grid]]\norigin = [0, 0]\ncolumns = 10000\nspacing = [3, 3]\nradius = 1\n")

@@ -9,6 +9,8 @@ from sandbox.games.billiards.view.controls import DIAL, FINE, ROOM, CueControls
 from sandbox.games.billiards.view.player import BilliardsPlayer
 from tests.window.billiards.seated import FREE, NINE, controls_at
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 CUE = (0.5, 0.5)
 EMPTY_POINT = (0.9, 0.2)
 """Point without a ball, m."""

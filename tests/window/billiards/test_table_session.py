@@ -18,6 +18,8 @@ from sandbox.window.playback.live import LiveView
 from tests.toml_text import toml
 from tests.window.billiards.seated import FREE, NINE, controls_at, roll_out
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 PLAIN = (
     toml(title="Plain")
     + toml("surface")

@@ -9,6 +9,8 @@ from sandbox.scene.files.load import loads
 from sandbox.window.editor.ghost_path import SECONDS, GhostPath, GhostPredictor, predict_path
 from tests.toml_text import toml
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 FLIGHT = toml("world", gravity=[0, -9.81]) + toml("ball", name="a", position=[0, 10], velocity=[3, 4], radius=0.1)
 
 

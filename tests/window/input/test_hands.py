@@ -106,6 +106,7 @@ def test_body_that_moves_after_the_press_is_grabbed_at_the_pressed_point(paused:
         assert held == pytest.approx(grabbed_point, rel=1e-12)  # some roundings
 
 
+@pytest.mark.fail_slow(60)
 def test_pulled_body_reaches_the_mouse_and_keeps_its_velocity_when_released() -> None:
     view, tools = live(), BodyTools()
     pick_and_grab(tools, view, (0.0, 0.25), 0.0, paused=False)
@@ -181,6 +182,7 @@ def test_added_ball_of_an_empty_scene_is_scaled_to_the_view() -> None:
     assert len(view.bodies) == 2
 
 
+@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_added_ball_is_shifted_to_avoid_overlap_on_the_exact_engine() -> None:
     view, tools = live("exact"), BodyTools()
     tools.add(view, (0.2, 0.0), 10.0)

@@ -38,6 +38,7 @@ def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> li
     return calls
 
 
+@pytest.mark.fail_slow(60)
 def test_key_bindings_are_computed_once_per_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, app_state, "key_bindings")
     with open_window(ROOM, tmp_path) as window:
@@ -59,6 +60,7 @@ def test_score_panel_layout_is_cached(tmp_path: Path, monkeypatch: pytest.Monkey
         assert len(calls) == 1
 
 
+@pytest.mark.fail_slow(60)
 def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     queries = count_calls(monkeypatch, SessionParameters, "of")
     shown = count_calls(monkeypatch, SidePanel, "show")
@@ -81,6 +83,7 @@ def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch:
         assert gravity.parameter.value == -3.0  # type: ignore[attr-defined]  # it has a parameter
 
 
+@pytest.mark.fail_slow(60)
 def test_widget_shows_the_current_value_after_a_refused_change(tmp_path: Path) -> None:
     with open_window(ROOM, tmp_path, (1280, 720)) as window:
         run_frame(window)
