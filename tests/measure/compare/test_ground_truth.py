@@ -1,5 +1,6 @@
 """Refined truths end where a second method contradicts them, or where they violate a conservation law."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -144,3 +145,62 @@ def test_energy_gained_from_wind_does_not_end_the_truth() -> None:
     )
     truth = truth_of(scene, scene.solver, 1e-3)
     assert (truth.kind, truth.trusted_until) == ("refined", 1.0)
+
+
+@pytest.mark.parametrize("air", ["linear_drag = 1e-9", "wind = [4.0, 0.0]"])
+def test_energy_that_only_wind_and_drag_together_explain_ends_the_truth(
+    air: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = loads(DROP.replace("duration", f"{air}\nduration"))
+    install(monkeypatch, one=AlteredPymunk(restitution=2.2), other=AlteredPymunk(restitution=2.2))  # e = 1.1
+    truth = truth_of(scene, scene.solver, TOLERANCE)
+    assert IMPACT_TIME - 0.01 <= truth.trusted_until <= IMPACT_TIME + 0.01  # frames are 0.01 s apart
+
+
+def test_second_methods_share_one_limit_of_cost(monkeypatch: pytest.MonkeyPatch) -> None:
+    limits: list[float] = []
+    original = witness.bounded_run
+
+    def priced(start: Scene | Setup, engine: str, settings: Settings, limit: float) -> Any:
+        limits.append(limit)
+        return original(start, engine, settings, limit)[0], 1.0
+
+    monkeypatch.setattr(witness, "bounded_run", priced)
+    diverging = AlteredPymunk(gravity=1e200)
+    install(monkeypatch, pymunk=PymunkEngine(), diverging=diverging, another=AlteredPymunk(restitution=0.9))
+    assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE).witness == "another"
+    assert len(limits) > 2
+    assert limits == [witness.CONFIRMATION_LIMIT - k for k in range(len(limits))]
+
+
+def test_second_methods_that_do_not_converge_share_one_limit_of_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+    original = witness.bounded_run
+
+    def noted(start: Scene | Setup, engine: str, settings: Settings, limit: float) -> Any:
+        tried.append(engine)
+        return original(start, engine, settings, limit)
+
+    monkeypatch.setattr(witness, "bounded_run", noted)
+    monkeypatch.setattr(witness, "MIN_WORK", 0)
+    monkeypatch.setattr(witness, "IMPACT_STEPS", 1e9)  # so that no method contradicts
+    others = {f"other_{k}": AlteredPymunk(gravity=1.01) for k in range(9)}
+    install(monkeypatch, pymunk=PymunkEngine(), **others)
+    assert "has not converged" in truth_of(loads(DROP), loads(DROP).solver, TOLERANCE).about
+    # 8 halvings make the result, 1 + 2 + … + 256 runs' work. A method may take half of that, 1 + 2 + … + 128; after two
+    # of them a little is left, so that a third one begins, and after that no other.
+    assert {*tried} == {"other_0", "other_1", "other_2"}
+
+
+@pytest.mark.parametrize(("ends", "reason"), [("agrees_until", "smaller steps disagree"), ("horizon", "chaotic")])
+def test_truth_names_the_first_of_two_reasons_to_end(ends: str, reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    original = witness.refine
+
+    def ended(*given: Any) -> Any:
+        return replace(original(*given), about="smaller steps disagree", **{ends: 0.3})
+
+    monkeypatch.setattr(witness, "refine", ended)
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk())
+    truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
+    assert truth.trusted_until == 0.3
+    assert [word for word in ("smaller steps disagree", "chaotic") if word in truth.about] == [reason]
