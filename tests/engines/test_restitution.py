@@ -124,9 +124,9 @@ def test_kick_added_to_the_rebound_is_largest_in_the_middle(engine: str, x: floa
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_kick_fraction_is_measured_along_the_whole_polyline(engine: str) -> None:
-    points = [[-1.0, 0.0], [-0.5, 0.0], [1.0, 0.0], [1.0, -2.0]]  # 4 m long; x = 0.25 is at 1.25 m
-    _, velocity = run_steps(falling_ball(2.0, 0.25, points=points, restitution=0.5, kick=SLINGSHOT), engine)
-    fraction = 1.25 / 4.0
+    points = [[6.0, 0.0], [4.0, 0.0], [2.0, 0.0], [2.0, -2.0]]  # 6 m long; x = 2.5 is at 3.5 m
+    _, velocity = run_steps(falling_ball(2.0, 2.5, points=points, restitution=0.5, kick=SLINGSHOT), engine)
+    fraction = 3.5 / 6.0
     assert velocity[1] == pytest.approx(0.5 * (2.0 + 2.16 * 4 * fraction * (1 - fraction)), rel=TOLERANCE)
 
 

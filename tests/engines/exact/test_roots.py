@@ -92,6 +92,16 @@ def test_touching_circles_are_judged_by_their_relative_motion():
     assert returning == pytest.approx(4 / 9.81, rel=1e-13)  # thrown up from the top of a post, and down again
 
 
+def test_touch_of_a_distant_pair_is_as_accurate_as_its_coordinates():
+    found = curved_entry(1e5, 0.3, -1e3, 0.0, -1.0, 0.0, 0.5, False, math.inf)
+    gap = math.hypot(1e5 - (1e3 + 0.5 * found) * found, 0.3) - 0.5
+    assert abs(gap) <= 1e-10  # rounding of 1e5 m is 1.5e-11 m; the squared distance loses 1e-6 m
+
+
+def test_polynomial_that_is_zero_never_falls():
+    assert first_downward_root(0.0, 0.0, 0.0, 0.0, 0.0, 1.0) == math.inf
+
+
 @given(
     st.floats(0.6, 8),
     st.floats(0, 2 * math.pi),
