@@ -117,7 +117,7 @@ def test_import_loads_nothing_heavy() -> None:
     assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_run_works_without_assertions() -> None:
     code = f"import sandbox; print(sandbox.run(sandbox.loads({TEXT!r})).status)"
     done = subprocess.run([sys.executable, "-O", "-c", code], capture_output=True, text=True, check=True, timeout=120)

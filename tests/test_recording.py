@@ -45,7 +45,7 @@ def test_recording_round_trips_through_json() -> None:
     assert Recording.from_json(RECORDING.to_json()) == RECORDING
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.scenes(), actions(), st.floats(0, 1e9), st.none() | st.text(max_size=9))
 def test_any_recording_round_trips_through_json(scene, applied, duration, state_hash):
     recording = Recording(scene, "reference", scene.solver, applied, duration, state_hash)

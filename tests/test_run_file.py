@@ -23,23 +23,13 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 
 SCENE = loads("""
-[world]
-gravity = [0.0, -10.0]
-duration = 0.5
-[[plane]]
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-[[ball]]
-name = "a"
-position = [0.0, 1.0]
-radius = 0.5
-[[ball]]
-name = "b"
-position = [3.0, 1.0]
-radius = 0.5
-[[joint]]
-kind = "rod"
-between = ["a", "b"]
+world = { gravity = [0.0, -10.0], duration = 0.5 }
+plane = [{ point = [0.0, 0.0], normal = [0.0, 1.0] }]
+ball = [
+  { name = "a", position = [0.0, 1.0], radius = 0.5 },
+  { name = "b", position = [3.0, 1.0], radius = 0.5 },
+]
+joint = [{ kind = "rod", between = ["a", "b"] }]
 """)
 """Two balls on a rod, which fall on a plane."""
 

@@ -99,7 +99,7 @@ def mass_of(task: RunTask, k: int = 0) -> float:
     return task.jobs[k].scene.balls[0].mass or 0.0
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_short_jobs_are_grouped_and_long_ones_are_not(plan: Callable[[int], Plan]) -> None:
     executor = ScriptedExecutor(quick)
     driven(plan(1000), executor)

@@ -76,7 +76,7 @@ def completed(future: "Future[tuple[JobOutcome, ...]]") -> list[CompletedRun]:
     return [each for each in outcomes if isinstance(each, CompletedRun)]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_worker_processes_have_the_outcomes_of_this_process() -> None:
     submitted = jobs(6)
     here = completed(InProcessExecutor().submit(task_of(*submitted)))
@@ -157,7 +157,7 @@ def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytes
         executor.submit(task_of(*jobs(1))).result(60)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_process_that_ends_at_its_start_raises_executor_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", end_at_once)
     with pool() as executor, pytest.raises(ExecutorError, match="ended with status 3"):
@@ -168,7 +168,7 @@ def end_at_once(_: object) -> NoReturn:
     os._exit(3)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_fewer_workers_run_where_no_more_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
     start, started = SpawnProcess.start, list[SpawnProcess]()
 
@@ -187,7 +187,7 @@ def test_fewer_workers_run_where_no_more_can_be_started(monkeypatch: pytest.Monk
         assert executor.slots < 3
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_killed_worker_loses_the_job_that_it_ran(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, die_at_drop_1))
     with pool() as executor:
@@ -210,7 +210,7 @@ def die_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> Com
     return run(job, *more)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_worker_that_hangs_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
     monkeypatch.setattr(executors, "COMPILING", 20.0)
@@ -227,7 +227,7 @@ def hang_at_drop_1(run: Callable[..., CompletedRun], job: Job, *more: Any) -> Co
     return run(job, *more)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_worker_killed_while_it_sends_an_outcome_does_not_block_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, large_run))
     with pool(2) as executor:
@@ -254,7 +254,7 @@ def send_half(pipe: Connection, data: Any, write: Callable[[int, Any], int] = os
         os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_shut_down_ends_workers_in_the_middle_of_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(process_pool, "serve", partial(serve_with, hang_at_drop_1))
     with pool() as executor:

@@ -133,7 +133,7 @@ def test_plan_key_depends_on_everything_that_determines_a_run(change, scene, mon
     assert after != before
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_number_of_reported_faults_is_limited(scene: tuple[str, str]) -> None:
     with pytest.raises(SceneError) as error:
         plan([scene], None, sweeps=["solver.dt=-1:-2:1000000"])

@@ -31,6 +31,8 @@ from sandbox.scene.description.world import Settings
 from tests.batch.test_store import sample_run
 from tests.environment import with_root_on_path
 
+pytestmark = pytest.mark.fail_slow(60)  # other processes
+
 SCENE = """
 title = "drop"
 [world]
@@ -149,7 +151,6 @@ def test_wrong_or_hostile_filter_is_refused_and_changes_nothing(where, message, 
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.fail_slow(60)
 @given(st.text(), st.sampled_from(["solver.dt", "ball.stone.restitution"]))
 def test_texts_in_an_expression_are_left_alone(text: str, name: str) -> None:
     quoted = "'" + text.replace("'", "''") + "'"
@@ -324,7 +325,6 @@ def test_invalid_export_of_runs_is_rejected(folder, options, message, study, cap
     assert message in capfd.readouterr().err
 
 
-@pytest.mark.fail_slow(60)
 def test_store_is_read_while_another_process_writes(tmp_path: Path) -> None:
     script = """
 import sys
@@ -373,7 +373,6 @@ def test_settings_and_details_are_columns_on_request(runs: StoredRuns) -> None:
     assert table["solver.substeps"].tolist() == [1] * 4
 
 
-@pytest.mark.fail_slow(60)
 def test_hundred_thousand_runs_are_grouped(tmp_path: Path) -> None:
     synthetic(tmp_path, 100_000, energy_end=float, **{"a.b": lambda k: k % 10, "solver.dt": lambda k: 0.01 + k % 3})
     with open_store(tmp_path) as runs:

@@ -196,7 +196,7 @@ with Store(sys.argv[1]) as store:
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_several_processes_add_to_one_folder(tmp_path: Path) -> None:
     shared = [f"{k:020x}" for k in range(30)]
     individual = [[f"{k:010x}{n:010x}" for n in range(10)] for k in range(1, 4)]

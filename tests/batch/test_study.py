@@ -100,7 +100,7 @@ def test_fault_of_a_study_has_its_line(text: str, line: int | None, path: str, m
     assert message in fault.message
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_study_runs_as_the_command_that_it_states(study, tmp_path, capfd):
     status, document, err = json_of(capfd, "run", study)
     assert status == 0

@@ -72,7 +72,7 @@ print(status, *heavy, file=sys.stderr)
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("arguments", "unneeded"),
     [
@@ -96,7 +96,7 @@ def test_command_does_not_import_modules_it_does_not_need(arguments: tuple[str, 
     assert done.stderr == "0\n"
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "arguments", [("scenes",), ("schema",), ("check", "pile"), ("run", "drop.toml"), ("run", "drop.toml", "--json")]
 )

@@ -62,7 +62,7 @@ def test_missed_contacts_are_unknown_without_audit(tmp_path: Path, capfd: pytest
     assert lines_of(capfd, "run", scene, "--no-audit")[1][2].split()[-1] == "?"
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_process_in_another_folder_finds_both_kinds_of_scene(tmp_path: Path) -> None:
     write_scene(tmp_path)
     done = process("run", "drop.toml", "bounce", "--set", "world.duration=0.01", cwd=tmp_path)
@@ -179,7 +179,7 @@ def test_table_has_a_column_of_broken_joints_if_any_broke(tmp_path: Path, capfd:
         assert " ".join(out[1].split()) == f"engine dt status × real time energy, J joint error {column}contacts missed"
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_plot_is_written_and_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene, plot = write_scene(tmp_path), tmp_path / "run.svg"
     status, out, err = lines_of(capfd, "run", scene, "--plot", str(plot), "--body", "a")

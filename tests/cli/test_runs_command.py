@@ -77,7 +77,7 @@ def test_groups_have_statistics_and_success_rates(study: str, capfd: pytest.Capt
     assert list(rows[0])[-3:] == ["contacts q0.1", "contacts q0.5", "contacts q0.9"]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "words",
     [

@@ -20,48 +20,18 @@ pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that
 
 POT = """
 title = "Pot"
-
-[world]
-seed = 5
-
-[surface]
-sliding_friction = 0.2
-rolling_friction = 0.01
-spinning_friction = 0.0127
-
-[[ball]]
-name = "cue"
-position = [0.0, 0.0]
-radius = 0.028575
-restitution = 1.0
-
-[[ball]]
-name = "8:ball"
-position = [0.5, 0.0]
-radius = 0.028575
-restitution = 1.0
-
-[[ball]]
-name = "bystander"
-position = [0.5, 2.0]
-radius = 0.028575
-restitution = 1.0
-
-[[pocket]]
-name = "far [left]"
-position = [1.5, 0.0]
-radius = 0.06
-
-[[shot]]
-name = "stun"
-aim = 0.0
-speed = 3.0
-
-[[shot]]
-name = "soft"
-aim = 3.14159
-speed = 1.0
-ball = "bystander"
+world = { seed = 5 }
+surface = { sliding_friction = 0.2, rolling_friction = 0.01, spinning_friction = 0.0127 }
+ball = [
+  { name = "cue", position = [0.0, 0.0], radius = 0.028575, restitution = 1.0 },
+  { name = "8:ball", position = [0.5, 0.0], radius = 0.028575, restitution = 1.0 },
+  { name = "bystander", position = [0.5, 2.0], radius = 0.028575, restitution = 1.0 },
+]
+pocket = [{ name = "far [left]", position = [1.5, 0.0], radius = 0.06 }]
+shot = [
+  { name = "stun", aim = 0.0, speed = 3.0 },
+  { name = "soft", aim = 3.14159, speed = 1.0, ball = "bystander" },
+]
 """
 
 FEW_SHOTS = ("--count", "400", "--threads", "2")

@@ -37,7 +37,7 @@ def test_every_picture_is_referenced() -> None:
     assert sorted(set(FILES) - _referenced()) == []
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_every_picture_is_made_by_the_tool() -> None:
     tool = [sys.executable, "-m", "tools.images", "--list"]
     done = subprocess.run(tool, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)

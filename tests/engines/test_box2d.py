@@ -18,6 +18,8 @@ from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # many worlds
+
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
 GRAVITY = {"gravity": [0.0, -9.81], "duration": 1.0}
 
@@ -115,7 +117,6 @@ def test_polygons_that_box2d_would_change_are_refused() -> None:
     assert 0.0 < result.position[-1, 0, 1] < 0.01
 
 
-@pytest.mark.fail_slow(60)
 def test_worlds_are_limited_and_freed_by_close() -> None:
     scene, open_ones = scene_of(ball=[ball(0, 0)]), []
     with pytest.raises(Refusal, match="128 Box2D worlds"):
@@ -236,7 +237,6 @@ def test_drives_by_torque_are_refused() -> None:
     assert "flip: a drive by torque" in reason(scene)
 
 
-@pytest.mark.fail_slow(60)
 def test_joints_last_when_a_zone_changes_the_layer_of_a_body() -> None:
     """A pendulum that swings through a zone: its body gets other shapes, and keeps its rod."""
     joint = {"kind": "rod", "between": ["bob"], "anchors": [[0.0, 0.0], [0.0, 2.0]]}

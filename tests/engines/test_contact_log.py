@@ -48,7 +48,7 @@ def record_contacts(script: list[Interval], joints: bool, impulses_only: bool) -
     return [*found, log.take()]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("joints", [False, True])
 @given(intervals())
 def test_impulses_only_records_are_bit_identical_to_full_records(joints: bool, script: list[Interval]) -> None:

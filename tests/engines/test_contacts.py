@@ -45,7 +45,7 @@ def crowded_scene():
     )  # fmt: skip
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("engine", "settings"),
     [

@@ -121,7 +121,7 @@ SPRINGS = {
 FLIGHT = {"ball": [ball(velocity=[2.0, 3.0], angular_velocity=4.0, collides="none")]}
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("tables", [BOXES, SPRINGS, FLIGHT], ids=["boxes", "springs", "flight"])
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_ledger_closes_with_damping(tables: dict[str, Any], engine: str) -> None:

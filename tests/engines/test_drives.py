@@ -117,7 +117,7 @@ def test_stroke_is_as_fast_as_in_visual_pinball(start):
     assert down == pytest.approx(returning[0], rel=0.01)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("moment", "hold_ratio", "within", "ramp", "return_ratio"),
     [
@@ -205,7 +205,7 @@ def test_ball_that_presses_a_flipper_onto_its_stop_rebounds_as_from_a_wall(start
     assert (frame.angle[1], frame.angular_velocity[1]) == (0.0, 0.0)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("held", [True, False], ids=["held", "at rest"])
 def test_ball_rests_on_a_flipper_without_jitter(start, held):
     drive = {"stops": [-0.5, 0.0], "hold_within": 0.1} if held else {}
@@ -221,7 +221,7 @@ def test_ball_rests_on_a_flipper_without_jitter(start, held):
     assert 0.0 < frame.position[0, 1] - 0.01 < BALL_RADIUS
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @settings(max_examples=15)
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(1.0, 8.0)), min_size=4, max_size=4))
 def test_no_ball_passes_a_flapping_flipper(start, throws):

@@ -148,7 +148,7 @@ def test_flight_of_a_whole_frame_equals_its_single_substeps(drag, substeps):
     assert len(times) == 9 * substeps
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("drag", DRAGS)
 @pytest.mark.parametrize("substeps", [1, 4, 6])
 @pytest.mark.parametrize("count", [150, 20_000])

@@ -11,6 +11,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 ENGINES = ("pymunk", "reference")
 G = 10.0
 
@@ -51,7 +53,6 @@ def breaking_force(simulation: SwitchableSimulation, body: str, rise: float, ste
     raise AssertionError("no joint broke")
 
 
-@pytest.mark.fail_slow(60)
 @every_engine
 @pytest.mark.parametrize(
     "table",
@@ -66,7 +67,6 @@ def test_joint_breaks_under_the_load_of_its_strength(engine: str, table: dict[st
     assert simulation.broken == {0: simulation.time}
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("method", ["relaxation", "xpbd", "rattle"])
 @pytest.mark.parametrize("kind", ["rod", "spring"])
 def test_joint_solved_by_positions_breaks_under_the_same_load(method: str, kind: str) -> None:

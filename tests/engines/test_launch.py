@@ -14,6 +14,8 @@ from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 BOUNDS = [[-3.0, -3.0], [3.0, 30.0]]
 
 
@@ -90,7 +92,6 @@ def test_launch_restores_retired_and_removed_sparks(engine: str) -> None:
     }
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_launch_keeps_changed_parameters_spawned_bodies_and_pulls() -> None:
     simulation = start(mixed_scene())
     simulation.apply(Spawn(time=0.0, ball=Ball(name="new", position=(2.0, 9.0), radius=0.1, collides="none")))
@@ -116,7 +117,6 @@ def test_unknown_generator_is_refused(generator: str) -> None:
     assert simulation.state_hash() == before
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_launch_into_an_overlap_is_refused_by_the_exact_engine_only() -> None:
     grid = {"name": "g", "origin": [0, 2], "columns": 3, "spacing": [1, 1], "radius": 0.3}
     ball = {"name": "own", "position": [9, 2], "radius": 0.3}

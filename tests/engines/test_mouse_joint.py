@@ -16,6 +16,8 @@ from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 OMEGA = 2.0 * math.pi * 7.5
 """Natural frequency as documented in the manual of the window, rad/s."""
 
@@ -77,7 +79,6 @@ def test_impulse_solves_the_soft_constraint() -> None:
     assert (jy, turn) == (0.0, 0.0)
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pulled_body_converges_to_the_critically_damped_oscillator_at_first_order(engine: str) -> None:
     """From rest at −d: x(t) = −d·(1 + ωt)·e^{−ωt}. The largest error halves with the step."""
@@ -97,7 +98,6 @@ def test_pulled_body_converges_to_the_critically_damped_oscillator_at_first_orde
     assert errors[-1] < 0.01 * d  # ω·dt is 0.0024, and the first-order error is about that fraction of d
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("dt", "mass"), [(1e-3, 1e-9), (1 / 60, 1.0), (0.1, 1e12), (0.5, 1.0)])
 def test_pulled_body_comes_to_rest_at_the_pointer_at_any_step_and_mass(engine: str, dt: float, mass: float) -> None:

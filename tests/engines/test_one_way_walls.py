@@ -111,7 +111,7 @@ def test_box_passes_without_contact(engine: str) -> None:
     assert simulation.frame().angular_velocity[0] == 2.0
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @every_engine
 @given(st.floats(-1.2, 1.2), st.floats(-0.5, 0.5), st.floats(0.2, 20.0))
 def test_no_ball_passes_from_left_to_right_or_loses_energy(engine: str, y: float, up: float, speed: float) -> None:

@@ -39,14 +39,14 @@ STEPS_OF_SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("name", "steps"), STEPS_OF_SCENES.items())
 def test_ledger_of_a_shipped_scene_closes(name: str, steps: int) -> None:
     account = closed_account(sandbox.load(SCENES / f"{name}.toml"), steps)
     assert all(np.isfinite(list(account.values())))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "joints",
     [

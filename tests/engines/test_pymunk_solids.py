@@ -16,6 +16,8 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 G = 9.81
 FLOOR = {"name": "floor", "point": [0, 0], "normal": [0, 1]}
 
@@ -25,7 +27,6 @@ def scene(dt: float = 1e-3, duration: float = 1.0, gravity: float = G, **documen
     return from_document({"world": world, "solver": {"dt": dt, "iterations": 30}, **document})
 
 
-@pytest.mark.fail_slow(60)
 def test_compound_pendulum_has_the_closed_form_period() -> None:
     parts = [{"size": [0.1, 1.0]}, {"size": [0.5, 0.2], "position": [0, -0.5], "density": 3}]
     hammer = {"name": "hammer", "position": [0, 0], "density": 1, "box": parts, "angle": 0.0}
@@ -86,7 +87,6 @@ def test_jointed_bodies_without_collisions_move_as_those_with_shapes() -> None:
     assert final_hash("all") == final_hash("none")
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("seed", [0, 3])
 @pytest.mark.parametrize("kind", ["box", "compound", "corner"])
 def test_recorded_impulses_sum_to_the_momentum_change(kind: str, seed: int) -> None:

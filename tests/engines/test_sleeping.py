@@ -15,6 +15,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests import accounts
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 # Rounding of sums of energies up to 1e3 times the kinetic energy.
 closed_account = partial(accounts.closed_account, engine="pymunk", closes=1e-11)
 
@@ -113,12 +115,10 @@ def test_states_are_those_of_a_run_without_sleep_until_the_first_falls_asleep() 
     assert asleep_run.position[-1, rows] == pytest.approx(awake.position[-1, rows], abs=1e-3)
 
 
-@pytest.mark.fail_slow(60)
 def test_account_of_bodies_that_fall_asleep_and_wake_closes() -> None:
     closed_account(tower(), 400)
 
 
-@pytest.mark.fail_slow(60)
 def test_account_of_joined_bodies_that_fall_asleep_and_wake_closes() -> None:
     """A chain of discs, a spring and a motor fall asleep on the floor, and are hit."""
     discs = [ball(f"d{k}", 0.25 * k - 1.0, 0.1) for k in range(6)]

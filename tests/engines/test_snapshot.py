@@ -14,11 +14,12 @@ from sandbox.scene.description.discs import Ball
 from tests.engines.stepping import advance, continued
 from tests.engines.test_advance import SCENES, small_scene
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 COPYING = ("exact", "reference")
 CASES = [(name, engine) for name in SCENES for engine in able(small_scene(name)) if engine in COPYING]
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(("name", "engine"), CASES)
 @settings(max_examples=5)
 @given(before=st.integers(0, 60), after=st.integers(1, 40), with_energy=st.booleans())
@@ -64,7 +65,6 @@ def test_actions_after_a_snapshot_are_undone(engine: str, action: Action) -> Non
     assert continued(simulation, 30) == first
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_switch_of_the_engine_is_undone() -> None:
     simulation = start(small_scene("balls that settle"), "exact")
     simulation.contacts()
@@ -100,7 +100,6 @@ def test_pymunk_says_that_it_cannot_be_copied() -> None:
     simulation.step()  # it is not affected
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_snapshot_of_another_engine_is_refused() -> None:
     exact, reference = (ENGINES[name].start(small_scene("one ball")) for name in COPYING)
     with pytest.raises(ValueError, match="not a snapshot of a ReferenceSimulation"):

@@ -16,6 +16,8 @@ from sandbox.scene.files.load import from_document
 from tests.engines.builders import make_scene
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 ENGINES = ("pymunk", "exact", "reference")
 R = 0.05
 G = 9.81
@@ -44,7 +46,6 @@ def toggle(simulation: SwitchableSimulation, thing: str, solid: bool) -> None:
     simulation.apply(Toggle(time=0.0, thing=thing, solid=solid))
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_ball_falls_when_its_shelf_becomes_non_solid(engine: str) -> None:
     simulation = start(shelf(), engine)
@@ -83,7 +84,6 @@ def test_contacts_end_with_the_solid_state(engine: str) -> None:
     assert not len(simulation.contacts().time)
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_ball_inside_a_wall_that_becomes_solid_is_pushed_out_or_refused() -> None:
     simulation = start(shelf(solid=False), "exact")
     advance(simulation, 30)  # halfway through the shelf
@@ -97,7 +97,6 @@ def test_ball_inside_a_wall_that_becomes_solid_is_pushed_out_or_refused() -> Non
     assert height_after(on_pymunk, 900) == pytest.approx(1.0 + R, abs=2e-3)
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(
     "how",
     [
@@ -139,7 +138,6 @@ def test_toggle_to_the_same_state_changes_nothing() -> None:
     assert simulation.scene is scene
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_spawns_and_removals_keep_the_solid_state() -> None:
     for engine in ENGINES:
         simulation = start(shelf(), engine)
@@ -219,7 +217,6 @@ def test_invalid_reshape_changes_nothing(engine: str) -> None:
     assert simulation.scene.walls is walls
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_exact_refuses_a_wall_through_a_ball() -> None:
     simulation = start(hill(), "exact")
     with pytest.raises(ActionError, match="'a' and 'hill' overlap"):

@@ -82,7 +82,7 @@ def test_entry_is_recorded_in_the_substep_in_which_the_centre_enters(engine: str
     assert run.contact_point[0].tolist() == pytest.approx([speed * time, 0.0], abs=sums)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @every_engine
 @given(
     angle=st.floats(0.0, 2.0 * math.pi),

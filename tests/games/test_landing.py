@@ -64,7 +64,7 @@ def test_bot_lands_on_every_engine(engine: str) -> None:
     assert game.trajectory.status == "ok"
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.nightly) for seed in (1, 3, 4))])
 def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     scene = load(find("landing"), [("world.seed", seed)])
@@ -99,7 +99,7 @@ def test_tilted_contact_is_a_crash() -> None:
     assert 0 < game.score <= FOR_A_CRASH
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_empty_tank_stops_the_engine() -> None:
     game = play_out(flat(200.0), ScriptedInput([Press(0.0, "engine", 1.0)]))
     stop = game.recording.actions[-1]

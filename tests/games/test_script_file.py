@@ -69,7 +69,7 @@ def test_missing_or_binary_file_is_refused(tmp_path: Path) -> None:
         PlayerSpec.parse(str(tmp_path / "bytes"))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "text",
     ["x" * 10**6, "1, x, 1," * 10**5, "9" * 10**6 + ", a, 1", "[" * 10**6, "0, a, " + "9" * 10**6, "wrong\n" * 10**5],

@@ -45,7 +45,7 @@ def test_projectile_has_the_closed_form_and_the_error_of_its_scheme(config):
     np.testing.assert_allclose(result.velocity[:, 0], np.column_stack((3 + 0 * t, 10 - G * t)), atol=tolerance)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 def test_bounce_from_5_m(config):
     """Case 7, e = 0.8: peaks 3.2, 2.048, 1.31072 m. With a fixed step each is within the error of velocity, 2 g·h."""
@@ -66,7 +66,7 @@ def test_bounce_from_5_m(config):
     assert first == pytest.approx(1.0096376, abs=5e-8 if config.engine == "exact" else 2 * h)  # eight digits are given
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 def test_elastic_ball_keeps_its_energy_for_100_s(config):
     """Case 8: the energy stays within the band of the scheme."""
@@ -86,7 +86,7 @@ def test_elastic_ball_keeps_its_energy_for_100_s(config):
         assert change <= 1e-9  # errors of impulses at half the step cancel, to rounding
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_ball_comes_to_rest_on_the_plane(config):
     """Case 9: within the slop of 1 % of the radius plus the sink of a substep of gravity; m g/k for springs.
@@ -105,7 +105,7 @@ def test_ball_comes_to_rest_on_the_plane(config):
     assert not config.knows_impulses or result.contact_impulse[:, 1].sum() == pytest.approx(-G * 5.0, abs=1e-5)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 @pytest.mark.parametrize("swinging", [1, 2, 3])
 def test_newtons_cradle_ejects_as_many_balls_as_hit_it(config, swinging):
@@ -128,7 +128,7 @@ def test_newtons_cradle_ejects_as_many_balls_as_hit_it(config, swinging):
     np.testing.assert_allclose(result.velocity[-1, :, 0], expected, atol=config.rounding(1e-12))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 def test_gas_conserves_energy_and_its_momentum_changes_by_wall_impulses(config):
     rng = np.random.Generator(np.random.PCG64(5))

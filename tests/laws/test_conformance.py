@@ -366,7 +366,7 @@ def test_proof_needs_its_demand(demand: Demand) -> None:
     assert demand in demands(PROOFS[demand].scene)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("demand", Demand)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_engine_models_what_it_lists_and_refuses_the_rest_by_name(engine: str, demand: Demand) -> None:

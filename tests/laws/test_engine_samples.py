@@ -69,7 +69,7 @@ def test_bullet_passes_a_thin_wall_without_continuous_collision(
     assert (run("bullet", engine, **settings).position[-1, 0, 0] < 1.0) == stops
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("engine", able(sandbox.load("far_pyramid")))
 def test_pyramid_far_from_the_origin_stands_as_near_it(engine: str) -> None:
     near, far = (run(name, engine) for name in ("pyramid", "far_pyramid"))

@@ -20,7 +20,7 @@ def collide(config: EngineConfig, scene):
     return result, result.velocity[0], result.velocity[-1]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 @settings(max_examples=12)
 @given(e=restitutions, mass=masses, offset=offsets, speed=speeds)
@@ -36,7 +36,7 @@ def test_momentum_is_conserved_and_separation_speed_is_e_times_approach(config, 
     assert np.abs((now - before) @ tangent).max() <= rounding * speed  # no friction
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config(IMPULSE_CONFIGS)
 @settings(max_examples=8)
 @given(e=restitutions, mass=masses, offset=offsets, speed=speeds, mu=st.sampled_from([0.05, 0.5, 10.0]))
@@ -77,7 +77,7 @@ def test_loss_of_kinetic_energy_is_that_of_the_formula(config, e, mass, offset, 
     )
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @each_config([config for config in (*IMPULSE_CONFIGS, PENALTY) if config.knows_impulses])
 def test_recorded_impulses_are_the_change_of_momentum(config):
     scene = pair(0.8, (3.0, 0.7), 0.4, 2.0, friction=0.3)
@@ -106,7 +106,7 @@ def test_equal_elastic_balls_separate_at_a_right_angle(config):
     assert abs(now[0] @ now[1]) <= config.rounding(1e-14) * np.linalg.norm(now[0]) * np.linalg.norm(now[1])
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_penalty_impact_has_nearly_the_restitution_of_the_pair():
     """Penalty springs reach it as h → 0; with 30 substeps per contact within 2 %."""
     for e in (0.3, 0.8, 1.0):

@@ -20,7 +20,7 @@ LOOSE: dict[str, dict[str, Any]] = {
 """Joints that have no effect on two discs that meet head-on"""
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("kind", LOOSE)
 def test_jointed_bodies_collide_only_if_the_joint_allows_it(kind: str) -> None:
     """Equal discs with e = 1 exchange their velocities, or pass through each other."""

@@ -77,7 +77,7 @@ def test_damped_flight_converges_at_the_order_of_its_scheme(config, drag):
     assert fitted_order(spins) == pytest.approx(order, abs=0.2)  # likewise
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("settings", "order"), [({"detection": "swept"}, 2), ({"detection": "discrete"}, 1)])
 def test_bounce_converges_at_the_order_of_its_detection(settings, order):
     """The largest error over many phases of the impact within the step, as that of a single phase is random."""
@@ -92,7 +92,7 @@ def test_bounce_converges_at_the_order_of_its_detection(settings, order):
     assert fitted_order(errors) == pytest.approx(order, abs=0.3)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("detection", ["bisect", "swept"])
 @pytest.mark.parametrize(("e", "h"), [(0.8, 0.007), (0.8, 0.0035), (0.9, 0.007)])
 def test_explicit_euler_with_exact_impacts_never_stops_bouncing(detection, e, h):
@@ -140,7 +140,7 @@ SMOOTH = [
 ]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("document", "config", "order"),
     SMOOTH,

@@ -15,7 +15,7 @@ def demanded(*names: str) -> set[Demand]:
     return set().union(*(demands(Setup.of(load(find(name)))) for name in names))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_sample_scenes_demand_all_that_shipped_scenes_demand():
     assert demanded(*SAMPLE_SCENES) == demanded(*(scene.name for scene in shipped()))
 

@@ -9,6 +9,8 @@ from sandbox.scene.files.load import from_document
 from tests.engines.builders import make_scene
 from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, each_config
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs
+
 TOLERANCE = 1e-12  # m and m/s: rounding of 1e-16, amplified by less than 1e3 in the impacts
 
 PAIRS = [{"between": [a, b], "restitution": 0.7, "friction": 0.4} for a, b in ("xx", "xy", "yy")]
@@ -39,7 +41,6 @@ def state(result, order=(0, 1, 2, 3)):
     return result.position[-1][by_name], result.velocity[-1][by_name], result.angular_velocity[-1][by_name]
 
 
-@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
     expected = config.run(four_balls())
@@ -49,7 +50,6 @@ def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
             np.testing.assert_allclose(actual, wanted, atol=config.rounding(TOLERANCE), rtol=0)
 
 
-@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_mirror_image_stays_a_mirror_image(config):
     position, velocity, spin = state(config.run(four_balls(gravity=-9.81)))
@@ -71,7 +71,6 @@ def test_motion_is_the_same_in_a_moving_frame(config):
     np.testing.assert_allclose(drifting_spin, spin, atol=config.rounding(1e-10), rtol=0)
 
 
-@pytest.mark.fail_slow(60)
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_run_repeats_bit_for_bit(config):
     one, two = config.run(four_balls()), config.run(four_balls())

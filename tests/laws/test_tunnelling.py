@@ -24,7 +24,7 @@ def scene_of_bullets(ratio: float) -> Scene:
     )
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize("ratio", [0.9, 1.1, 1.5, 3.0, 10.0])
 def test_fraction_of_tunnelling_bullets_is_the_predicted_one(ratio: float, engine: str) -> None:

@@ -40,9 +40,7 @@ PENDULUM = """
 title = "Pendulum"
 world = { gravity = [0.0, -9.81], duration = 3.0 }
 solver = { dt = 0.016666666666666666 }
-ball = [
-  { name = "bob", position = [1.0, 0.0], radius = 0.05, mass = 1.0, collides = "none" },
-]
+ball = [{ name = "bob", position = [1.0, 0.0], radius = 0.05, mass = 1.0, collides = "none" }]
 joint = [{ name = "rod", kind = "rod", between = ["bob"], anchors = [[0.0, 0.0], [0.0, 0.0]], length = 1.0 }]
 """
 
@@ -101,7 +99,7 @@ def test_remedy_of_a_ball_that_tunnels_removes_it() -> None:
     assert sandbox.run(scene_of(BULLET), "pymunk", **safe.model_dump()).missed_contacts == 0
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("text", [FLIGHT, BULLET, PENDULUM])
 def test_recommended_setting_meets_the_tolerance_when_run_again(text: str) -> None:
     advice, scene = advice_of(text, effort=1.0), scene_of(text)
@@ -121,7 +119,7 @@ def test_knobs_of_a_flight_have_the_errors_of_euler() -> None:
     assert all(knob.setting.frame_ms is not None and knob.cost_ratio is not None for knob in knobs.values())
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_other_engines_have_a_setting_or_a_reason() -> None:
     others = {other.engine: other for other in advice_of(PENDULUM, effort=1.0).others}
     assert set(others) == set(ENGINES) - {"pymunk"}

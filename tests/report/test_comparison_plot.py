@@ -123,7 +123,7 @@ def test_time_after_the_trusted_time_is_marked() -> None:
     assert "from the start" in draw_energy(comparison).axes[1].get_ylabel()
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
     paths = plot_comparison(PROJECTILES, tmp_path)
     assert [path.name for path in paths] == ["trajectories.png", "error.png", "energy.png"]
@@ -133,7 +133,7 @@ def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
     assert [path.read_bytes() for path in paths] == before
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_comparison_without_a_run_or_a_body_can_be_drawn(tmp_path: Path) -> None:
     refused = compare(DROP.scene, ["pymunk"], integrator="rk4")
     assert refused.trajectories == {}

@@ -53,7 +53,7 @@ def test_every_potting_aim_is_coloured() -> None:
     assert [label.get_text() for label in lower.get_yticklabels()] == ["cue", "$8$"]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "parts", [(CUE,), (CUE, HOLE), (CUE, OBJECT), (WALLS, CUE, OBJECT, HOLE)], ids=["lone", "hole", "open", "table"]
 )

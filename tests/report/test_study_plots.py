@@ -12,6 +12,8 @@ from sandbox.measure.extremes.scenarios import AXES, PAIRS
 from sandbox.report.extremes_plot import COLOURS, MARKS, draw_axes, draw_pairs, level_text, plot_extremes
 from sandbox.report.tradeoff_plot import draw_tradeoff, plot_tradeoff
 
+pytestmark = pytest.mark.fail_slow(60)  # draws many pictures
+
 
 def synthetic_extremes() -> Extremes:
     axis, pair = AXES["restitution"], PAIRS[0]
@@ -47,7 +49,6 @@ def test_pairs_have_a_matrix_per_setup() -> None:
     assert [axes.get_title() for axes in figure.axes] == ["pymunk", "pymunk, 4 substeps", "exact"]
 
 
-@pytest.mark.fail_slow(60)
 def test_pictures_are_written(tmp_path: Path) -> None:
     names = [path.name for path in plot_extremes(synthetic_extremes(), tmp_path)]
     assert names == ["extremes.png", "pairs.png"]
@@ -105,7 +106,6 @@ def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any
     assert y > 0.1
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("suffix", [".png", ".svg"])
 def test_file_is_written(document: dict[str, Any], suffix: str, tmp_path: Path) -> None:
     path = plot_tradeoff(document, tmp_path / f"plot{suffix}")

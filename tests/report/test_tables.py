@@ -173,7 +173,7 @@ def test_parquet_without_its_extra_names_the_command_to_install_it(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_writing_a_table_takes_little_additional_memory(
     suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

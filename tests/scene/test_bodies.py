@@ -109,7 +109,7 @@ def test_fixed_elements_are_numbered_as_planes_walls_posts() -> None:
     assert scene.fixed == (*scene.planes, *scene.walls, *scene.posts)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.scenes())
 def test_arrays_of_bodies_have_equal_lengths_and_are_finite(scene: Scene) -> None:
     bodies = scene.bodies

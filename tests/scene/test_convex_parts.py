@@ -102,7 +102,7 @@ def test_known_shapes_are_covered_at_any_angle(points: tuple[Point, ...], angle:
     assert_parts(moved(points, angle))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("points", [comb(250), star(500), gear(200), spiral(500)])
 def test_outlines_of_a_thousand_corners_are_covered(points: tuple[Point, ...]) -> None:
     assert_parts(points)

@@ -101,7 +101,7 @@ def test_scene_has_one_fault_with_its_path(document: dict[str, Any], fault: str)
     assert_faults(document, fault)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     "document",
     [
@@ -163,7 +163,7 @@ def test_height_above_a_plane_does_not_depend_on_the_length_of_its_normal() -> N
         assert height_above(plane, positions) == pytest.approx(expected, rel=1e-12)  # rounding of the normal
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_million_balls_at_one_point_are_refused() -> None:
     grid = {**GRID, "columns": 1000, "rows": 1000, "spacing": [0, 0]}
     assert_faults({"grid": [grid]}, "grid[0]: overlapping pairs")

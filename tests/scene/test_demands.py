@@ -161,7 +161,7 @@ def test_every_demand_is_on_in_a_case_and_off_for_a_ball_alone() -> None:
     assert demands(from_document({"title": "t"})) == frozenset()
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.scenes())
 def test_bill_lists_every_demand_once_with_a_reason(scene: Scene) -> None:
     items = bill(scene)

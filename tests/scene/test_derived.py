@@ -70,7 +70,7 @@ def test_value_of_a_changed_setup_does_not_compile_its_scene() -> None:
     assert "bodies" not in vars(changed.scene)  # cached properties that were not read
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_value_is_released_with_its_scene() -> None:
     class Value:
         pass

@@ -12,7 +12,7 @@ from sandbox.scene.files.load import loads
 from tests import strategies
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.rendered())
 def test_line_of_a_location_is_the_line_of_its_key(drawn: tuple[strategies.Document, strategies.Rendered]) -> None:
     rendered = drawn[1]
@@ -20,7 +20,7 @@ def test_line_of_a_location_is_the_line_of_its_key(drawn: tuple[strategies.Docum
     assert {location: lines.find(location) for location in rendered.lines} == rendered.lines
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.rendered(), st.integers(), st.text(min_size=1))
 def test_line_of_a_missing_key_is_the_line_of_its_table(drawn, index, key):
     rendered = drawn[1]
@@ -49,7 +49,7 @@ def with_fault(document: strategies.Document, chance: random.Random) -> tuple[st
     return document, location
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(
     st.tuples(strategies.documents(), st.randoms(use_true_random=False)).map(lambda pair: with_fault(*pair)),
     st.randoms(use_true_random=False),

@@ -28,7 +28,7 @@ print(*sorted(name for name in sys.modules if name.startswith("sandbox.games."))
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("scene", "folders"),
     [

@@ -95,7 +95,7 @@ def test_links_list_bodies_held_turned_and_excluded_from_collision() -> None:
     assert links.of(LinkKind.MOTOR).names == ("joint-3",)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(strategies.solid_scenes())
 def test_links_among_fewer_bodies_are_renumbered_or_dropped(scene: Scene) -> None:
     names = scene.bodies.names

@@ -39,7 +39,7 @@ def keys(seed: int, many: int) -> Iterator[list[int]]:
             yield from (key_of(stream, seed, index) for index in range(many))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("seed", SEEDS)
 def test_streams_of_a_seed_have_distinct_keys(seed):
     all_words = [words(key) for key in keys(seed, MANY)]

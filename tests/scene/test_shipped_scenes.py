@@ -139,7 +139,7 @@ def test_committed_schema_is_current() -> None:
     assert (root / SCHEMA).read_text(encoding="utf-8") == dumps()
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_dumped_schema_is_valid_json_with_its_dialect() -> None:
     assert json.loads(dumps()) == cached_schema()
     assert dumps().endswith("}\n")

@@ -13,12 +13,13 @@ from sandbox.scene.files.load import dumps, from_document, loads
 from tests import strategies
 from tests.scene.faults import assert_faults, faults_of
 
+pytestmark = pytest.mark.fail_slow(60)  # property tests
+
 FLOOR = {"point": [0, 0], "normal": [0, 1]}
 GON = [[round(math.cos(k), 6), round(math.sin(k), 6)] for k in np.linspace(0, 2 * math.pi, 1002)[:-1]]
 BOX, BODY = "[[box]]\nposition=[0,0]\n", "[[body]]\nposition=[0,0]\n"
 
 
-@pytest.mark.fail_slow(60)
 @given(strategies.solid_scenes())
 def test_scene_of_solids_and_joints_round_trips(scene: Scene) -> None:
     again = loads(dumps(scene))
@@ -87,7 +88,6 @@ def concave_polygons(count: int, **keys: Any) -> dict[str, Any]:
     return {"polygon": [{"points": shape, **keys} for _ in range(count)]}
 
 
-@pytest.mark.fail_slow(60)
 def test_too_many_overlapping_concave_polygons_are_refused() -> None:
     assert isinstance(from_document(concave_polygons(50)), Scene)
     assert "pairs of pieces so close" in faults_of(concave_polygons(900))[0].message

@@ -375,7 +375,7 @@ def is_touched(location: tuple[str | int, ...], changes: list[Change]) -> bool:
     return False
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @settings(max_examples=60)  # of large documents
 @given(rendered(documents() | solids()), st.data())
 def test_random_changes_of_any_layout_give_the_changed_document(case, data):
@@ -389,7 +389,7 @@ def test_random_changes_of_any_layout_give_the_changed_document(case, data):
             assert body.rstrip("\r\n") in remaining, body  # consumes those before it, so the order is checked
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(rendered(documents()))
 def test_present_values_change_nothing(case: tuple[Any, Rendered]) -> None:
     document, text = case[0], case[1].text
@@ -403,7 +403,7 @@ def test_present_values_change_nothing(case: tuple[Any, Rendered]) -> None:
     assert with_changes(text, []) == text
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(rendered(documents()), st.dictionaries(names(), some_values, max_size=3), st.booleans())
 def test_added_element_removed_again_leaves_the_original_text(case, values, is_cut):
     document, text = case[0], case[1].text
@@ -436,7 +436,7 @@ def test_swapped_elements_of_inline_arrays() -> None:
     assert with_swapped_elements(text, "plane", 0, 1) == "plane = [{ a = 2 }, # one\n  { a = 1 }]\n"
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(rendered(documents()), st.data())
 def test_swapping_twice_restores_any_text(case: tuple[dict[str, object], Rendered], data: st.DataObject) -> None:
     document, text = case

@@ -12,7 +12,7 @@ CHECKED = {bench.same: bench for bench in BENCHES if bench.same is not None}
 """One row per check function: rows that differ only in size have the same one."""
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("bench", CHECKED.values(), ids=lambda bench: bench.name)
 def test_both_sides_of_a_row_compute_the_same(bench: Bench) -> None:
     assert bench.same is not None
@@ -23,7 +23,7 @@ def test_names_of_rows_are_unique() -> None:
     assert len({bench.name for bench in BENCHES}) == len(BENCHES)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_sides_take_turns_and_the_first_alternates() -> None:
     order: list[str] = []
 

@@ -97,7 +97,7 @@ def test_overlap_is_computed_from_outlines(tables: dict[str, Any], expected: lis
     assert overlapping_bodies(shape_scene, shape_scene.bodies, start(shape_scene)).tolist() == expected
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("radius", [0.0, 0.4])
 def test_hull_distance_equals_the_distance_to_a_sampled_outline(count: int, radius: float) -> None:

@@ -210,7 +210,7 @@ sounds.disable()
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_missing_audio_device_raises_no_exception() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", NO_DEVICE],

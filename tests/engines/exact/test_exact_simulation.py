@@ -244,7 +244,7 @@ for document, steps in json.loads(sys.stdin.read()):
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_compiled_and_plain_kernels_agree_bit_for_bit():
     import json
 

@@ -16,7 +16,7 @@ def touches(dx, dy, vx, vy, reach):
     return dx * vx + dy * vy < 0 and (vx * vx + vy * vy) * reach * reach > cross * cross
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_20000_near_grazing_pairs_match_exact_arithmetic():
     random = np.random.default_rng(5)
     wrong = hits = 0

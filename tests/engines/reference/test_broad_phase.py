@@ -48,7 +48,7 @@ def contact_columns(finder, position, margin=0.0):
     return [column.tolist() for column in contacts]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(crowds())
 def test_all_broad_phases_find_the_same_manifolds(balls):
     store = body_store_of(scene_of(*balls))
@@ -97,7 +97,7 @@ def touching_within_rounding(count):
             count -= 1
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_overlaps_below_rounding_far_from_the_origin_are_found(name):
     for x, a, other, b in touching_within_rounding(300):
@@ -189,7 +189,7 @@ def mixed_sizes():
     return scene_of(*balls, hill, world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005})
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("scene", "steps", "settings"),
     [

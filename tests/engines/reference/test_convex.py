@@ -29,6 +29,8 @@ from tests.engines.reference.outlines import (
 )
 from tests.environment import with_root_on_path
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of polygons
+
 PAIRS = 1000
 
 
@@ -46,7 +48,6 @@ def separations_by_error(exact, p, q):
     return sorted(found, key=lambda separation: abs(separation - exact))
 
 
-@pytest.mark.fail_slow(60)
 def test_separations_match_shapely_distances_and_qhull_penetrations():
     overlaps = 0
     for p, q, size in random_pairs(1, PAIRS):
@@ -59,7 +60,6 @@ def test_separations_match_shapely_distances_and_qhull_penetrations():
     assert 0.3 * PAIRS < overlaps < 0.7 * PAIRS
 
 
-@pytest.mark.fail_slow(60)
 def test_separations_are_accurate_from_micrometres_to_a_thousand_kilometres():
     random = np.random.default_rng(2)
     for k in range(PAIRS):
@@ -80,7 +80,6 @@ def test_separations_are_accurate_from_micrometres_to_a_thousand_kilometres():
         assert other == pytest.approx(exact, abs=3 * REFERENCE_FACE_BIAS * scales.min() + rounding)
 
 
-@pytest.mark.fail_slow(60)
 def test_pieces_moved_by_the_separation_along_the_normal_just_touch():
     for p, q, size in random_pairs(3, PAIRS):
         nx, ny, separation = deepest(collide(p, q))[:3]
@@ -259,7 +258,6 @@ def pymunk_contact(p, q):
     return contacts.normal, min(point.distance for point in contacts.points)
 
 
-@pytest.mark.fail_slow(60)
 def test_overlapping_polygons_match_pymunk():
     random = np.random.default_rng(9)
     compared = 0
@@ -337,7 +335,6 @@ print(digest.hexdigest())
 """
 
 
-@pytest.mark.fail_slow(60)
 def test_results_are_bit_identical_with_and_without_compiled_kernels():
     digests = set()
     for disabled in ("0", "1"):

@@ -43,7 +43,7 @@ def run(step, f, x, u, time, steps):
     return x
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_error_converges_with_the_declared_order(name, problem):

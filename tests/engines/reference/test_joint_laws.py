@@ -61,7 +61,7 @@ def test_corrections_along_final_directions_lose_angular_momentum_at_first_order
     assert lost[0] / lost[1] == pytest.approx(2.0, abs=0.4)  # first order, and the time at which the limit is reached
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_rotary_limit_holds(method, integrator):
     """A beam on a pivot falls onto its limit at −½ and stays; the torque there equals that of its weight."""

@@ -16,6 +16,8 @@ from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.files.load import from_document
 from tests.engines.reference.joint_rig import compile_joints, link
 
+pytestmark = pytest.mark.fail_slow(60)  # many runs of a second
+
 METHOD_ERRORS = {"impulses": 6e-3, "relaxation": 6e-3, "xpbd": 6e-3, "rattle": 1e-9}
 """m, error after 1 s in steps of 1 ms with accelerations up to 10 m/s²: of order h·a·t/2; with RATTLE the error that
 60 iterations leave"""
@@ -80,7 +82,6 @@ def test_jacobian_is_the_derivative_of_the_value(
             assert (ends[0] - ends[1]) / 2e-6 == pytest.approx(jacobian[column], abs=1e-7)
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
 def test_atwood_machine(method: str, ratio: float) -> None:
@@ -92,7 +93,6 @@ def test_atwood_machine(method: str, ratio: float) -> None:
     assert run.position[:, :, 0] == pytest.approx(np.asarray([[0.0, 1.0]] * len(t)), abs=1e-12)  # rounding
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_rope_of_a_pulley_pulls_and_never_pushes(method: str) -> None:
     """Both bodies start at rest with 0.2 m of slack: they fall freely until it is used up after sqrt(0.2/g)."""
@@ -123,7 +123,6 @@ MOMENT = (1.0**2 + 0.2**2) / 12
 """kg·m², of the first wheel; that of the second is three times as large"""
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_motor_turns_at_its_rate(method: str) -> None:
     run = sandbox.run(machine(method, False, None), engine="reference")
@@ -138,7 +137,6 @@ def test_motor_of_limited_torque_accelerates_uniformly(method: str) -> None:
     assert run.angular_velocity[:, 0] == pytest.approx(expected, abs=1e-9)  # rounding of 1,000 steps
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_gear_transmits_the_torque_of_a_motor(method: str) -> None:
     """ω_a = −2 ω_b: the second wheel adds I_b/4 to the moment of the first."""
@@ -150,7 +148,6 @@ def test_gear_transmits_the_torque_of_a_motor(method: str) -> None:
     assert run.angle[:, 1] * -2.0 == pytest.approx(run.angle[:, 0], abs=METHOD_ERRORS[method])
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_motor_work_is_that_of_drives_in_the_energy_account(method: str) -> None:
     run = sandbox.run(machine(method, True, 0.2), engine="reference", account=True)
@@ -160,7 +157,6 @@ def test_motor_work_is_that_of_drives_in_the_energy_account(method: str) -> None
     assert sum(account.values()) == pytest.approx(energy, rel=1e-12)  # rounding
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_groove_prescribes_the_motion_of_a_slider_crank(method: str) -> None:
     """The piston is at r cos φ + √(L² − r² sin² φ) with the crank at φ = ω t."""
@@ -188,7 +184,6 @@ def test_groove_ends_stop_a_slider(method: str) -> None:
     assert run.velocity[-1, 0] == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
-@pytest.mark.fail_slow(60)
 @every_method
 def test_groove_in_a_free_body_conserves_momentum(method: str) -> None:
     groove = joint("groove", "a", "s", groove=[[-0.4, 0.0], [0.4, 0.0]])

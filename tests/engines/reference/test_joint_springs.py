@@ -49,7 +49,7 @@ def test_xpbd_holds_any_stiffness():
     assert rig.pose[0, 1] == pytest.approx(-1.0, abs=1e-10)  # m g/k is 1e-11 m
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])
 def test_two_bodies_oscillate_with_their_reduced_mass(integrator):
     joints = compile_joints(link(LinkKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
@@ -97,7 +97,7 @@ def test_damped_spring_of_zero_rest_length_brakes_at_its_anchor():
     assert not rig.solver.forces(rig.x).any()
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("method", ["impulses", "xpbd"])
 def test_rotary_springs_oscillate_with_the_reduced_moment(method):
     joints = compile_joints(link(LinkKind.ROTARY_SPRING, 0, 1, 0.5, OMEGA**2 * 0.75))
@@ -115,7 +115,7 @@ def test_rotary_dampers_brake():
     assert rig.rates[0, 2] == pytest.approx(2 * math.exp(-2.0), rel=1e-7)  # RK4 at c h/I = 0.02: error 2e-9 per second
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("method", "accuracy"), [("impulses", 1e-9), ("xpbd", 1e-6)])
 def test_hanging_chain_of_springs_stretches_by_the_sum_of_weights(method, accuracy):
     """By n (n + 1)/2 · m g/k, once drag has brought it to rest."""

@@ -72,7 +72,7 @@ def test_boxes_are_separated_exactly_if_an_axis_separates_them():
     assert min(counts) > 300
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_pieces_nearer_than_the_margin_are_not_separated():
     random = np.random.default_rng(3)
     near = rejected = 0

@@ -48,7 +48,7 @@ COMBINATIONS = [
 """Each integrator with each detection, and with these each response and each broad phase in turn."""
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("integrator", "detection", "response", "broad_phase"), COMBINATIONS)
 def test_every_combination_runs_or_refuses_with_a_reason(integrator, detection, response, broad_phase):
     settings = {"integrator": integrator, "detection": detection, "response": response, "broad_phase": broad_phase}
@@ -69,7 +69,7 @@ def test_every_combination_runs_or_refuses_with_a_reason(integrator, detection, 
     assert frame.position[3].tolist() == [1.5, 0.4]
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("integrator", "detection"), [*zip(INTEGRATORS, [*DETECTIONS, "discrete"], strict=True)])
 def test_runs_are_bit_identical_and_queries_change_nothing(integrator, detection):
     queried, unqueried = (simulation_of(mixed_scene(), integrator=integrator, detection=detection) for _ in range(2))

@@ -15,6 +15,8 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of tables
+
 R, M = 0.03, 0.17
 CLOTH = {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.01}
 
@@ -28,7 +30,6 @@ def table(*balls: dict[str, Any], dt: float = 0.005, **more: Any) -> Scene:
     return from_document({"world": {"duration": 5.0}, **document})
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("speed", [3.0, 300.0])
 def test_no_ball_tunnels_through_another(speed: float) -> None:
     """At 300 m/s a ball moves 25 diameters in a step."""
@@ -40,7 +41,6 @@ def test_no_ball_tunnels_through_another(speed: float) -> None:
     assert simulation.contacts().pair.tolist() == [[0, 1]]
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of tables
 def test_ball_falls_into_a_pocket_and_a_move_returns_it() -> None:
     scene = table(ball("a", 0, 0, 2.0, 0), pocket=[{"position": [0.5, 0.0], "radius": 0.05}])
     simulation = start(scene, "reference")
@@ -80,7 +80,6 @@ def test_only_balls_of_the_same_radius_can_be_added() -> None:
     assert len(simulation.bodies) == 1
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of tables
 def test_observer_sees_balls_in_pockets_as_nan() -> None:
     observed: list[Any] = []
     simulation = start(table(ball("a", 0, 0, 2, 0), pocket=[{"position": [0.1, 0], "radius": 0.05}]), "reference")

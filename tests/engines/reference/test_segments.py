@@ -74,7 +74,7 @@ def test_contacts_are_the_overlapping_pairs(scene):
     assert (contacts.separation < 0).all()
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_walls_far_from_the_origin_are_not_lost_to_rounding():
     random = np.random.default_rng(3)
     count = 0

@@ -13,6 +13,8 @@ from sandbox.engines.reference.penalty import MIN_RESTITUTION, damping_of, resti
 from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of
 from tests.engines.stepping import advance
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 
 @given(st.floats(MIN_RESTITUTION, 1.0))
 def test_restitution_of_damping_of_e_is_e(e):
@@ -60,7 +62,6 @@ def rebound_speed(e, name, **settings):
     return float(advance(simulation, 15).frame().velocity[0, 1])
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("name", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
 @pytest.mark.parametrize("e", [0.1, 0.5, 0.8, 1.0])
 def test_run_with_short_steps_rebounds_with_the_stated_restitution(name, e):
@@ -73,7 +74,6 @@ def test_explicit_damping_overrides_restitution():
     assert rebound == pytest.approx(math.exp(-2.0), abs=0.02)  # as above
 
 
-@pytest.mark.fail_slow(60)
 def test_resting_ball_penetrates_by_its_weight_over_the_stiffness():
     scene = scene_of(ball(0, 0.5, mass=2.0, restitution=0.1), world=EARTH, plane=[FLOOR], solver={"dt": 0.01})
     simulation = simulation_of(scene, response="penalty", stiffness=2e4, substeps=20)
@@ -96,7 +96,6 @@ def test_springs_never_pull():
         fastest = speed
 
 
-@pytest.mark.fail_slow(60)
 def test_energy_error_of_elastic_springs_falls_with_the_step():
     errors = []
     for substeps in (30, 60, 120):
@@ -109,7 +108,6 @@ def test_energy_error_of_elastic_springs_falls_with_the_step():
     assert errors[2] < errors[0]
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("response", ["impulse", "penalty"])
 def test_reported_contact_impulses_equal_the_momentum_change(integrator, response):

@@ -14,10 +14,11 @@ from sandbox.games.artillery.landing_error import landing_error_table
 from sandbox.scene.description.world import Settings, World
 from tests.games.artillery.grounds import G, world
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 DTS = 0.1, 0.05, 0.025
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_euler_lands_one_step_late_or_early_in_vacuum() -> None:
     """The heights of explicit Euler are those of v_y + g h/2, so it flies h too long and v_x h too far."""
     found = landing_error_table(world(), 50.0, math.radians(45.0), DTS)
@@ -37,7 +38,6 @@ def test_euler_lands_one_step_late_or_early_in_vacuum() -> None:
     assert not found.refused
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(("drags", "damping"), [((0.2, 0.0), 1.0), ((0.0, 0.01), 1.0), ((0.0, 0.01), 0.8)])
 def test_landing_errors_converge_with_the_order_of_each_integrator(drags: tuple[float, float], damping: float) -> None:
     dts = tuple(0.2 * 2.0 ** (-k / 2) for k in range(7))

@@ -82,7 +82,7 @@ def test_scene_survives_a_round_trip_and_overrides_change_it() -> None:
     assert moved.walls[0].restitution == 0.3
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(st.integers(0, 2**63 - 1))
 def test_another_seed_rebuilds_the_hills_of_an_expanded_scene(seed: int) -> None:
     scene = loads(DUEL)

@@ -90,7 +90,7 @@ def test_frames_of_every_game_end_with_a_valid_table_and_replay(game: str, skill
     assert record.replayed() == record
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_shots_on_pymunk_are_judged_and_replay() -> None:
     played = play_frame(match("9-ball"), [BilliardsBot(0.9, 1), BilliardsBot(0.9, 2)], "pymunk", most=3)
     assert len(played.shots) == 3

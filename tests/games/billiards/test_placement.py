@@ -55,7 +55,7 @@ def test_nearest_position_beside_a_ball_keeps_a_small_gap() -> None:
     assert position[0] == pytest.approx(0.6, abs=1e-9)  # straight away from the ball
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(
     region=st.sampled_from(["anywhere", "behind the head string", "in the D"]),
     at=st.tuples(st.floats(-1.0, 2.5), st.floats(-1.0, 4.5)),

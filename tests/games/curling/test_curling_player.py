@@ -24,7 +24,7 @@ def ice() -> Ice:
     return Ice.of(SCENE.surface)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_first_stone_is_delivered_as_the_bot_intends() -> None:
     scene = load(find("curling"), [("world.duration", 15.0)])
     game = play_out(scene, CurlingPlayer(1, 1.0))

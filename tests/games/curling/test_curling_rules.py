@@ -146,7 +146,7 @@ def test_a_copy_of_the_rules_is_independent(rink: Rink) -> None:
     assert rink.rules._score.thrown == 1
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_a_scripted_game_with_sweeping_replays_to_the_same_state() -> None:
     scene = sheet("world.duration=60.0")
     script = [Press(0.5, "right", 1.0), Press(1.5, "right", 0.0), Press(2.0, "throw", 1.0), Press(6.0, "sweep", 1.0)]
@@ -163,7 +163,7 @@ def test_a_scripted_game_with_sweeping_replays_to_the_same_state() -> None:
     assert rules._score.thrown == 2
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("duration", "thrown"),
     [(60.0, 3), pytest.param(1e4, 16, marks=pytest.mark.nightly)],

@@ -9,6 +9,8 @@ from sandbox.action import Move
 from sandbox.games.pinball.game_flow import BALL_SAVE_TIME, BONUS_TIME
 from tests.games.pinball.pinball_by_hand import OPEN, SERVE, Table, drives, is_launch, moves, table
 
+pytestmark = pytest.mark.fail_slow(60)  # whole games
+
 WAIT = BONUS_TIME + 0.05
 """s, until the next ball is served"""
 
@@ -102,7 +104,6 @@ def test_bonus_is_multiplied_by_the_lanes_at_the_end_of_a_ball() -> None:
     assert (sheet.bonus, sheet.times) == (0, 1)
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("balls", [1, 2, 3])
 def test_balls_are_never_placed_onto_each_other(balls: int) -> None:
     game = Table(table(balls=balls))
@@ -130,7 +131,6 @@ def test_game_ends_after_three_balls() -> None:
     assert "over" in game.cues
 
 
-@pytest.mark.fail_slow(60)
 def test_players_alternate_and_have_separate_scores() -> None:
     game = Table(table(players=3))
     panels = []

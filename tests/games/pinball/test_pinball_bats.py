@@ -16,10 +16,11 @@ from sandbox.scene.geometry.polygon import is_convex, signed_area
 from tests.games.pinball.passing_watch import TIP, PassageObserver
 from tests.toml_text import toml
 
+pytestmark = pytest.mark.fail_slow(60)  # long runs
+
 REST, RAISED = -0.541, 0.349
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize("drive", ["torque", "stroke"])
 def test_no_ball_passes_through_a_flipper(drive: str) -> None:
     random, max_depth, hits = np.random.default_rng(3), 0.0, 0

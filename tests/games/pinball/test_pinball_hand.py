@@ -50,7 +50,7 @@ def test_rising_and_far_balls_are_ignored(position: tuple[float, float] | None, 
     assert not let_play(game, PinballBot(1, 1.0), 1.0)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_skill_is_the_fraction_of_balls_that_are_flipped() -> None:
     flipped = 0
     for seed in range(60):
@@ -69,7 +69,7 @@ def test_ball_in_the_lane_is_plunged() -> None:
     assert len(pressed) == 2  # the bot waits for the spring
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_bot_depends_only_on_its_seed() -> None:
     def plays(seed: int) -> list[tuple[float, str, float]]:
         return let_play(ball_at_flipper(), PinballBot(seed, 0.3), 3.0)

@@ -5,6 +5,8 @@ import pytest
 from sandbox.action import Move
 from tests.games.pinball.pinball_by_hand import OPEN, SERVE, Table, is_launch, moves, table
 
+pytestmark = pytest.mark.fail_slow(60)  # whole games
+
 
 def ready(*omitted: str) -> Table:
     """Return a table with a set of standup targets just completed."""
@@ -35,7 +37,6 @@ def test_mode_scores_each_hit_and_its_completion() -> None:
     assert "reward" in game.cues
 
 
-@pytest.mark.fail_slow(60)
 def test_mode_ends_by_time_that_is_paused_while_no_ball_is_in_play() -> None:
     game = ready("hole", "lock")
     game.put(0, SERVE)
@@ -155,7 +156,6 @@ def test_table_with_one_ball_has_no_multiball() -> None:
     assert game.game.sheet.locked == 0
 
 
-@pytest.mark.fail_slow(60)
 def test_locks_are_counted_per_player() -> None:
     game = Table(table(players=2))
     game.play()

@@ -7,6 +7,8 @@ from sandbox.action import Action, Force, Impulse
 from sandbox.games.pinball.tilt import GRAVITY, JOLT, JOLT_TIME, SAME_PUSH_TIME, TiltBob
 from tests.games.pinball.pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
+pytestmark = pytest.mark.fail_slow(60)  # whole games
+
 
 @pytest.fixture
 def game() -> Table:
@@ -66,7 +68,6 @@ def test_full_nudge_warns_and_the_third_tilts(game: Table) -> None:
     assert game.lines()[""] == "TILT!"
 
 
-@pytest.mark.fail_slow(60)
 def test_light_nudges_do_not_warn(game: Table) -> None:
     for _ in range(10):
         game.press("nudge", 0.13)  # an undamped bob trips at 0.1413
@@ -168,7 +169,6 @@ def test_no_search_while_a_ball_waits_is_held_or_moves(game: Table, state: str) 
     assert drives(game.wait(19.0)) == []
 
 
-@pytest.mark.fail_slow(60)
 def test_search_depends_only_on_the_seed() -> None:
     def kick(seed: int) -> tuple[float, float]:
         scene = table()

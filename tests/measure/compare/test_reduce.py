@@ -53,25 +53,13 @@ mass = 0.01
 """100 m/s is 10 cm a step, and the wall is 2 cm thick: the bullet passes it between two steps."""
 
 PASSING = """
-[world]
-duration = 0.1
-[solver]
-dt = 0.001
-[[ball]]
-name = "left"
-position = [-0.52, 0.0]
-velocity = [100.0, 0.0]
-radius = 0.01
-[[ball]]
-name = "right"
-position = [0.53, 0.001]
-velocity = [-100.0, 0.0]
-radius = 0.01
-[[scatter]]
-count = 9
-lower = [-9.0, 3.0]
-upper = [9.0, 9.0]
-radius = 0.1
+world = { duration = 0.1 }
+solver = { dt = 0.001 }
+ball = [
+  { name = "left", position = [-0.52, 0.0], velocity = [100.0, 0.0], radius = 0.01 },
+  { name = "right", position = [0.53, 0.001], velocity = [-100.0, 0.0], radius = 0.01 },
+]
+scatter = [{ count = 9, lower = [-9.0, 3.0], upper = [9.0, 9.0], radius = 0.1 }]
 """
 """At a closing speed of 200 m/s balls of 2 cm pass through each other without an overlap in any step."""
 
@@ -105,24 +93,13 @@ force = [0.0, 0.0]
 """A stretched spring releases a bob; the rod and its two balls stay at rest."""
 
 ROLLING = """
-[world]
-gravity = [0.0, -10.0]
-duration = 1.0
-[[plane]]
-point = [0.0, 0.0]
-normal = [0.0, 1.0]
-[[wall]]
-name = "thin"
-points = [[5.0, -1.0], [5.0, 3.0]]
-[[ball]]
-name = "resting"
-position = [-9.0, 0.5]
-radius = 0.5
-[[ball]]
-name = "rolling"
-position = [-1.05, 0.01]
-velocity = [20.0, 0.0]
-radius = 0.01
+world = { gravity = [0.0, -10.0], duration = 1.0 }
+plane = [{ point = [0.0, 0.0], normal = [0.0, 1.0] }]
+wall = [{ name = "thin", points = [[5.0, -1.0], [5.0, 3.0]] }]
+ball = [
+  { name = "resting", position = [-9.0, 0.5], radius = 0.5 },
+  { name = "rolling", position = [-1.05, 0.01], velocity = [20.0, 0.0], radius = 0.01 },
+]
 """
 """A ball rolls over a floor, 20 cm a step, and passes a wall at 0.31 s."""
 

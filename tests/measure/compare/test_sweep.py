@@ -11,13 +11,8 @@ pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 FALL = """
 title = "Fall"
-[world]
-gravity = [0, -10]
-duration = 0.5
-[[ball]]
-name = "a"
-position = [0, 10]
-radius = 0.5
+world = { gravity = [0, -10], duration = 0.5 }
+ball = [{ name = "a", position = [0, 10], radius = 0.5 }]
 """
 
 

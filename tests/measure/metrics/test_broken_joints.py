@@ -18,42 +18,18 @@ from tests.batch.fetching import run_or_fetch
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
 BREAKING = """
-[world]
-duration = 1.0
-[solver]
-dt = 0.01
-substeps = 3
-[[ball]]
-name = "a"
-position = [0.0, 0.0]
-velocity = [-1.0, 0.0]
-radius = 0.1
-mass = 1.0
-[[ball]]
-name = "b"
-position = [1.0, 0.0]
-velocity = [1.0, 0.0]
-radius = 0.1
-mass = 1.0
-[[ball]]
-name = "c"
-position = [1.0, 1.0]
-velocity = [1.0, 0.0]
-radius = 0.1
-mass = 1.0
-[[joint]]
-kind = "rod"
-between = ["b", "c"]
-[[joint]]
-kind = "spring"
-between = ["a", "b"]
-stiffness = 20.0
-strength = 5.0
-[[joint]]
-kind = "rod"
-between = ["c"]
-anchors = [[0.0, 0.0], [1.0, 3.0]]
-strength = 0.01
+world = { duration = 1.0 }
+solver = { dt = 0.01, substeps = 3 }
+ball = [
+  { name = "a", position = [0.0, 0.0], velocity = [-1.0, 0.0], radius = 0.1, mass = 1.0 },
+  { name = "b", position = [1.0, 0.0], velocity = [1.0, 0.0], radius = 0.1, mass = 1.0 },
+  { name = "c", position = [1.0, 1.0], velocity = [1.0, 0.0], radius = 0.1, mass = 1.0 },
+]
+joint = [
+  { kind = "rod", between = ["b", "c"] },
+  { kind = "spring", between = ["a", "b"], stiffness = 20.0, strength = 5.0 },
+  { kind = "rod", between = ["c"], anchors = [[0.0, 0.0], [1.0, 3.0]], strength = 0.01 },
+]
 """
 """The spring breaks where it stores ½·F²/k = 0.625 J; the rod to the world breaks at once."""
 

@@ -14,25 +14,12 @@ from sandbox.trajectory import Trajectory
 from tests.runs_by_hand import run_of
 
 BALLS = """
-[world]
-gravity = [0.5, -2.0]
-[[ball]]
-name = "a"
-position = [1.0, 3.0]
-velocity = [3.0, 4.0]
-angular_velocity = 2.0
-radius = 2.0
-mass = 5.0
-[[ball]]
-name = "b"
-position = [0.0, 1.0]
-radius = 1.0
-[[ball]]
-name = "wall"
-position = [9.0, 9.0]
-radius = 1.0
-mass = 100.0
-fixed = true
+world = { gravity = [0.5, -2.0] }
+ball = [
+  { name = "a", position = [1.0, 3.0], velocity = [3.0, 4.0], angular_velocity = 2.0, radius = 2.0, mass = 5.0 },
+  { name = "b", position = [0.0, 1.0], radius = 1.0 },
+  { name = "wall", position = [9.0, 9.0], radius = 1.0, mass = 100.0, fixed = true },
+]
 """
 
 

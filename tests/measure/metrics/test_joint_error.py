@@ -11,14 +11,10 @@ from sandbox.scene.files.load import loads
 from tests.measure.metrics.test_energy import resting_run
 
 TWO = """
-[[box]]
-name = "a"
-position = [0.0, 0.0]
-size = [2.0, 0.2]
-[[box]]
-name = "b"
-position = [3.0, 0.0]
-size = [2.0, 0.2]
+box = [
+  { name = "a", position = [0.0, 0.0], size = [2.0, 0.2] },
+  { name = "b", position = [3.0, 0.0], size = [2.0, 0.2] },
+]
 """
 
 

@@ -15,23 +15,14 @@ from sandbox.trajectory import Trajectory
 from tests.accounts import ledger
 
 SCENE = loads("""
-[world]
-gravity = [0.0, -10.0]
-duration = 0.55
-[solver]
-dt = 0.01
-record_every = 4
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[ball]]
-position = [0, 1]
-radius = 0.5
-restitution = 0.5
+world = { gravity = [0.0, -10.0], duration = 0.55 }
+solver = { dt = 0.01, record_every = 4 }
+plane = [{ point = [0, 0], normal = [0, 1] }]
+ball = [{ position = [0, 1], radius = 0.5, restitution = 0.5 }]
 """)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_ledger_has_a_row_for_every_recorded_frame() -> None:
     recorded = ledger(SCENE, "reference")
     assert recorded.time.tolist() == run(SCENE, "reference").time.tolist()

@@ -9,6 +9,8 @@ from sandbox import load, run
 from sandbox.engines.switching import start
 from sandbox.scene.files.shipped_scenes import find
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 SLACK = 1.02
 """Contacts begin and end by rounding, which depends on the math library: a percent of work in the largest pile."""
 
@@ -36,7 +38,6 @@ def work_of(name: str, seconds: float, engine: str) -> Mapping[str, int]:
     return found.info["work"]
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_work_of_a_single_collision_equals_a_hand_count() -> None:
     # 500 substeps of 1 ms, one pair tested in each and at the start, one impact of 10 iterations.
     assert work_of("two_balls", 0.5, "reference") == {
@@ -53,12 +54,10 @@ def test_work_of_a_single_collision_equals_a_hand_count() -> None:
     assert work_of("two_balls", 0.5, "exact") == {"events": 1, "predictions": 4, "pair_tests": 8}
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_impact_through_five_balls_is_four_events_with_two_predictions_each() -> None:
     assert work_of("newtons_cradle", 0.5, "exact") == {"events": 4, "predictions": 5 + 2 * 4, "pair_tests": 13 * 5}
 
 
-@pytest.mark.fail_slow(60)
 def test_joint_is_solved_once_per_iteration_and_twice_by_rattle() -> None:
     for engine in ("pymunk", "reference"):
         assert work_of("pendulum_90", 0.5, engine)["joint_iterations"] == 500 * 10
@@ -87,7 +86,6 @@ def test_pymunk_counts_contacts_only_after_they_are_requested() -> None:
     assert simulation.work["contact_iterations"] == simulation.work["contacts"] * scene.solver.iterations > 0
 
 
-@pytest.mark.fail_slow(60)
 @pytest.mark.parametrize(("name", "seconds", "engine"), EXPECTED_WORK, ids=str)
 def test_work_is_within_the_expected_amount(name: str, seconds: float, engine: str) -> None:
     found = work_of(name, seconds, engine)

@@ -74,7 +74,7 @@ def fly(scene, velocity, steps):
 # ---- thin walls ----
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("ratio", [0.5, 0.99, 1.2, 2.0, 10.0, 100.0])
 def test_wall_is_missed_with_the_probability_of_the_formula(ratio):
     # P(miss) = max(0, 1 − (r + w/2) / (v·h)) over all phases
@@ -372,7 +372,7 @@ def by_definition(scene, start, end, before, after):
     return sorted(found)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.003, 0.03, 0.3, 3.0]), st.integers(2, 30))
 def test_gas_is_audited_by_the_definition(seed, speed, count):
     rng = np.random.default_rng(seed)

@@ -28,7 +28,7 @@ def expected_encounters(radius, start, end, fast):
     return set(zip(when.tolist(), i[pair].tolist(), j[pair].tolist(), strict=True))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("count", [2, 40, 300])
 @pytest.mark.parametrize("speed", [1e-3, 0.1, 0.5, 5.0])
 @pytest.mark.parametrize("spread", [1.0, 30.0])

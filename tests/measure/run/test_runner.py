@@ -122,7 +122,7 @@ def test_partial_last_step_follows_the_scheme(steps: tuple[str, int, str], subst
     assert result.velocity[-1, 0] == pytest.approx([float(v) for v in velocity], abs=1e-12)  # likewise
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("duration", "every"), [(0.8, 2), (0.804, 7), (0.8, 79), (0.8099, 80), (0.804, 81), (0.8, 1000)]
 )
@@ -307,7 +307,7 @@ def test_unknown_engine_and_invalid_settings_raise() -> None:
             run(scene, **wrong)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_run_too_large_for_memory_is_rejected_before_its_first_step() -> None:
     states: list[Progress] = []
     scene = loads("[world]\nduration = 1.0\n[[grid]]\norigin = [0, 0]\ncolumns = 10000\nspacing = [3, 3]\nradius = 1\n")

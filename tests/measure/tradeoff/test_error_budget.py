@@ -19,31 +19,15 @@ pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 
 FLIGHT = """
-[world]
-gravity = [0.0, -10.0]
-duration = 0.4
-[solver]
-dt = 0.02
-[[ball]]
-name = "a"
-position = [0.0, 0.0]
-velocity = [1.0, 3.0]
-radius = 0.1
+world = { gravity = [0.0, -10.0], duration = 0.4 }
+solver = { dt = 0.02 }
+ball = [{ name = "a", position = [0.0, 0.0], velocity = [1.0, 3.0], radius = 0.1 }]
 """
 BULLET = """
-[world]
-duration = 0.02
-[solver]
-dt = 0.01
-[[wall]]
-name = "wall"
-points = [[1.0, -1.0], [1.0, 1.0]]
-thickness = 0.00002
-[[ball]]
-name = "bullet"
-position = [0.05, 0.0]
-velocity = [100.0, 0.0]
-radius = 0.00001
+world = { duration = 0.02 }
+solver = { dt = 0.01 }
+wall = [{ name = "wall", points = [[1.0, -1.0], [1.0, 1.0]], thickness = 2e-05 }]
+ball = [{ name = "bullet", position = [0.05, 0.0], velocity = [100.0, 0.0], radius = 1e-05 }]
 """
 """The wall is so thin that even 16 times the substeps do not detect it."""
 CRADLE = """

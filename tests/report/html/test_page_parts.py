@@ -34,6 +34,8 @@ from sandbox.report.tradeoff_plot import budget_of, pareto_of, work_points
 from sandbox.scene.files.load import loads
 from tests.report.html.page_documents import HOSTILE, SCENE, extremes_document, tradeoff_document, tradeoff_of
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
+
 
 class ParsedHtml(HTMLParser):
     """Elements and text of an HTML document."""
@@ -85,7 +87,6 @@ def test_control_characters_and_lone_surrogates_of_a_page_are_replaced() -> None
     html.encode("utf-8")
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_data_cannot_end_its_element_and_rejects_nan() -> None:
     document = tradeoff_document()
     html = tradeoff_page(document).html()
@@ -123,7 +124,6 @@ def test_empty_trade_off_and_empty_extremes_are_pages() -> None:
     assert "0 cells" in extremes_page(Extremes(ExtremesPlan((), ()), (), (), (), (), 0.0).document()).html()
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_every_point_of_a_trade_off_is_drawn_including_failures() -> None:
     html = tradeoff_page(tradeoff_document()).html()
     assert len(re.findall(r'data-point="\d"', html)) == 6
@@ -131,7 +131,6 @@ def test_every_point_of_a_trade_off_is_drawn_including_failures() -> None:
     assert "pymunk: error limit at any step" in html
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_warnings_for_recommended_settings_are_below_their_answers() -> None:
     document = tradeoff_document()
     html = tradeoff_page(document).html()
@@ -141,7 +140,6 @@ def test_warnings_for_recommended_settings_are_below_their_answers() -> None:
     assert 'src="x"' not in answers
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_selected_point_has_its_warnings_and_time_per_frame() -> None:
     html = tradeoff_page(tradeoff_document()).html()
     facts = json.loads(re.findall(r'class="facts">(.*?)</script>', html, re.DOTALL)[0])
@@ -152,7 +150,6 @@ def test_selected_point_has_its_warnings_and_time_per_frame() -> None:
     assert ">frame" not in safe
 
 
-@pytest.mark.fail_slow(60)
 def test_settings_beyond_a_frame_or_the_budget_are_marked() -> None:
     html = tradeoff_page({**tradeoff_document(), "budget": 0.05}).html()
     front = html[html.index("The Pareto front</bdi>") : html.index("Sources of error")]
@@ -170,7 +167,6 @@ def test_extremes_have_a_cell_for_every_level() -> None:
     assert "75 %" in html
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_methods_are_named_by_their_differing_settings() -> None:
     document = tradeoff_document()
     points = work_points(document)

@@ -150,7 +150,7 @@ time.sleep(60)
 """
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no signal that tests for a process")
 def test_changes_of_a_killed_editor_are_offered_and_those_of_a_living_one_are_not(path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", EDITOR, str(path)], stdout=subprocess.PIPE, text=True) as process:

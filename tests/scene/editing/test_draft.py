@@ -295,7 +295,7 @@ def plain(value: Any) -> Any:
     return [plain(each) for each in value] if isinstance(value, tuple | list) else value
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(st.lists(OPERATIONS, max_size=12))
 def test_undoing_everything_restores_the_start(operations: list[tuple[str, int, float]]) -> None:
     draft = SceneDraft(TEXT)

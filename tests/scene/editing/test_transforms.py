@@ -97,7 +97,7 @@ SIMILARITIES = st.builds(
 )
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(SIMILARITIES)
 def test_bodies_and_static_elements_are_mapped(by: Similarity) -> None:
     rigid = [key for key in KEYS if key.table not in (*CANNOT_ROTATE, "rope", "stack")]
@@ -119,7 +119,7 @@ def test_bodies_and_static_elements_are_mapped(by: Similarity) -> None:
     assert np.abs(np.asarray(plane.point) - ends[0]).max() < ROUNDING
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(st.tuples(st.floats(-9, 9), st.floats(-9, 9)))
 def test_translation_moves_every_body_of_every_element(shift: tuple[float, float]) -> None:
     moved = after(Similarity(shift=shift), KEYS)

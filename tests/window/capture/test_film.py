@@ -283,7 +283,7 @@ def stored_run() -> Trajectory:
     return run(scene, audit=False, bout=PlayerSpec("skilled").start_game(scene))
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_path: Path) -> None:
     stored_run.save(tmp_path / "run.npz")
     film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))
@@ -304,7 +304,7 @@ def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_p
     assert distance.max() <= 6.5 * RADIUS * camera.scale + 2.0  # within the radius of the glow
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_invalid_lamp_records_are_an_error(stored_run: Trajectory) -> None:
     info = stored_run.info | {"game": stored_run.info["game"] | {"lamps": [["never", 3]]}}
     with pytest.raises(SceneError, match=r"info\.game: invalid lamp record"):

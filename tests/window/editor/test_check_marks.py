@@ -201,7 +201,7 @@ def test_lost_release_does_not_take_the_next_one(scene: Scene, result: CheckResu
     assert not marks.is_folded
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(
     ("size", "ui_scale", "area"),
     [

@@ -488,7 +488,7 @@ EVENTS = st.one_of(
 )
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(st.lists(EVENTS, max_size=30), st.booleans())
 def test_any_events_report_only_values_of_fields(events: list[pygame.event.Event], is_rejected: bool) -> None:
     edited = Edited(section(Ball, BALL), section(Settings, {}), size=(1280, 400))

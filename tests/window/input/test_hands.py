@@ -106,7 +106,7 @@ def test_body_that_moves_after_the_press_is_grabbed_at_the_pressed_point(paused:
         assert held == pytest.approx(grabbed_point, rel=1e-12)  # some roundings
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_pulled_body_reaches_the_mouse_and_keeps_its_velocity_when_released() -> None:
     view, tools = live(), BodyTools()
     pick_and_grab(tools, view, (0.0, 0.25), 0.0, paused=False)

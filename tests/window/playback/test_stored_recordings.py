@@ -19,7 +19,7 @@ def test_recordings_exist_for_every_kind() -> None:
     assert {file.stem for file in FILES} == {"9-ball", "curling", "duel", "landing", "pile", "pinball"}
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("file", FILES, ids=[file.stem for file in FILES])
 def test_stored_recording_replays_headless_and_in_a_session_of_the_window(file: Path) -> None:
     recording = Recording.load(file)

@@ -179,7 +179,7 @@ def frame_rules(window: App, *events: pygame.event.Event) -> ArtilleryRules:
     return rules
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_keys_aim_and_fire_and_seeking_back_undoes_the_shot(window: App) -> None:
     rules = frame_rules(window)
     red = rules.shooter

@@ -55,7 +55,7 @@ def test_line_thinner_than_a_pixel_is_visible() -> None:
     assert (column[:, 0] > column[:, 2]).mean() > 0.9
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @given(x=st.floats(-9e15, 9e15), y=st.floats(-9e15, 9e15), size=st.floats(1e-9, 1e9), power=st.floats(-12, 9))
 def test_markings_of_any_position_and_size_are_drawn(x: float, y: float, size: float, power: float) -> None:
     camera = Camera((0.0, 0.0), 10.0**power, (40, 30))

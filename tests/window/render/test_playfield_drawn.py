@@ -140,7 +140,7 @@ def test_background_is_cached_while_lamps_change(monkeypatch: pytest.MonkeyPatch
     assert len(calls) == 1
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("scale", [1e-12, 1.0, MAX_LAMP_RADIUS / RADIUS, 1e6, 1e12])
 def test_lit_lamps_are_drawn_at_any_scale(scale: float) -> None:
     camera = Camera((0.0, 0.0), scale, SIZE)

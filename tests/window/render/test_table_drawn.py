@@ -177,7 +177,7 @@ def test_side_spin_rotates_about_the_vertical() -> None:
     assert east == pytest.approx([math.cos(1.0), math.sin(1.0), 0.0], abs=1e-12)  # rounding
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_orientation_stays_orthogonal_over_long_rolling() -> None:
     rotation = rotation_of((300.0, -170.0, 40.0), 20.0, 2000)
     assert rotation @ rotation.T == pytest.approx(np.eye(3), abs=1e-12)  # orthonormalised at every rolling_frame

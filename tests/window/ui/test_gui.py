@@ -15,6 +15,8 @@ from tests.toml_text import toml
 from tests.window.pressing import press, release
 from tests.window.windowed import open_window, run_frame
 
+pytestmark = pytest.mark.fail_slow(60)  # a window
+
 ROOM = (
     toml("world", gravity=[0.0, -9.8], duration=60.0)
     + toml("ball", name="ball", position=[0.0, 1.0], radius=0.4)
@@ -38,7 +40,6 @@ def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> li
     return calls
 
 
-@pytest.mark.fail_slow(60)
 def test_key_bindings_are_computed_once_per_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, app_state, "key_bindings")
     with open_window(ROOM, tmp_path) as window:
@@ -60,7 +61,6 @@ def test_score_panel_layout_is_cached(tmp_path: Path, monkeypatch: pytest.Monkey
         assert len(calls) == 1
 
 
-@pytest.mark.fail_slow(60)
 def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     queries = count_calls(monkeypatch, SessionParameters, "of")
     shown = count_calls(monkeypatch, SidePanel, "show")
@@ -83,7 +83,6 @@ def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch:
         assert gravity.parameter.value == -3.0  # type: ignore[attr-defined]  # it has a parameter
 
 
-@pytest.mark.fail_slow(60)
 def test_widget_shows_the_current_value_after_a_refused_change(tmp_path: Path) -> None:
     with open_window(ROOM, tmp_path, (1280, 720)) as window:
         run_frame(window)

@@ -70,7 +70,7 @@ def test_wheel_scrolls_help_only_if_it_does_not_fit(size: tuple[int, int], fits:
     assert (pygame.image.tobytes(first, "RGB") == pygame.image.tobytes(later, "RGB")) == fits
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize(("size", "ui_scale"), [((640, 480), 1.0), ((1280, 800), 1.0), ((3840, 2160), 2.0)])
 def test_help_fits_into_common_window_sizes(size: tuple[int, int], ui_scale: float) -> None:
     surface = pygame.Surface(size)

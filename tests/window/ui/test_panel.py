@@ -106,7 +106,7 @@ def test_drag_continues_when_other_content_is_shown() -> None:
     assert recorded.calls[-1] == ("change", "gravity", 30, True)
 
 
-@pytest.mark.fail_slow(60)
+@pytest.mark.fail_slow(60)  # takes over half a second
 def test_replaced_widgets_are_released() -> None:
     recorded = RecordedPanel()
     known = [weakref.ref(widget) for widget in recorded.panel.widgets]
