@@ -1,4 +1,4 @@
-"""Symmetries: mirror images, order of bodies, moving frames, translation, repetition."""
+"""Symmetries: mirror images, order of bodies, moving frames, translation, rotation, repetition."""
 
 import numpy as np
 import pytest
@@ -69,6 +69,34 @@ def test_motion_is_the_same_in_a_moving_frame(config):
     np.testing.assert_allclose(drifting_position, position + drift, atol=config.rounding(1e-10), rtol=0)
     np.testing.assert_allclose(drifting_velocity, velocity + drift, atol=config.rounding(1e-10), rtol=0)
     np.testing.assert_allclose(drifting_spin, spin, atol=config.rounding(1e-10), rtol=0)
+
+
+@each_config([*IMPULSE_CONFIGS, PENALTY])
+@pytest.mark.parametrize("angle", [0.5, 2.0, 4.0])  # signs of both components of the normal and of gravity differ
+def test_motion_turns_with_the_world(config, angle):
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.array([[cos, sin], [-sin, cos]])  # from the right, of rows
+
+    def falling(turn):
+        balls = [ball.model_dump(exclude_none=True) for ball in four_balls().balls]
+        for ball in balls:
+            ball |= {key: (np.array(ball[key]) @ turn).tolist() for key in ("position", "velocity")}
+        gravity, normal, point = ((np.array(v) @ turn).tolist() for v in ([0, -9.81], [0, 1], [0, -2.5]))
+        return make_scene(
+            world={"duration": 1.0, "gravity": gravity},
+            material=[{"name": "x"}, {"name": "y"}],
+            pair=PAIRS,
+            ball=balls,
+            plane=[{"point": point, "normal": normal, "material": "y"}],
+        )
+
+    straight, turned = config.run(falling(np.eye(2))), config.run(falling(turn))
+    assert (straight.contact_pair[:, 1] < 0).any()  # some fall onto the plane
+    assert (straight.contact_pair[:, 1] >= 0).any()
+    for key in ("position", "velocity"):
+        expected = getattr(straight, key)[-1] @ turn
+        # accuracy of the roots for times of impact
+        np.testing.assert_allclose(getattr(turned, key)[-1], expected, atol=config.rounding(1e-10), rtol=0)
 
 
 @each_config([*IMPULSE_CONFIGS, PENALTY])

@@ -81,3 +81,30 @@ def test_resting_ball_is_knocked_off_the_floor_and_lands_again():
     frame = advance(simulation_of({"plane": [floor], "ball": balls}), 5.0)
     assert frame.position[:, 1] == pytest.approx([0.5, 0.5], abs=1e-12)  # both rest again, up to truncation
     assert frame.velocity[0, 0] + frame.velocity[1, 0] == pytest.approx(0.0, abs=1e-14)  # frictionless floor: rounding
+
+
+@pytest.mark.parametrize("speed", [0.0, 2.0])
+def test_ball_hits_a_resting_ball_after_the_closed_form_time(speed):
+    floor = {"point": [0, 0], "normal": [0, 1]}
+    resting = {"position": [0, 0.5], "radius": 0.5, "restitution": 0.5}
+    falling = {"position": [0.6, 3.3], "radius": 0.5, "restitution": 0.5, "velocity": [0, -speed]}
+    simulation = simulation_of({"plane": [floor], "ball": [resting, falling]})
+    simulation.contacts()
+    advance(simulation, 1.0)
+    found = simulation.contacts()
+    height = 3.3 - 0.5 - 0.8  # to where the centres, 0.6 m apart across, are 1 m apart
+    expected = (math.sqrt(speed**2 + 2 * G * height) - speed) / G
+    assert found.time[(found.pair == [0, 1]).all(axis=1)][0] == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("gravity", [[3.0, -9.0], [-3.0, -9.0], [0.0, -9.0], [9.0, -9.0]])
+@pytest.mark.parametrize("normal", [[0.28, 0.96], [-0.28, 0.96], [0.0, 1.0]])
+def test_ball_thrown_off_a_plane_returns_after_the_closed_form_time(gravity, normal):
+    plane = {"point": [0, 0], "normal": normal}
+    start, speed = [0.5 * n for n in normal], 4.0
+    ball = {"position": start, "velocity": [speed * n for n in normal], "radius": 0.5}
+    simulation = simulation_of({"world": {"gravity": gravity}, "plane": [plane], "ball": [ball]})
+    simulation.contacts()
+    expected = 2 * speed / -(gravity[0] * normal[0] + gravity[1] * normal[1])
+    advance(simulation, expected + 0.1)
+    assert simulation.contacts().time[0] == pytest.approx(expected, rel=1e-13)

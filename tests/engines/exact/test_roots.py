@@ -98,6 +98,10 @@ def test_touch_of_a_distant_pair_is_as_accurate_as_its_coordinates():
     assert abs(gap) <= 1e-10  # rounding of 1e5 m is 1.5e-11 m; the squared distance loses 1e-6 m
 
 
+def test_acceleration_with_a_square_of_zero_leaves_the_path_straight():
+    assert curved_entry(3.0, 0.0, -1.0, 0.0, 0.0, 5e-207, 1.0, False, math.inf) == 2.0
+
+
 def test_polynomial_that_is_zero_never_falls():
     assert first_downward_root(0.0, 0.0, 0.0, 0.0, 0.0, 1.0) == math.inf
 

@@ -236,6 +236,8 @@ def curved_entry(
     elif c0 <= 0.0 and abs(closing) <= 2.0**-49 * math.sqrt(distance_squared * speed_squared):
         c1 = 0.0
     speed, acceleration = math.sqrt(speed_squared), math.sqrt(acceleration_squared)
+    if acceleration == 0.0:  # its square is below the smallest number
+        return math.inf if separating else pair_entry(dx, dy, vx, vy, radius_sum, speed)
     # After this time a t²/2 exceeds all other terms: they cannot touch any more.
     until = min(
         limit,
