@@ -18,6 +18,8 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, loads
 from sandbox.scene.geometry.polygon import polygon_moments, rounded_polygon_moments
 
+pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of polygons
+
 CAPSULE = '[[body]]\nname = "b"\nposition = [1, 2]\ncapsule = [{{ radius = 0.1, {} }}]\n'
 
 
@@ -72,7 +74,6 @@ def test_stated_moment_decides_how_a_torque_turns_a_body() -> None:
         assert math.isclose(omega, 3.0 * 0.5 / 5.0, rel_tol=5e-3), engine
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `reference`
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
 def test_rounded_box_rests_on_its_rounding(engine: str) -> None:
     table = scene(
@@ -120,7 +121,6 @@ def test_bodies_of_one_group_pass_each_other() -> None:
     assert {*crowd.bodies.group.tolist()} == {2**20, 2**20 + 1}
 
 
-@pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 def test_exact_refuses_a_new_body_with_a_group() -> None:
     simulation = start(scene('[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 0.2\n'), "exact")
     with pytest.raises(ActionError, match="does not model groups"):

@@ -80,6 +80,8 @@ class Checkout:
         """Let compiled kernels stay valid although a module of plain Python beside them has changed."""
         script = "from sandbox.engines.common.kernel import cache_folder; print(cache_folder())"
         old = max((self.folder / "sandbox").rglob("kernels-*"), key=lambda each: each.stat().st_mtime, default=None)
+        if old is not None:
+            os.utime(old)  # or the script deletes it, if it is an hour old, as that of earlier sources
         found = subprocess.run(
             [sys.executable, "-c", script], cwd=self.folder, capture_output=True, text=True, check=True
         ).stdout
@@ -87,7 +89,6 @@ class Checkout:
         if old is not None and old != new:
             shutil.rmtree(new)
             old.rename(new)
-        os.utime(new)  # or it would be deleted after an hour as that of earlier sources
 
     def test(self, mutant: Mutant, contexts: dict[str, Context], stages: list[str]) -> dict[str, Any]:
         """Return the fate of a mutant after the stages "uncompiled" and "compiled", or one of them."""
