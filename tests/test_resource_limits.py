@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from sandbox import resource_limits
+from sandbox import resource_limits, run
+from sandbox.action import Move
 from sandbox.cli.main import call
 from sandbox.engines.registry import ENGINES
 from sandbox.resource_limits import LIMITS, MEMORY, PAIRS, LimitValueError
@@ -93,6 +94,15 @@ def test_engine_names_the_limit_that_a_scene_exceeds(engine, variable, more, mon
     monkeypatch.setenv(variable, "1")
     (reason,) = ENGINES[engine].missing(scene, scene.solver)
     assert f"set {variable}=" in reason
+
+
+def test_step_with_more_contacts_than_the_limit_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = from_document({"grid": [{"name": "g", "origin": [0, 0], "columns": 20, "spacing": [3, 0], "radius": 1}]})
+    monkeypatch.setenv("SANDBOX_MAX_STEP_WORK", "1000")  # as many passes over the bodies are less
+    moves = [Move(time=0, body=f"g-{k + 1}", position=(0.0, 0.0)) for k in range(20)]
+    ended = run(scene, "reference", actions=moves)
+    assert ended.status == "failed"
+    assert "set SANDBOX_MAX_STEP_WORK=" in ended.reason
 
 
 def test_memory_error_exits_with_status_1_and_one_line(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
