@@ -180,6 +180,19 @@ def test_compiled_steps_of_the_reference(name: str, integrator: str) -> None:
     assert seen[:5] == seen_other[:5]
 
 
+@pytest.mark.parametrize(
+    "substeps", [512, 513, 1000]
+)  # a call reserves 64 rows for the contacts of each; it has 512·64
+@pytest.mark.parametrize("name", ["balls that settle", "boxes"])
+def test_compiled_steps_of_many_substeps_end(name: str, substeps: int) -> None:
+    ways = [(stepped, [20]), (advanced, [20])]
+    (one, seen), (other, seen_other) = (
+        way(started(small_scene(name), "reference", substeps=substeps), split, 1) for way, split in ways
+    )
+    assert_same_frames(one, other)
+    assert seen == seen_other
+
+
 @pytest.mark.parametrize(("name", "kernel"), [("balls that settle", "advance_balls"), ("boxes", "advance_pieces")])
 def test_compiled_steps_are_used(name: str, kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []

@@ -78,7 +78,7 @@ def advance_pieces(
     written, size = 0, 0
     for k in range(steps):
         first = k * number.substeps
-        if not has_room(log, first, number.substeps * (2 * size + 64)):
+        if k > 0 and not has_room(log, first, number.substeps * (2 * size + 64)):  # the first step always begins
             return k, 0, written, DONE
         for s in range(number.substeps):
             move_bodies(number, bodies, state, scratch, (steps_before + k) * number.dt + s * number.h)
