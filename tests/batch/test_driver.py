@@ -25,11 +25,7 @@ from sandbox.scene.errors import Fault, SceneError
 
 SCENE = """
 world = { duration = 0.05 }
-[[ball]]
-name = "a"
-position = [0, 0]
-velocity = [1, 0]
-radius = 1
+ball = [{ name = "a", position = [0, 0], velocity = [1, 0], radius = 1 }]
 """
 
 DEFAULT = RunOptions()

@@ -28,18 +28,11 @@ pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that
 
 SCENE = loads("""
 title = "Two"
-[world]
-gravity = [0.0, -10.0]
-duration = 0.1
-seed = 3
-[[ball]]
-name = "a"
-position = [0, 0]
-radius = 1
-[[ball]]
-name = "b"
-position = [5, 0]
-radius = 1
+world = { gravity = [0.0, -10.0], duration = 0.1, seed = 3 }
+ball = [
+  { name = "a", position = [0, 0], radius = 1 },
+  { name = "b", position = [5, 0], radius = 1 },
+]
 """)
 JOB = Job("label", SCENE, "pymunk")
 

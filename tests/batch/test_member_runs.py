@@ -36,24 +36,11 @@ BALLS = """
 title = "Balls"
 world = { gravity = [0, -9.81], duration = 0.4 }
 solver = { dt = 0.01, record_every = 7 }
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-restitution = 0.7
-friction = 0.3
-[[ball]]
-name = "a"
-position = [0, 0.3]
-velocity = [1, 0]
-radius = 0.1
-restitution = 0.9
-[[grid]]
-origin = [0.5, 0.2]
-columns = 3
-spacing = [0.3, 0.3]
-jitter = 0.03
-velocity_jitter = 1
-radius = 0.1
+plane = [{ point = [0, 0], normal = [0, 1], restitution = 0.7, friction = 0.3 }]
+ball = [{ name = "a", position = [0, 0.3], velocity = [1, 0], radius = 0.1, restitution = 0.9 }]
+grid = [
+  { origin = [0.5, 0.2], columns = 3, spacing = [0.3, 0.3], jitter = 0.03, velocity_jitter = 1, radius = 0.1 },
+]
 """
 
 END = RunOptions(audit=False, keep="end")

@@ -35,17 +35,9 @@ pytestmark = pytest.mark.fail_slow(60)  # other processes
 
 SCENE = """
 title = "drop"
-[world]
-gravity = [0, -9.81]
-duration = 0.5
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[ball]]
-name = "stone"
-position = [0, 1]
-radius = 0.1
-restitution = 0.5
+world = { gravity = [0, -9.81], duration = 0.5 }
+plane = [{ point = [0, 0], normal = [0, 1] }]
+ball = [{ name = "stone", position = [0, 1], radius = 0.1, restitution = 0.5 }]
 """
 
 

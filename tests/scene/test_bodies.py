@@ -15,37 +15,15 @@ from sandbox.scene.files.load import loads
 from tests import strategies
 
 SCENE = """
-[[emitter]]
-position = [9, 9]
-count = 2
-velocity_min = [1, 1]
-velocity_max = [1, 1]
-[[ball]]
-position = [1, 2]
-velocity = [3, 4]
-angle = 5
-angular_velocity = 6
-radius = 2
-density = 0.5
-[[grid]]
-name = "row"
-origin = [0, 20]
-columns = 2
-spacing = [7, 0]
-radius = 1
-mass = 8
-angular_velocity = 2
-[[ball]]
-name = "rock"
-position = [50, 0]
-radius = 1
-fixed = true
-[[scatter]]
-count = 1
-lower = [-9, -9]
-upper = [-9, -9]
-velocity = [2, 1]
-radius = 1
+emitter = [{ position = [9, 9], count = 2, velocity_min = [1, 1], velocity_max = [1, 1] }]
+ball = [
+  { position = [1, 2], velocity = [3, 4], angle = 5, angular_velocity = 6, radius = 2, density = 0.5 },
+  { name = "rock", position = [50, 0], radius = 1, fixed = true },
+]
+grid = [
+  { name = "row", origin = [0, 20], columns = 2, spacing = [7, 0], radius = 1, mass = 8, angular_velocity = 2 },
+]
+scatter = [{ count = 1, lower = [-9, -9], upper = [-9, -9], velocity = [2, 1], radius = 1 }]
 """
 
 

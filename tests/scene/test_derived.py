@@ -17,26 +17,13 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import loads
 
 TEXT = """
-[world]
-gravity = [0, -10]
-duration = 0.5
-[[material]]
-name = "rubber"
-restitution = 0.5
-friction = 0.3
-[[plane]]
-point = [0, 0]
-normal = [0, 1]
-[[ball]]
-name = "a"
-position = [0, 1]
-radius = 0.5
-material = "rubber"
-[[ball]]
-name = "b"
-position = [3, 1]
-radius = 0.5
-material = "rubber"
+world = { gravity = [0, -10], duration = 0.5 }
+material = [{ name = "rubber", restitution = 0.5, friction = 0.3 }]
+plane = [{ point = [0, 0], normal = [0, 1] }]
+ball = [
+  { name = "a", position = [0, 1], radius = 0.5, material = "rubber" },
+  { name = "b", position = [3, 1], radius = 0.5, material = "rubber" },
+]
 """
 
 
