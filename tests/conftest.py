@@ -11,11 +11,11 @@ from hypothesis import settings
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 
-CORE = "not nightly and not fail_slow"
-"""Expression of the marks of the tests that run by default, see pyproject.toml."""
-
 WHOLE_FILE = re.compile(r"^pytestmark = pytest\.mark\.(?:nightly|fail_slow)", re.MULTILINE)
 """Text of a file of which no test belongs to the core."""
+
+FEW_KERNELS = tuple(f"tests/{folder}/" for folder in ("docs", "games", "levels", "report", "scene", "window"))
+"""Folders whose tests need few compiled kernels."""
 
 ON_CI = bool(os.environ.get("CI"))
 
@@ -43,29 +43,25 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Do not import files without a test of the core, if only the core runs: to import all takes a minute at first."""
-    if config.option.markexpr != CORE or collection_path.suffix != ".py":
+    is_core = config.option.markexpr in config.getini("addopts")
+    if not is_core or collection_path.suffix != ".py":
         return None
     return "exact" in collection_path.parts or WHOLE_FILE.search(collection_path.read_text("utf-8")) is not None or None
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
-    """Keep tests of `exact` out of the core: to compile its kernels takes minutes."""
-    folder, _, parameters = item.nodeid.partition("[")
-    if "/exact/" in folder or "exact" in parameters:
+    """Keep tests with the parameter `exact` out of the core: to compile its kernels takes minutes."""
+    if "exact" in item.nodeid.partition("[")[2]:
         item.add_marker(pytest.mark.fail_slow(60))
-
-
-WITHOUT_KERNELS = ("docs", "games", "levels", "report", "scene", "window")
-"""Folders whose tests need few kernels."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Order the tests, and keep those of a shard.
 
-    Tests that need no kernels are last, because a second worker begins in the middle: so it does not compile what the
+    Tests that need few kernels are last, because a second worker begins in the middle: so it does not compile what the
     first one is compiling. The digest of a test's name decides its shard, so that other tests do not move it.
     """
-    items.sort(key=lambda item: item.nodeid.startswith(tuple(f"tests/{folder}/" for folder in WITHOUT_KERNELS)))
+    items.sort(key=lambda item: item.nodeid.startswith(FEW_KERNELS))
     if shard := config.getoption("--shard"):
         part, count = map(int, shard.split("/"))
         parts: list[list[pytest.Item]] = [[], []]

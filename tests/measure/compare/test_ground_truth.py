@@ -204,3 +204,14 @@ def test_truth_names_the_first_of_two_reasons_to_end(ends: str, reason: str, mon
     truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
     assert truth.trusted_until == 0.3
     assert [word for word in ("smaller steps disagree", "chaotic") if word in truth.about] == [reason]
+
+
+def test_second_method_that_has_not_converged_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(witness, "MIN_WORK", 0)
+    monkeypatch.setattr(witness, "WORK_FRACTION", 0.0)  # so that it may halve dt twice
+    scene = loads(DROP.replace("duration", "linear_drag = 1e-9\nduration"))  # excludes half_kick: first order
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk())
+    truth = truth_of(scene, scene.solver, 1e-4)
+    assert "another has not converged" in truth.about
+    # Its last halving, to 2.5 ms, changes the fall by ½·10 m/s²·t·2.5 ms. Ten tolerances are reached at 0.08 s.
+    assert truth.trusted_until == pytest.approx(0.08, abs=0.01)  # frames are 0.01 s apart
