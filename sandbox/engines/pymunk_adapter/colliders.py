@@ -37,8 +37,21 @@ SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 thousand times as much at 5e6"""
 
 
+CLASHING_NUMBERS = 4
+"""Smallest number of a shape from which on no two contacts of a pair of shapes share a name.
+
+Munk2D numbers the shapes of a space in the order of `add`, from 0, and names a contact by a hash of the numbers of both
+shapes and of their corners (`CP_HASH_PAIR`, cpCollision.c). With numbers of 0 to 3 both contacts of two edges can have
+the same name; then both start from the impulse of one of them. If a segment is the first shape and a box from its lower
+left corner (`pymunk.Poly`) the second, a stack of boxes on it leans and falls.
+"""
+
+
 def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
-    """Return an empty space with every parameter set. `settings` must be resolved."""
+    """Return an empty space with every parameter set, whose shapes are numbered from `CLASHING_NUMBERS` on.
+
+    `settings` must be resolved.
+    """
     assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
     space = pymunk.Space(threaded=False)  # with two threads, runs are not repeatable
     space.gravity = gravity_of(scene)
@@ -51,6 +64,10 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     if settings.sleeping:
         assert settings.sleep_time is not None and settings.idle_speed is not None
         space.sleep_time_threshold, space.idle_speed_threshold = settings.sleep_time, settings.idle_speed
+    for _ in range(CLASHING_NUMBERS):
+        unused = pymunk.Circle(space.static_body, 1.0)
+        space.add(unused)
+        space.remove(unused)
     return space
 
 
