@@ -37,21 +37,8 @@ SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 thousand times as much at 5e6"""
 
 
-CLASHING_NUMBERS = 4
-"""Smallest number of a shape from which on no two contacts of a pair of shapes share a name.
-
-Munk2D numbers the shapes of a space in the order of `add`, from 0, and names a contact by a hash of the numbers of both
-shapes and of their corners (`CP_HASH_PAIR`, cpCollision.c). With numbers of 0 to 3 both contacts of two edges can have
-the same name; then both start from the impulse of one of them. If a segment is the first shape and a box from its lower
-left corner (`pymunk.Poly`) the second, a stack of boxes on it leans and falls.
-"""
-
-
 def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
-    """Return an empty space with every parameter set, whose shapes are numbered from `CLASHING_NUMBERS` on.
-
-    `settings` must be resolved.
-    """
+    """Return an empty space with every parameter set. `settings` must be resolved."""
     assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
     space = pymunk.Space(threaded=False)  # with two threads, runs are not repeatable
     space.gravity = gravity_of(scene)
@@ -64,11 +51,27 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     if settings.sleeping:
         assert settings.sleep_time is not None and settings.idle_speed is not None
         space.sleep_time_threshold, space.idle_speed_threshold = settings.sleep_time, settings.idle_speed
-    for _ in range(CLASHING_NUMBERS):
+    return space
+
+
+def clashing_numbers(bodies: Bodies) -> int:
+    """Return how many numbers of shapes to skip, so that no two contacts of a pair of shapes share a name.
+
+    Munk2D numbers the shapes of a space from 0 in the order of `add`, and names a contact by a hash of the numbers of
+    both shapes and of their corners (`CP_HASH_PAIR` in cpCollision.c). The hash is symmetric: where the corners of two
+    edges have the same numbers as the shapes, both contacts have the name 0, and start from the impulse of one of them.
+    If the ground is the first shape of a space and a box from its lower left corner (`pymunk.Poly`) the second, a stack
+    of boxes leans and falls. A number that no corner has clashes with none.
+    """
+    return 0 if bodies.all_round else int(bodies.shapes.corners.max())
+
+
+def skip_numbers(space: pymunk.Space, count: int) -> None:
+    """Skip numbers of shapes."""
+    for _ in range(count):
         unused = pymunk.Circle(space.static_body, 1.0)
         space.add(unused)
         space.remove(unused)
-    return space
 
 
 def gravity_of(scene: Scene) -> tuple[float, float]:
@@ -113,7 +116,8 @@ def fixed_shapes(
 def keeps_first_corners(element: BodySource) -> bool:
     """Return whether the polygons of a body start at their first corners, and not where pymunk starts a hull.
 
-    A body with a stated centre of mass may be captured from a space; only rounding depends on the first corner.
+    A body with a stated centre of mass may be captured from a space. Rounding depends on the first corner, and so do
+    the names of contacts (see `clashing_numbers`).
     """
     return isinstance(element, Compound) and element.centre_of_mass is not None
 

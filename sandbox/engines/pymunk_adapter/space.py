@@ -16,11 +16,13 @@ from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
     body_shapes,
+    clashing_numbers,
     gravity_of,
     jointed_surfaces,
     new_space,
     shape_filter,
     shuffled,
+    skip_numbers,
 )
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
@@ -64,7 +66,7 @@ class SpaceBodies(SpaceBodyTable):
         """(N,) collision layer of each body"""
         self.zone_sensors = ZoneSensors(self._space, scene.zones)
         self.joints = SpaceJoints(self._space)
-        self._polygons = False
+        self._polygons, self._skipped_numbers = False, 0
         self._has_single_contacts = False  # two bodies have at most one contact, and no sensors are listed
         self._by_name: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
@@ -96,6 +98,10 @@ class SpaceBodies(SpaceBodyTable):
         """Add bodies: their (M,) indices and present state."""
         if not len(indices):
             return
+        clashing = clashing_numbers(bodies)
+        if clashing > self._skipped_numbers:
+            skip_numbers(self._space, clashing - self._skipped_numbers)
+            self._skipped_numbers = clashing
         self._static_shapes.create(self._scene, self._setup.plane_reach, bodies, self._surface_of_fixed)
         self._moments = bodies.moment
         self._polygons = self._polygons or not bodies.round.all()

@@ -7,7 +7,7 @@ from importlib.metadata import version
 import numpy as np
 
 from sandbox.echo import printable, shorten
-from sandbox.engines.pymunk_adapter.colliders import CLASHING_NUMBERS, reach_of
+from sandbox.engines.pymunk_adapter.colliders import clashing_numbers, reach_of
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE, PymunkEngine
 from sandbox.engines.pymunk_adapter.program.contents import Contents, literal
 from sandbox.engines.pymunk_adapter.program.loops import Loops, comment
@@ -252,10 +252,12 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
     )
     if contents.has_sleep:
         yield "    space.sleep_time_threshold, space.idle_speed_threshold = SLEEP_TIME_THRESHOLD, IDLE_SPEED_THRESHOLD"
-    yield f"    for _ in range({CLASHING_NUMBERS}):  # Munk2D confuses contacts of the first shapes of a space"
-    yield "        unused = pymunk.Circle(space.static_body, 1.0)"
-    yield "        space.add(unused)"
-    yield "        space.remove(unused)"
+    skipped = clashing_numbers(contents.setup.bodies)
+    if skipped:
+        yield f"    for _ in range({skipped}):  # Munk2D confuses contacts of the first shapes of a space"
+        yield "        unused = pymunk.Circle(space.static_body, 1.0)"
+        yield "        space.add(unused)"
+        yield "        space.remove(unused)"
     yield "    bodies = {}"
     if contents.surfaces.rules:
         yield from _indented(["", *comment("Pairs of materials whose coefficients are no products of factors.")])
