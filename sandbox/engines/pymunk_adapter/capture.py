@@ -18,6 +18,7 @@ import numpy as np
 import pymunk
 
 from sandbox.engines.common.base import BIAS
+from sandbox.engines.pymunk_adapter.contact_names import clashing_pairs
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE, SLEEP_TIME
 from sandbox.engines.pymunk_adapter.joint_capture import MIN_RADIUS, KeyValues, joint_values, point_of
 from sandbox.engines.pymunk_adapter.shape_filters import MAX_CATEGORIES, FilterKind, SceneFilters
@@ -226,6 +227,7 @@ class SpaceElements:
     def note_space(self) -> None:
         """Note the settings and callbacks of the space that a scene cannot state."""
         space = self.space
+        self._note_contact_names()
         if not damping_of(space) and space.damping != 1.0:
             self.omitted.append(f"space.damping = {space.damping:g}; `world.damping` is above 0 and at most 1")
         if space.current_time_step:
@@ -238,6 +240,16 @@ class SpaceElements:
             self.omitted.append(f"{len(space._handlers)} collision callbacks (space.on_collision)")
         if getattr(space, "_post_step_callbacks", None):
             self.omitted.append("post-step callbacks")
+
+    def _note_contact_names(self) -> None:
+        """Note if other pairs of shapes than in the space have contacts that share a name."""
+        corners = [len(each.get_vertices()) if isinstance(each, pymunk.Poly) else 2 for each in self._shapes]
+        corners = [1 if isinstance(s, pymunk.Circle) else n for s, n in zip(self._shapes, corners, strict=True)]
+        here = clashing_pairs(range(len(corners)), corners)
+        for a, b in sorted(here ^ clashing_pairs([each._hashid for each in self._shapes], corners)):
+            names = " and ".join(self.names[_body_of(self._shapes[k])] for k in (a, b))
+            where = "here" if (a, b) in here else "in the space"
+            self.inexact.append(f"contacts of {names} share a name {where} only, as other shapes came before them")
 
     # Elements
 

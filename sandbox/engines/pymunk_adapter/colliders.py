@@ -24,11 +24,11 @@ from sandbox.engines.common.collision_bits import bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.common.restitution import segment_fractions
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayWalls
+from sandbox.engines.pymunk_adapter.contact_names import is_captured
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BACKING, BodySource, Point
-from sandbox.scene.description.bodies import Compound
+from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
 from sandbox.scene.description.world import Settings
 
@@ -52,18 +52,6 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
         assert settings.sleep_time is not None and settings.idle_speed is not None
         space.sleep_time_threshold, space.idle_speed_threshold = settings.sleep_time, settings.idle_speed
     return space
-
-
-def clashing_numbers(bodies: Bodies) -> int:
-    """Return how many numbers of shapes to skip, so that no two contacts of a pair of shapes share a name.
-
-    Munk2D numbers the shapes of a space from 0 in the order of `add`, and names a contact by a hash of the numbers of
-    both shapes and of their corners (`CP_HASH_PAIR` in cpCollision.c). The hash is symmetric: where the corners of two
-    edges have the same numbers as the shapes, both contacts have the name 0, and start from the impulse of one of them.
-    If the ground is the first shape of a space and a box from its lower left corner (`pymunk.Poly`) the second, a stack
-    of boxes leans and falls. A number that no corner has clashes with none.
-    """
-    return 0 if bodies.all_round else int(bodies.shapes.corners.max())
 
 
 def skip_numbers(space: pymunk.Space, count: int) -> None:
@@ -113,22 +101,13 @@ def fixed_shapes(
         yield pymunk.Circle(body, collider.radius, collider.position)
 
 
-def keeps_first_corners(element: BodySource) -> bool:
-    """Return whether the polygons of a body start at their first corners, and not where pymunk starts a hull.
-
-    A body with a stated centre of mass may be captured from a space. Rounding depends on the first corner, and so do
-    the names of contacts (see `clashing_numbers`).
-    """
-    return isinstance(element, Compound) and element.centre_of_mass is not None
-
-
 def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0) -> Iterator[tuple[int, pymunk.Shape]]:
     """Yield the shapes of a body, each with its index among all shapes; single discs are enlarged by `skin`."""
     if bodies.all_round:
         yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
         return
     shapes, element = bodies.shapes, bodies.elements[bodies.element[index]]
-    is_kept = keeps_first_corners(element)
+    is_kept = is_captured(element)
     first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
     for piece in range(first, last):
         corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]].tolist()

@@ -16,7 +16,6 @@ from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
     body_shapes,
-    clashing_numbers,
     gravity_of,
     jointed_surfaces,
     new_space,
@@ -24,6 +23,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
     shuffled,
     skip_numbers,
 )
+from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
 from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, mean_fraction, rates
@@ -98,10 +98,10 @@ class SpaceBodies(SpaceBodyTable):
         """Add bodies: their (M,) indices and present state."""
         if not len(indices):
             return
-        clashing = clashing_numbers(bodies)
-        if clashing > self._skipped_numbers:
-            skip_numbers(self._space, clashing - self._skipped_numbers)
-            self._skipped_numbers = clashing
+        to_skip = numbers_to_skip(bodies)
+        if to_skip > self._skipped_numbers:
+            skip_numbers(self._space, to_skip - self._skipped_numbers)
+            self._skipped_numbers = to_skip
         self._static_shapes.create(self._scene, self._setup.plane_reach, bodies, self._surface_of_fixed)
         self._moments = bodies.moment
         self._polygons = self._polygons or not bodies.round.all()

@@ -7,6 +7,7 @@ import numpy as np
 
 from sandbox.engines.box2d_adapter.engine import Box2DEngine
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, MAX_TURN, scale_for
+from sandbox.engines.pymunk_adapter.contact_names import confused_elements
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, PymunkEngine, is_space_default, space_attributes
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
@@ -32,6 +33,7 @@ def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
     return [
         *(_box2d(scene) if engine == "box2d" else ()),
         *_pymunk(scene, engine),
+        *(_contact_names(scene) if engine in (None, "pymunk") else ()),
         *_pixels(scene),
         *_flight(scene),
         *_outlines(scene),
@@ -162,6 +164,20 @@ def _pymunk(scene: Scene, engine: str | None) -> Iterator[Diagnostic]:
         f"pymunk: {', '.join(texts)}; bodies may overlap by {100.0 * slop / half:.3g} % of the narrowest half width"
     )
     yield Diagnostic("pymunk", message, {**values, "half_width": half})
+
+
+def _contact_names(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a note if pymunk confuses contacts of the first shapes of a game's space."""
+    confused = confused_elements(scene)
+    if confused:
+        first, second = confused[0]
+        others = f" and {len(confused) - 1} other pairs" if len(confused) > 1 else ""
+        message = (
+            f"pymunk can confuse both contacts of {first!r} and {second!r}{others}, because their shapes are the first "
+            "of the space, and what stands on them can lean; in the game, add and remove a few unused circles before "
+            "all other shapes"
+        )
+        yield Diagnostic("contact_names", message, {"body": second, "other": first, "pairs": len(confused)})
 
 
 LARGE_SLOP = 0.05

@@ -220,14 +220,16 @@ def _solver_remedy(scene: Scene, name: str, value: float) -> Iterator[Remedy]:
 def _iteration_remedies(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
     """Yield more iterations, more substeps, and a shorter dt, for joints and stacks."""
     details, solver = diagnostic.details, scene.solver
+    if "iterations" in details:  # stacks
+        yield from _solver_remedy(scene, "iterations", int(details["iterations"]))
+        yield from _step_remedies(scene, float(details["safe_dt"]) / solver.dt)
+        return
     if "needed" not in details:  # stretch of a chain, proportional to h² / iterations
         excess = float(details["share"]) / MAX_STRETCH
         yield from _solver_remedy(scene, "iterations", _ceil(solver.iterations * excess))
         yield from _step_remedies(scene, 1.0 / math.sqrt(excess))
         return
     needed = float(details["needed"])
-    if diagnostic.kind == "stack":  # the iterations at which it stays upright; `needed` only keeps it from falling
-        needed = max(needed, solver.iterations * solver.substeps / float(details["safe_dt"]))
     yield from _solver_remedy(scene, "iterations", _ceil(needed * solver.h))
     factor = solver.iterations / (needed * solver.h)
     if "joint" in details:

@@ -416,27 +416,29 @@ def tower(boxes: int, masses: tuple[float, ...] = (), solver: str = "", gap: flo
     return loads(text)
 
 
-@pytest.mark.parametrize(("iterations", "is_warned"), [(10, True), (32, False)])
+@pytest.mark.parametrize(("iterations", "is_warned"), [(2, True), (10, False)])
 def test_tower_that_will_fall_is_warned_of(iterations: int, is_warned: bool) -> None:
     scene = tower(10, solver=f"dt = 0.016666\niterations = {iterations}")
     found = warnings(scene)
     assert [w.kind for w in found] == ["stack"] * is_warned
     for warning in found:
         assert (warning.details["body"], warning.details["bodies"]) == ("b1", 10)
-        assert warning.details["needed"] == pytest.approx(60.0 * 10.0 * math.sqrt(9.81), rel=1e-12)  # roundings
+        safe = scene.solver.replace(dt=float(warning.details["safe_dt"]))
+        lean = 10.0**2.5 * 9.81 * safe.dt**2 / safe.iterations**0.8
+        assert lean == pytest.approx(0.05, rel=1e-12)  # roundings
     top = run(scene, audit=False).position[-1, 9, 1]
     assert (top < 8.5) == is_warned  # it lost more than the height of a box, or nothing
 
 
 def test_low_spaced_or_weightless_stack_is_not_warned_of() -> None:
-    few_iterations = "dt = 0.016666\niterations = 5"
+    few_iterations = "dt = 0.016666\niterations = 2"
     assert warnings(tower(4, solver=few_iterations)) == []
     assert warnings(tower(10, solver=few_iterations, gap=0.1)) == []
     weightless = tower(10, solver=few_iterations).model_copy(update={"world": loads("[world]\nduration = 6.0\n").world})
     assert warnings(weightless) == []
 
 
-@pytest.mark.parametrize(("iterations", "is_warned"), [(10, True), (160, False)])
+@pytest.mark.parametrize(("iterations", "is_warned"), [(10, True), (80, False)])
 def test_light_box_under_a_heavy_one_is_warned_of(iterations: int, is_warned: bool) -> None:
     scene = tower(2, (1.0, 100.0), f"dt = 0.016666\niterations = {iterations}")
     found = warnings(scene)

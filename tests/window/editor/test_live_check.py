@@ -129,7 +129,7 @@ CASES: dict[str, tuple[str, str, tuple[ElementKey, ...], tuple[str, ...]]] = {
     "chain": (SLACK + chain(20), "chain", (R,), PASSES),
     "stretch": (RELAXED + chain(20), "chain", (R,), PASSES),
     "load of a chain": (SLACK + chain(3, 100.0), "mass_ratio", (ElementKey("joint", 2),), PASSES),
-    "tower": (SLACK + GROUND + boxes(12), "stack", (ElementKey("box", 0),), PASSES),
+    "tower": (SLACK + GROUND + boxes(16), "stack", (ElementKey("box", 0),), PASSES),
     "heavy on light": (
         SLACK + GROUND + box("light", 0, 0.5, mass=1) + box("heavy", 0, 1.5, mass=100),
         "mass_ratio",

@@ -10,7 +10,8 @@ from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.common.collision_bits import COLLIDES_ALL, COLLIDES_FIXED, STATIC, bits_of_body, bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
-from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, keeps_first_corners, reach_of, shuffled
+from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, reach_of, shuffled
+from sandbox.engines.pymunk_adapter.contact_names import is_captured
 from sandbox.engines.pymunk_adapter.program.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
@@ -245,7 +246,7 @@ class Contents:
             shape, columns = _shape_of(corners, float(pieces.radius[piece]), "" if last - first == 1 else f"_{number}")
             created = self._shape(shape, index, piece)
             element = bodies.elements[bodies.element[index]]
-            if keeps_first_corners(element) and len(created) == 2 and len(corners) > 2:
+            if is_captured(element) and len(created) == 2 and len(corners) > 2:
                 (outline,) = (name for name in columns if name.startswith("corners"))
                 created.insert(1, f"shape.unsafe_set_vertices({{{outline}}})  # starts at their first corner")
             lines += created

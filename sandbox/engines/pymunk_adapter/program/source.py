@@ -7,7 +7,8 @@ from importlib.metadata import version
 import numpy as np
 
 from sandbox.echo import printable, shorten
-from sandbox.engines.pymunk_adapter.colliders import clashing_numbers, reach_of
+from sandbox.engines.pymunk_adapter.colliders import reach_of
+from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE, PymunkEngine
 from sandbox.engines.pymunk_adapter.program.contents import Contents, literal
 from sandbox.engines.pymunk_adapter.program.loops import Loops, comment
@@ -252,7 +253,7 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
     )
     if contents.has_sleep:
         yield "    space.sleep_time_threshold, space.idle_speed_threshold = SLEEP_TIME_THRESHOLD, IDLE_SPEED_THRESHOLD"
-    skipped = clashing_numbers(contents.setup.bodies)
+    skipped = numbers_to_skip(contents.setup.bodies)
     if skipped:
         yield f"    for _ in range({skipped}):  # Munk2D confuses contacts of the first shapes of a space"
         yield "        unused = pymunk.Circle(space.static_body, 1.0)"
