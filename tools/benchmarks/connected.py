@@ -1,11 +1,12 @@
 """Workloads of connected and stacked bodies: cloth, tower, heap of planks, and a cloth of bare pymunk springs."""
 
+import math
 import time
 from collections.abc import Callable
 
 import pymunk
 
-from sandbox.engines.registry import start
+from sandbox.engines.registry import ENGINES, start
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.compile.scene import Scene
@@ -103,6 +104,42 @@ def standing(scene: Scene, engine: str, max_drift: float, **settings: int) -> Ti
         seconds = time.perf_counter() - start_time
         drift = float(abs(done.position[-1, :, 0] - done.position[0, :, 0]).max())
         assert drift <= max_drift, f"{engine}: drift of {drift:g} m"
+        return seconds
+
+    return work
+
+
+def bare_standing(scene: Scene, max_drift: float, substeps: int, iterations: int) -> Timed:
+    """Return the same workload on a `pymunk.Space` of boxes and a segment, as a game builds it; it returns seconds.
+
+    Raises:
+        AssertionError: a box drifted sideways by more than `max_drift`, m.
+    """
+    settings = ENGINES["pymunk"].resolve(scene, scene.solver)
+    (stack,), (pair,) = scene.stacks, scene.pairs
+    assert pair.friction is not None and settings.slop is not None
+    friction, slop = math.sqrt(pair.friction), settings.slop
+
+    def add(space: pymunk.Space, shape: pymunk.Shape) -> None:
+        shape.friction = friction
+        space.add(shape)
+
+    def work() -> float:
+        start_time = time.perf_counter()
+        space = pymunk.Space()
+        space.gravity, space.iterations, space.collision_slop = scene.world.gravity, iterations, slop
+        add(space, pymunk.Segment(space.static_body, (-50.0, -1.0), (50.0, -1.0), 1.0))
+        for x, y in scene.bodies.position.tolist():
+            body = pymunk.Body(1.0, pymunk.moment_for_box(1.0, stack.size))
+            body.position = x, y
+            space.add(body)
+            add(space, pymunk.Poly.create_box(body, stack.size))
+        h = scene.solver.dt / substeps
+        for _ in range(round(scene.world.duration / h)):
+            space.step(h)
+        seconds = time.perf_counter() - start_time
+        drift = max(abs(body.position.x) for body in space.bodies)
+        assert drift <= max_drift, f"bare pymunk: drift of {drift:g} m"
         return seconds
 
     return work

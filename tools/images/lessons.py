@@ -155,14 +155,14 @@ def gas(axes: Axes) -> None:
 def stacks(axes: Axes) -> None:
     """Draw the drift of two stacks against iterations."""
     counts = (5, 10, 20, 50, 100, 200)
-    for scene, style in (("tower", "o-"), ("pyramid", "s--")):
+    for scene, substeps, style in (("tower", 1, "o-"), ("tower", 4, "o--"), ("pyramid", 4, "s:")):
         loaded = sandbox.load(scene)
         for engine, colour in (("pymunk", BLUE), ("reference", GREEN)):
             drift = []
             for count in counts:
-                run = sandbox.run(loaded, engine, iterations=count, audit=False)
+                run = sandbox.run(loaded, engine, substeps=substeps, iterations=count, audit=False)
                 drift.append(np.linalg.norm(run.position[-1] - run.position[0], axis=1).max())
-            axes.loglog(counts, drift, style, color=colour, label=f"{scene}, {engine}")
+            axes.loglog(counts, drift, style, color=colour, label=f"{scene}, {engine}, {substeps} substeps")
     axes.set(xlabel="iterations", ylabel="drift after 10 s, m", xticks=counts, xticklabels=map(str, counts))
     axes.minorticks_off()
     axes.legend()
