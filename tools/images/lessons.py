@@ -159,13 +159,15 @@ def stacks(axes: Axes) -> None:
         loaded = sandbox.load(scene)
         for engine, colour in (("pymunk", BLUE), ("reference", GREEN)):
             drift = []
+            label = f"{scene}, {engine}, {substeps} substeps".replace(" 1 substeps", " 1 substep")
             for count in counts:
                 run = sandbox.run(loaded, engine, substeps=substeps, iterations=count, audit=False)
                 drift.append(np.linalg.norm(run.position[-1] - run.position[0], axis=1).max())
-            axes.loglog(counts, drift, style, color=colour, label=f"{scene}, {engine}, {substeps} substeps")
+            axes.loglog(counts, drift, style, color=colour, label=label)
     axes.set(xlabel="iterations", ylabel="drift after 10 s, m", xticks=counts, xticklabels=map(str, counts))
     axes.minorticks_off()
-    axes.legend()
+    axes.set_ylim(top=600.0)
+    axes.legend(ncols=2)
 
 
 def tunnelling(axes: Axes) -> None:

@@ -12,6 +12,7 @@ from sandbox.atomic_write import atomic_write
 from sandbox.echo import short_repr
 from sandbox.measure.extremes.boundary import TOLERANCE, Boundary
 from sandbox.measure.extremes.runner import Extremes
+from sandbox.measure.extremes.scenarios import AXES
 from sandbox.resource_limits import read_limited
 from sandbox.scene.files.document import check_text
 
@@ -60,11 +61,13 @@ def store(result: Extremes, path: str | Path, others: StoredBoundaries = ()) -> 
     Args:
         result: results with the boundaries.
         path: the file.
-        others: further boundaries, which come first.
+        others: further boundaries, of other axes.
     """
     whole_document = result.document()
     kept = {key: whole_document[key] for key in ("tolerance", "timeout", "memory", "versions", "machine")}
-    document = {**kept, "limits": [*map(dict, others), *whole_document["limits"]]}
+    limits = [*map(dict, others), *whole_document["limits"]]
+    order = list(AXES)
+    document = {**kept, "limits": sorted(limits, key=lambda limit: order.index(limit["axis"]))}
     path = Path(path)
     with atomic_write(path) as temporary:
         text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
