@@ -23,7 +23,9 @@ from sandbox.engines.pymunk_adapter.capture import (
     capture_space,
     from_pymunk,
 )
+from sandbox.engines.pymunk_adapter.colliders import skip_numbers
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.preflight import notes
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, loads
 
@@ -652,3 +654,18 @@ def test_spaces_of_the_unit_tests_of_pymunk_are_captured() -> None:
     # the rounding of spins of bodies that nothing can turn, over 300 steps of bodies that touch and come to rest
     rounded = [difference for _, difference, has_remarks in rows if has_remarks and difference is not None]
     assert max(rounded) < 1e-5
+
+
+@pytest.mark.parametrize("skipped", [0, 4])
+def test_contacts_that_pymunk_confuses_are_named(skipped: int) -> None:
+    """The scene numbers its shapes from 0; a space that has used up the first numbers has no such contacts."""
+    space = pymunk.Space()
+    skip_numbers(space, skipped)
+    body = pymunk.Body(1.0, pymunk.moment_for_box(1.0, (20, 20)))
+    body.position = 0, 12
+    box = pymunk.Poly(body, [(-10, -10), (10, -10), (10, 10), (-10, 10)])
+    space.add(pymunk.Segment(space.static_body, (-300, 0), (300, 0), 2), body, box)
+    captured = capture_space(space, dt=DT, duration=1.0)
+    (note,) = [each for each in notes(captured.scene, "pymunk") if each.kind == "contact_names"]
+    assert note.details["pairs"] == 1 and note.details["body"] == "body-1"
+    assert any("share a name here only" in each for each in captured.inexact) == (skipped > 0)

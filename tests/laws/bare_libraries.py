@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pyb2d3 as box2d
@@ -32,28 +32,6 @@ WAYS = (
 length of planes, m."""
 
 
-class BareWorld(Protocol):
-    """Space or world of a library."""
-
-    def __init__(self, scene: Scene, settings: Settings, half_length: float) -> None:
-        """Create an empty world."""
-
-    def add_static(self, collider: Plane | Wall, friction: float, restitution: float) -> None:
-        """Add a plane or wall."""
-
-    def add_body(self, k: int, friction: float, restitution: float) -> None:
-        """Add body k, a box or disc."""
-
-    def add_joint(self, k: int) -> None:
-        """Add joint k, a rod or pivot."""
-
-    def step(self) -> None:
-        """Advance by a step with its substeps."""
-
-    def positions(self) -> FloatArray:
-        """Return the positions of the bodies, (N, 2) m."""
-
-
 def displacements(scene: Scene, engine: str) -> list[float]:
     """Return the largest distance of a body from its start at the end of the run, m, for each way."""
     found = []
@@ -64,7 +42,7 @@ def displacements(scene: Scene, engine: str) -> list[float]:
     return found
 
 
-def _worlds(scene: Scene, engine: str) -> Iterator[BareWorld]:
+def _worlds(scene: Scene, engine: str) -> "Iterator[BareSpace | BareBox2D]":
     settings = ENGINES[engine].resolve(scene, scene.solver)
     of_ground, of_body = _coefficients(scene, engine)
     kind = BareSpace if engine == "pymunk" else BareBox2D

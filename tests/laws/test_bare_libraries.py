@@ -3,11 +3,13 @@
 from typing import Any
 
 import numpy as np
+import pymunk
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
+from sandbox.engines.pymunk_adapter.colliders import skip_numbers
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
@@ -89,6 +91,7 @@ SHIPPED = {
 """duration, s"""
 
 
+@pytest.mark.fail_slow(60)  # seven runs each, of up to half a second
 @pytest.mark.parametrize("engine", ["pymunk", "box2d"])
 @pytest.mark.parametrize("name", [*SCENES, *SHIPPED])
 def test_bodies_move_as_far_as_in_a_bare_world(name: str, engine: str) -> None:
@@ -99,6 +102,26 @@ def test_bodies_move_as_far_as_in_a_bare_world(name: str, engine: str) -> None:
     result = run(scene, engine, audit=False)
     moved = float(np.hypot(*(result.position[-1] - result.position[0]).T).max())
     assert min(bare) / RANGE - ROUNDING <= moved <= RANGE * max(bare) + ROUNDING, bare
+
+
+@pytest.mark.parametrize(("skipped", "stands"), [(0, False), (4, True)])
+def test_boxes_from_their_lower_left_corner_fall_in_a_bare_space_unless_numbers_are_skipped(
+    skipped: int, stands: bool
+) -> None:
+    space = pymunk.Space()
+    space.gravity, space.collision_slop = (0.0, -9.81), 0.0025
+    skip_numbers(space, skipped)
+    ground = pymunk.Segment(space.static_body, (-50.0, -1.0), (50.0, -1.0), 1.0)
+    boxes = [pymunk.Body(1.0, pymunk.moment_for_box(1.0, (0.5, 0.5))) for _ in range(5)]
+    corners = [(-0.25, -0.25), (0.25, -0.25), (0.25, 0.25), (-0.25, 0.25)]
+    for k, body in enumerate(boxes):
+        body.position = 0.0, 0.25 + 0.5 * k
+    for shape in (ground, *(pymunk.Poly(body, corners) for body in boxes)):
+        shape.friction = 0.6
+        space.add(*([] if shape is ground else [shape.body]), shape)
+    for _ in range(600):
+        space.step(1.0 / 60.0)
+    assert (boxes[4].position.y > 2.2) == stands
 
 
 @given(st.integers(3, 12), st.integers(2, 12), st.data())

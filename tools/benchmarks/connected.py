@@ -1,4 +1,4 @@
-"""Workloads of connected and stacked bodies: cloth, tower, heap of planks, and a cloth of bare pymunk springs."""
+"""Workloads of connected and stacked bodies: cloth, tower, heap of planks; a cloth and a tower of bare pymunk."""
 
 import math
 import time
@@ -118,7 +118,7 @@ def bare_standing(scene: Scene, max_drift: float, substeps: int, iterations: int
     settings = ENGINES["pymunk"].resolve(scene, scene.solver)
     (stack,), (pair,) = scene.stacks, scene.pairs
     assert pair.friction is not None and settings.slop is not None
-    friction, slop = math.sqrt(pair.friction), settings.slop
+    friction, slop, mass = math.sqrt(pair.friction), settings.slop, float(scene.bodies.mass[0])
 
     def add(space: pymunk.Space, shape: pymunk.Shape) -> None:
         shape.friction = friction
@@ -130,7 +130,7 @@ def bare_standing(scene: Scene, max_drift: float, substeps: int, iterations: int
         space.gravity, space.iterations, space.collision_slop = scene.world.gravity, iterations, slop
         add(space, pymunk.Segment(space.static_body, (-50.0, -1.0), (50.0, -1.0), 1.0))
         for x, y in scene.bodies.position.tolist():
-            body = pymunk.Body(1.0, pymunk.moment_for_box(1.0, stack.size))
+            body = pymunk.Body(mass, pymunk.moment_for_box(mass, stack.size))
             body.position = x, y
             space.add(body)
             add(space, pymunk.Poly.create_box(body, stack.size))

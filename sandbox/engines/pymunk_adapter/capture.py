@@ -243,8 +243,7 @@ class SpaceElements:
 
     def _note_contact_names(self) -> None:
         """Note if other pairs of shapes than in the space have contacts that share a name."""
-        corners = [len(each.get_vertices()) if isinstance(each, pymunk.Poly) else 2 for each in self._shapes]
-        corners = [1 if isinstance(s, pymunk.Circle) else n for s, n in zip(self._shapes, corners, strict=True)]
+        corners = [_corner_count(each) for each in self._shapes]
         here = clashing_pairs(range(len(corners)), corners)
         for a, b in sorted(here ^ clashing_pairs([each._hashid for each in self._shapes], corners)):
             names = " and ".join(self.names[_body_of(self._shapes[k])] for k in (a, b))
@@ -514,6 +513,13 @@ def _ends_of(shape: pymunk.Shape) -> tuple[pymunk.Vec2d, ...]:
         return shape.a, shape.b
     assert isinstance(shape, pymunk.Circle)
     return (shape.offset,)
+
+
+def _corner_count(shape: pymunk.Shape) -> int:
+    """Return the number of corners of a shape: 1 of a circle, 2 of a segment."""
+    if isinstance(shape, pymunk.Poly):
+        return len(shape.get_vertices())
+    return 2 if isinstance(shape, pymunk.Segment) else 1
 
 
 _PART_OF: dict[type[pymunk.Shape], str] = {pymunk.Circle: "ball", pymunk.Segment: "capsule", pymunk.Poly: "polygon"}

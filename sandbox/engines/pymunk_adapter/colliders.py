@@ -55,7 +55,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
 
 
 def skip_numbers(space: pymunk.Space, count: int) -> None:
-    """Skip numbers of shapes."""
+    """Skip numbers of shapes, whose names of contacts could clash (`contact_names`)."""
     for _ in range(count):
         unused = pymunk.Circle(space.static_body, 1.0)
         space.add(unused)

@@ -37,12 +37,24 @@ def numbers_to_skip(bodies: Bodies) -> int:
 def clashing_pairs(number: Sequence[int], corners: Sequence[int]) -> set[tuple[int, int]]:
     """Return pairs of shapes, by index, of which both contacts of two edges can have one name.
 
+    Each has an edge between the corners that have the numbers of the two shapes.
+
     Args:
         number: (K,) numbers of the shapes in their space.
-        corners: (K,) numbers of corners: 1 of a circle, 2 of a segment.
+        corners: (K,) counts of corners: 1 of a circle, 2 of a segment.
     """
     able = [k for k, n in enumerate(number) if n < corners[k]]
-    return {(a, b) for a, b in combinations(able, 2) if max(number[a], number[b]) < min(corners[a], corners[b])}
+    return {
+        (a, b)
+        for a, b in combinations(able, 2)
+        if all(_is_edge(number[a], number[b], corners[shape]) for shape in (a, b))
+    }
+
+
+def _is_edge(first: int, second: int, corners: int) -> bool:
+    """Return whether an edge connects two corners of a shape, by their numbers."""
+    low, high = sorted((first, second))
+    return high < corners and high - low in (1, corners - 1)
 
 
 def confused_elements(scene: Scene) -> list[tuple[str, str]]:
@@ -50,16 +62,13 @@ def confused_elements(scene: Scene) -> list[tuple[str, str]]:
     bodies = scene.bodies
     if bodies.all_round or numbers_to_skip(bodies):
         return []
-    found, corners, moves = list[str](), list[int](), list[bool]()
+    static, corners = list[str](), list[int]()  # walls and posts, and then bodies, in the order of `add`
     for collider, name in zip(scene.fixed, scene.fixed_names, strict=True):
         count = len(list(wall_segments(collider))) if isinstance(collider, Wall) else 1
-        found += [name] * count
+        static += [name] * count
         corners += [1 if isinstance(collider, Post) else 2] * count
-    moves += [False] * len(found)
-    found += [bodies.names[k] for k in bodies.shapes.body.tolist()]
+    names = static + [bodies.names[k] for k in bodies.shapes.body.tolist()]
     corners += bodies.shapes.corners.tolist()
-    moves += (~bodies.fixed[bodies.shapes.body]).tolist()
-    pairs = sorted(clashing_pairs(range(len(found)), corners))
-    return list(
-        dict.fromkeys((found[a], found[b]) for a, b in pairs if (moves[a] or moves[b]) and found[a] != found[b])
-    )
+    moves = [False] * len(static) + (~bodies.fixed[bodies.shapes.body]).tolist()
+    pairs = [(a, b) for a, b in sorted(clashing_pairs(range(len(names)), corners)) if moves[a] or moves[b]]
+    return list(dict.fromkeys((names[a], names[b]) for a, b in pairs if names[a] != names[b]))

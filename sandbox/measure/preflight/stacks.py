@@ -1,7 +1,7 @@
 """Stacks: whether the solver iterations suffice for stacked bodies.
 
-Measured on pymunk 7.3.1, boxes placed in contact, friction 0.5, gravity 9.81 m/s². The engine
-`reference` agrees within the scatter.
+Measured on pymunk 7.3.1, boxes placed in contact, friction 0.5, gravity 9.81 m/s². `reference` agrees within
+the scatter.
 
 A tower of n boxes of height s leans in 3 s by about n^2.5·g·h²/(s·iterations^0.8) of a box, from 0.4 to 2.9 times that
 (3 to 20 boxes of 0.1 to 1 m, 60 to 240 substeps a second, 2 to 40 iterations, 270 towers). Above 0.2 it falls within
@@ -20,31 +20,26 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import IntArray
-from sandbox.measure.preflight.diagnostic import (
-    ROUNDING,
-    Details,
-    Diagnostic,
-    floor_3_digits,
-)
+from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import InitialContacts
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
 
 class Law(NamedTuple):
-    """Measured condition of a stack: it stands if load·h²/iterations^exponent is below a limit."""
+    """Measured condition of a stack: load·h²/iterations^exponent is at most a limit."""
 
     exponent: float
     limit: float
-    """of what stands"""
+    """largest value at which it stands for 10 s"""
     advised: float
-    """of what stays within a tenth of a box"""
+    """value that the remedies reach, at which it moves by less than a tenth of a box in 3 s"""
 
 
 TOWER = Law(exponent=0.8, limit=0.2, advised=0.05)
-"""of a load of n^2.5·g/s, 1/s²"""
+"""Tower of n boxes of height s, whose load is n^2.5·g/s, 1/s²."""
 CRUSHED = Law(exponent=1.0, limit=0.045, advised=0.015)
-"""of a load of M^1.25·g/s, 1/s²"""
+"""Box of height s under one that is M times as heavy; its load is M^1.25·g/s, 1/s²."""
 MIN_TOWER = 5
 """Smallest number of boxes of a tower."""
 MIN_MASS_RATIO = 10.0

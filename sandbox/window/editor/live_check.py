@@ -220,21 +220,14 @@ def _solver_remedy(scene: Scene, name: str, value: float) -> Iterator[Remedy]:
 def _iteration_remedies(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
     """Yield more iterations, more substeps, and a shorter dt, for joints and stacks."""
     details, solver = diagnostic.details, scene.solver
-    if "iterations" in details:  # stacks
-        yield from _solver_remedy(scene, "iterations", int(details["iterations"]))
-        yield from _step_remedies(scene, float(details["safe_dt"]) / solver.dt)
-        return
-    if "needed" not in details:  # stretch of a chain, proportional to h² / iterations
+    if "share" in details:  # stretch of a chain, proportional to h² / iterations
         excess = float(details["share"]) / MAX_STRETCH
         yield from _solver_remedy(scene, "iterations", _ceil(solver.iterations * excess))
         yield from _step_remedies(scene, 1.0 / math.sqrt(excess))
         return
-    needed = float(details["needed"])
-    yield from _solver_remedy(scene, "iterations", _ceil(needed * solver.h))
-    factor = solver.iterations / (needed * solver.h)
-    if "joint" in details:
-        factor = float(details["safe_dt"]) / solver.dt
-    yield from _step_remedies(scene, factor)
+    iterations = details["iterations"] if "iterations" in details else float(details["needed"]) * solver.h
+    yield from _solver_remedy(scene, "iterations", _ceil(float(iterations)))
+    yield from _step_remedies(scene, float(details["safe_dt"]) / solver.dt)
 
 
 def _thickness(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
