@@ -279,6 +279,7 @@ class Trajectory(HtmlRepr):
         lines = [f"<Trajectory{about and ' ' + about}: {self.info.get('status', 'unknown')}, {counts}"]
         if self.info.get("reason"):
             lines.append(shorten(str(self.info["reason"]), MAX_MESSAGE))
+        lines += [shorten(each, MAX_MESSAGE) for each in self.warnings]
         figures = []
         start, final = self.info.get("energy_start"), self.info.get("energy_end")
         if start is not None and final is not None:
@@ -301,6 +302,11 @@ class Trajectory(HtmlRepr):
         """Reason for a status other than `ok`; None if the status is `ok`."""
         reason = self.info["reason"]
         return None if reason is None else str(reason)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know about a run that is `ok`, such as energy that it gained without a source."""
+        return tuple(self.info.get("warnings", ()))
 
     @property
     def missed_contacts(self) -> int | None:

@@ -86,6 +86,8 @@ class RunRow:
     """ok, diverged, refused or failed"""
     reason: str | None
     """why the status is not ok"""
+    warnings: Sequence[str]
+    """what to know about a run that is ok"""
     seconds: float | None
     """s, computing time of the steps, without compilation"""
     steps: int
@@ -173,6 +175,7 @@ class RunRow:
             set=values,
             status=stored.status,
             reason=stored.reason,
+            warnings=details.get("warnings", []),
             seconds=finite(seconds),
             steps=stored.steps,
             steps_per_second=finite(stored.steps / seconds if seconds else None),
@@ -215,6 +218,7 @@ def details_of(run: Trajectory, scene: Scene, has_game: bool) -> dict[str, Any]:
     return {
         "simulated": float(run.time[-1]) if len(run.time) else 0.0,
         "audited": bool(run.info["audited"]),
+        "warnings": list(run.warnings),
         "retired": {name: time for name, time in retired if time == time},
         "pocketed": _pocketed(run, scene),
         "game": {key: game.get(key) for key in GAME} if has_game else None,

@@ -39,6 +39,8 @@ class RunBatch:
     """rows of completed runs as JSON, if there are many and --json is given"""
     statuses: Counter[str] = field(default_factory=Counter)
     """number of completed runs by status"""
+    warnings: dict[str, None] = field(default_factory=dict)
+    """different warnings about runs that are ok, in order"""
     problems: dict[int, str] = field(default_factory=dict)
     """lines about the first runs that are not ok, by their number"""
     games: dict[int, RunRow] = field(default_factory=dict)
@@ -67,6 +69,9 @@ class RunBatch:
         if self.is_large and self.spool is None and record.is_plain:
             return
         row = result.row
+        if len(self.warnings) < MAX_PROBLEMS:
+            # Of runs that differ in their seeds or values only, each warning is printed once.
+            self.warnings |= dict.fromkeys(f"{row.scene}: {each}" for each in row.warnings)
         problem = _problem(row, self, is_engine_chosen)
         if problem and len(self.problems) < MAX_PROBLEMS:
             self.problems[index] = problem
@@ -111,7 +116,9 @@ def _is_different_replay(row: RunRow) -> bool:
 
 
 def report_problems(batch: RunBatch) -> int:
-    """Print the lines about runs that are not ok, and return the exit status."""
+    """Print the warnings, and the lines about runs that are not ok, and return the exit status."""
+    for warning in batch.warnings:
+        click.echo(f"* {warning}", err=True)
     for _, problem in sorted(batch.problems.items()):
         click.echo(problem, err=True)
     print_faults(list(dict.fromkeys(batch.faults)))

@@ -35,7 +35,8 @@ LEGEND = {
     "dt": "time step of a frame, s",
     "dt × substeps": "time step of a frame, s, and the number of solver steps in it",
     "seed": "seed of the random numbers of the scene",
-    "status": "ok; diverged: a state is not finite; refused: the engine cannot model the scene; failed: it stopped",
+    "status": "ok; diverged: a state is not finite; refused: the engine cannot model the scene; failed: it stopped; "
+    "*: a warning about the run is printed below the table",
     "× real time": "simulated time / computing time (without compilation); above 1 is faster than real time",
     "energy, J": "kinetic + potential energy at the start → at the end, J",
     "joint error": "largest error of any joint in any recorded frame, relative to its length",
@@ -175,7 +176,8 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     yield from (_setting(settings[key]) for key in show.differing)
     if show.seeds:
         yield str(row.seed)
-    status = Text(row.status, style="green" if row.status == "ok" else "bold red")
+    style = "bold red" if row.status != "ok" else "yellow" if row.warnings else "green"
+    status = Text(row.status + (" *" if row.warnings else ""), style=style)
     yield status.append(" stored", style="dim") if row.repeated else status
     yield _number(row.realtime_factor, 3)
     start, end = row.energy_start, row.energy_end

@@ -231,6 +231,13 @@ class Simulation(Protocol):
         """Simulated time, s: k·dt."""
 
     @property
+    def makes_whole_steps(self) -> bool:
+        """Whether no step is shorter than dt, so that a run may end after its duration.
+
+        An engine whose solver starts from the impulses of the last step may have no shorter step without harm.
+        """
+
+    @property
     def scene(self) -> Scene:
         """The scene, with all changes that actions have made."""
 
@@ -298,6 +305,8 @@ class Simulation(Protocol):
 
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt, for a duration that is not a multiple of dt. No step can follow.
+
+        With `makes_whole_steps` the step is a whole one, and the time is beyond the duration.
 
         Args:
             part: fraction of dt, 0 < part < 1.

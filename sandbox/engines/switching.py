@@ -375,7 +375,7 @@ class SwitchableSimulation:
         segment.steps += frames.steps - before
 
     def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt. No step can follow.
+        """Advance by a last fraction of dt, or by dt with `makes_whole_steps`. No step can follow.
 
         Args:
             part: fraction of dt, 0 < part < 1.
@@ -384,7 +384,13 @@ class SwitchableSimulation:
             Divergence: as `step`.
             ValueError: `part` is out of range.
         """
-        self._advance(part, lambda: self._segment.simulation.finish(part))
+        length = 1.0 if self.makes_whole_steps else part
+        self._advance(length, lambda: self._segment.simulation.finish(part))
+
+    @property
+    def makes_whole_steps(self) -> bool:
+        """Whether no step is shorter than dt, so that a run may end after its duration."""
+        return self._segment.simulation.makes_whole_steps
 
     def _advance(self, part: float, advance: Callable[[], None]) -> None:
         """Apply the mouse joints, and advance the engine, for a fraction of a step."""

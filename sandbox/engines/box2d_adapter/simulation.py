@@ -48,6 +48,11 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         "Box2D cannot copy the state of its solver; a snapshot needs the engine 'reference' or 'exact'"
     )
 
+    @property
+    def makes_whole_steps(self) -> bool:
+        """True: Box2D applies the impulses that it keeps in full, however much shorter a step is than the last one."""
+        return True
+
     def __init__(self, setup: Setup, settings: Settings) -> None:
         """Start from a setup.
 

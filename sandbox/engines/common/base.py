@@ -58,6 +58,11 @@ class BaseSimulation(ABC):
         self.patience: float | None = None
         """s, largest computing time of a step; engines check it where they can. None: unlimited"""
 
+    @property
+    def makes_whole_steps(self) -> bool:
+        """Whether no step is shorter than dt, as `Simulation.makes_whole_steps`."""
+        return False
+
     def __reduce__(self) -> NoReturn:
         """Refuse pickling and shallow copies, which would share arrays with the original."""
         raise TypeError("a running simulation cannot be pickled; use `snapshot`, or start its scene again")
@@ -148,7 +153,7 @@ class BaseSimulation(ABC):
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call."""
 
-    def _after(self, substeps: int) -> float:
+    def _after(self, substeps: float) -> float:
         """Return the time after a number of substeps of the present step, s.
 
         After all of them it is the next frame's time.
@@ -230,7 +235,7 @@ class SteppedSimulation(BaseSimulation):
             self._finish_step()
 
     def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt, 0 < part < 1. No step can follow.
+        """Advance by a last fraction of dt, 0 < part < 1, or by dt with `makes_whole_steps`. No step can follow.
 
         Raises:
             Divergence: as `step`.
@@ -240,8 +245,12 @@ class SteppedSimulation(BaseSimulation):
         self._check_part(part)
         with self._lock, np.errstate(all="ignore"):
             self._check_running()
-            self._advance(part)
-            self._part = part
+            if self.makes_whole_steps:
+                self._advance(1.0)
+                self._steps += 1
+            else:
+                self._advance(part)
+                self._part = part
             self._finish_step()
             self._ended = True
 

@@ -15,7 +15,7 @@ normal: with complex numbers c = J/n, and then c·n' about the new normal. A cal
 take a sixth of the step of a pile.
 """
 
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
@@ -128,10 +128,6 @@ class ContactPoints(NamedTuple):
     """(P,) work of a kick for each N·s of normal impulse, J; 0 without a kick"""
     slip_target: FloatArray
     """(P,) m/s, velocity of b relative to a, to the left of the normal, without slip; not 0 if a surface moves"""
-
-    def scaled(self, fraction: float) -> Self:
-        """Return a fraction of the impulses."""
-        return self._replace(along=self.along * fraction, across=self.across * fraction)
 
     @property
     def joint_impulses(self) -> JointImpulses:

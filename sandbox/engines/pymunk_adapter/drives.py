@@ -350,7 +350,6 @@ class SpaceDrives:
         self._hinges: dict[int, SpaceHingeMotor] = {}  # by the ids of their bodies
         self._with_callback: set[int] = set()
         self._gravity = (0.0, 0.0), (0.0, 0.0)
-        self._last: FloatArray | None = None
 
     def holds(self, name: str) -> bool:
         """Return whether a body is driven."""
@@ -448,29 +447,13 @@ class SpaceDrives:
             position[n], velocity[n] = driven_body.position, driven_body.velocity
             angle[n], angular_velocity[n] = driven_body.angle, driven_body.spin
 
-    def place_on_hinges(self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> None:
-        """Compute position and velocity of hinged bodies from their angles and spins, in arrays in scene order.
-
-        After an interpolation between two states this puts their centres back on the arc.
-        """
-        for driven_body in self._by_drive.values():
-            n = driven_body.index
-            if not isinstance(driven_body, SpacePlunger):
-                position[n], velocity[n] = driven_body.centre_about_pivot(float(angle[n]), float(spin[n]))
-
     @property
     def indices(self) -> list[int]:
         """Indices of the driven bodies."""
         return [driven_body.index for driven_body in self.driven_bodies]
 
-    def end(self, before: FloatArray, fraction: float) -> None:
-        """Set the final state (D, 3), interpolated by a fraction of the last substep from `before`."""
-        self._last = before + (self.current_state() - before) * fraction
-
     def current_state(self) -> FloatArray:
         """Return the present state of the drives, (D, 3), as in `Frame.drives`."""
-        if self._last is not None:
-            return self._last
         if self._by_drive:
             self.state[list(self._by_drive)] = [driven_body.state for driven_body in self._by_drive.values()]
         return self.state.copy()

@@ -34,12 +34,6 @@ class EnergyState(NamedTuple):
     spin: FloatArray
     """(N,) rad/s"""
 
-    def interpolated(self, other: "EnergyState", fraction: float) -> "EnergyState":
-        """Return the state interpolated to another by a fraction; for 1 the other itself, bit for bit."""
-        if fraction == 1.0:
-            return other
-        return EnergyState(*(old + (new - old) * fraction for old, new in zip(self, other, strict=True)))
-
 
 class AppliedImpulses(NamedTuple):
     """Impulses on N bodies in a substep, without contacts and joints, N·s."""
@@ -149,19 +143,17 @@ def drive_work(
     bodies: Bodies,
     gravity: tuple[float, float],
     h: float,
-    fraction: float,
 ) -> DriveWorkSums:
-    """Return the work on driven bodies in a substep, or in its first part.
+    """Return the work on driven bodies in a substep.
 
     Args:
         driven_bodies: the driven bodies.
-        states: at the start of the substep, and at its end or where it is cut off.
+        states: at the start of the substep, and at its end.
         means: mean velocities (N + 1, 2), m/s, and spins (N + 1,), rad/s.
-        points: contacts of the substep, or a fraction of their impulses.
+        points: contacts of the substep.
         bodies: all.
         gravity: m/s².
-        h: the whole substep, s.
-        fraction: fraction of the substep.
+        h: substep, s.
     """
     before, now = states
     velocity, spin = means
@@ -184,12 +176,12 @@ def drive_work(
         x, y = driven_body.mount.hinge
         moment = float(bodies.moment[n]) + mass * (x * x + y * y)
         if isinstance(driven_body, SpaceHingeMotor):
-            weight += driven_body.weight_torque * h * fraction * float(spin[n])
+            weight += driven_body.weight_torque * h * float(spin[n])
         if isinstance(driven_body, SpaceHingeMotor) and not driven_body.was_locked:
-            impulse = driven_body.drive_impulse * fraction
+            impulse = driven_body.drive_impulse
         else:
             impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
-            impulse -= driven_body.weight_torque * h * fraction if isinstance(driven_body, SpaceHingeMotor) else 0.0
+            impulse -= driven_body.weight_torque * h if isinstance(driven_body, SpaceHingeMotor) else 0.0
         driven += impulse * float(spin[n])
     return DriveWorkSums(driven, weight, potential_change)
 
@@ -207,7 +199,7 @@ def kinematic_work(
 
     Args:
         indices: (K,) of the kinematic bodies.
-        states: at the start of a substep, and at its end or where it is cut off.
+        states: at the start of a substep, and at its end.
         means: mean velocities (N + 1, 2), m/s, and spins (N + 1,), rad/s.
         other_impulses: those of contacts and springs.
         joint_sums: sums of those of other joints and of motors; None: there are none.
@@ -270,11 +262,11 @@ class PymunkEnergyLedger:
         return EnergyState(p.position.copy(), p.angle.copy(), p.velocity.copy(), p.angular_velocity.copy())
 
     @np.errstate(over="ignore", invalid="ignore")  # in a diverged state, which the simulation detects next
-    def substep(self, before: EnergyState | None, fraction: float = 1.0) -> None:
-        """Account the last substep or, if it is cut off, its first fraction."""
+    def substep(self, before: EnergyState | None) -> None:
+        """Account the last substep."""
         p, account = self._population, self.account
         if p.particles.has_only_gravity:
-            account.add(Cause.INTEGRATOR, self._free_fall_error(fraction))
+            account.add(Cause.INTEGRATOR, self._free_fall_error())
         if before is None:
             return
         included = p.free_to_move
@@ -288,27 +280,25 @@ class PymunkEnergyLedger:
         if self._was_asleep is not None and asleep is not None:
             # Bodies fall asleep and wake between the change of positions and that of velocities.
             drifts, included = included & ~self._was_asleep, included & ~asleep
-        end = self._state()
-        now = before.interpolated(end, fraction)
-        if now is not end:
-            p.space_bodies.drives.place_on_hinges(now.position, now.velocity, now.angle, now.spin)
+        now = self._state()
         velocity, spin = self._mean(before, now, included)
         set_mean_driven_velocity(driven_bodies, before, now, velocity, spin)
         velocity[kinematic] = 0.5 * (before.velocity[kinematic] + now.velocity[kinematic])
         spin[kinematic] = 0.5 * (before.spin[kinematic] + now.spin[kinematic])
         joints = p.space_bodies.joints.by_kind
-        spring_force = spring_forces(joints.springs, end.position, end.angle) if len(joints.springs) else None
-        applied = applied_impulses(p, before, included, spring_force, p.h * fraction)
+        spring_force = spring_forces(joints.springs, now.position, now.angle) if len(joints.springs) else None
+        applied = applied_impulses(p, before, included, spring_force, p.h)
         applied.angular[~self._can_turn()] = 0.0
-        joint_impulses = springs(p.space_bodies.joints, end.position, end.angle, p.h) if joints else ((), ())
-        by_stiffness, by_damping = (tuple(each.scaled(fraction) for each in impulses) for impulses in joint_impulses)
+        by_stiffness: tuple[JointImpulses, ...]
+        by_damping: tuple[JointImpulses, ...]
+        by_stiffness, by_damping = springs(p.space_bodies.joints, now.position, now.angle, p.h) if joints else ((), ())
         if asleep is not None:
             by_stiffness, by_damping = (
                 tuple(each.without(asleep) for each in impulses) for impulses in (by_stiffness, by_damping)
             )
-        points = p.space_bodies.contact_reader.points().scaled(fraction)
+        points = p.space_bodies.contact_reader.points()
 
-        self._move(before, now, drifts, fraction, applied, (velocity, spin))
+        self._move(before, now, drifts, applied, (velocity, spin))
         for each in by_stiffness:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
         account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1]) + applied.angular_drag @ spin[:-1]))
@@ -320,7 +310,7 @@ class PymunkEnergyLedger:
         account.add(Cause.DRIVES, surface_work)
         if driven_bodies:
             gravity = p.scene.world.gravity
-            work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h, fraction)
+            work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h)
             account.add(Cause.DRIVES, work.driven)
             account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
@@ -330,13 +320,13 @@ class PymunkEnergyLedger:
             for impulses in other_impulses:
                 joint_sums.subtract(impulses)
             if np.isin(kinematic, joint_sums.joined).any():
-                set_unknown_sums(p.space_bodies.joints, end.position, end.angle, joint_sums, included)
+                set_unknown_sums(p.space_bodies.joints, now.position, now.angle, joint_sums, included)
         if len(kinematic):
             means, gravity = (velocity, spin), p.scene.world.gravity
             driven = kinematic_work(kinematic, (before, now), means, other_impulses, joint_sums, p.bodies, gravity)
             account.add(Cause.DRIVES, driven)
         if joint_sums is not None:
-            self._joints(joint_sums, end, fraction, velocity, spin, asleep)
+            self._joints(joint_sums, now, velocity, spin, asleep)
 
     def joints_broken(self, indices: IntArray) -> None:
         """Account the stored energy of joints, by their indices, that have broken."""
@@ -345,13 +335,14 @@ class PymunkEnergyLedger:
         self._breaks[indices], self._potential = -np.inf, None
         self.account.add(Cause.PARTED, float(self._stored_energy(now)[0] - before[0]))
 
-    def _free_fall_error(self, fraction: float) -> float:
+    def _free_fall_error(self) -> float:
         """Return the energy error of explicit Euler on bodies under gravity alone: ½ m (g h)² in each substep."""
         p = self._population
         kick = p.h * np.asarray(p.scene.world.gravity)
-        ahead = 1.0 if p.ahead.any() else 0.0  # not exact for a substep that is cut off
+        if p.ahead.any():  # exact with half a kick
+            return 0.0
         mass = float(p.bodies.mass[p.particles.indices].sum())
-        return 0.5 * mass * float(kick @ kick) * fraction * (fraction - ahead)
+        return 0.5 * mass * float(kick @ kick)
 
     def _mean(self, before: EnergyState, now: EnergyState, included: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return mean reported velocities (N + 1, 2) and spins (N + 1,); 0 for other bodies and the world."""
@@ -365,7 +356,6 @@ class PymunkEnergyLedger:
         before: EnergyState,
         now: EnergyState,
         drifts: BoolArray,
-        fraction: float,
         applied: AppliedImpulses,
         mean: tuple[FloatArray, FloatArray],
     ) -> None:
@@ -374,7 +364,7 @@ class PymunkEnergyLedger:
         The drift is the displacement by the old velocities; displacements beyond it are corrections of overlaps.
         """
         p = self._population
-        h = p.h * fraction
+        h = p.h
         drift = np.where(drifts[:, None], before.position + before.velocity * h, now.position)
         drift_angle = np.where(drifts, before.angle + before.spin * h, now.angle)
         weight = np.where(drifts, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
@@ -420,16 +410,13 @@ class PymunkEnergyLedger:
     def _joints(
         self,
         joint_sums: ImpulseSums,
-        end: EnergyState,
-        fraction: float,
+        now: EnergyState,
         velocity: FloatArray,
         spin: FloatArray,
         asleep: BoolArray | None,
     ) -> None:
         """Account the work of joints, with motors as drives."""
-        by_motors: JointImpulses = motors(
-            self._population.space_bodies.joints, end.position, end.angle, joint_sums
-        ).scaled(fraction)
+        by_motors: JointImpulses = motors(self._population.space_bodies.joints, now.position, now.angle, joint_sums)
         if asleep is not None:
             by_motors = by_motors.without(asleep)
         joint_sums.subtract(by_motors)

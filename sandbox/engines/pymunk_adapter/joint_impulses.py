@@ -26,10 +26,6 @@ class JointImpulses(NamedTuple):
     angular_impulse: FloatArray
     """(K,) N·m·s, angular impulse in addition to that of `impulse` at its arms"""
 
-    def scaled(self, fraction: float | FloatArray) -> Self:
-        """Return fractions of them, one for all or (K,)."""
-        return self._replace(impulse=(self.impulse.T * fraction).T, angular_impulse=self.angular_impulse * fraction)
-
     def without(self, asleep: BoolArray) -> Self:
         """Return those without a body that is asleep, (N,): pymunk does not apply the others."""
         is_applied = ~np.append(asleep, False)  # the world is the last

@@ -290,11 +290,19 @@ class PymunkSimulation(BaseSimulation):
             frames.layer_rows()[rows, :n] = population.layer
         frames.finish_rows(len(states), n)
 
+    @property
+    def makes_whole_steps(self) -> bool:
+        """Whether no step is shorter than dt: not on a surface, whose stepper does not use Munk2D's solver.
+
+        Munk2D applies the impulses that it keeps in proportion to the length of a step, but accumulates them in full.
+        In a step shorter than the last one a contact that has just bounced pulls, and a motor brakes.
+        """
+        return self._population.tabletop is None
+
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt. No step can follow.
 
-        Whole substeps come first. The state within the last, shortened substep is interpolated, which for positions is
-        the path of the scheme.
+        On a surface, whole substeps come first, and then a shorter one; elsewhere the step is whole.
 
         Args:
             part: fraction of dt, 0 < part < 1.
@@ -305,29 +313,20 @@ class PymunkSimulation(BaseSimulation):
             ValueError: `part` is out of range.
         """
         self._check_part(part)
+        if self.makes_whole_steps:
+            self.step()
+            self._population.end()
+            return
         with self._lock:
             self._check_running()
             substeps, fraction = divmod(part * self._settings.substeps, 1.0)
             self._advance(int(substeps))
-            population, start = self._population, None
-            if population.tabletop is None:
-                start = [array.copy() for array in self._state()], population.space_bodies.drives.current_state()
-                self._integrate(int(substeps), self.time, fraction=fraction)  # its contacts would be after the end
-            elif fraction:  # the tabletop stepper supports a shorter substep, with its contacts
+            if fraction:
                 self._substep(int(substeps), self.time, fraction=fraction)
             self._part = part
             self._check_state()
-            if start is not None:
-                self._interpolate(*start, fraction)
             self._retire()
-            population.end()
-
-    def _interpolate(self, start: list[FloatArray], drives: FloatArray, fraction: float) -> None:
-        """Set the state to a fraction of the last substep, from its start: four arrays, and drives (D, 3)."""
-        for array, old in zip(self._state(), start, strict=True):
-            array[...] = old + (array - old) * fraction
-        self._population.space_bodies.drives.place_on_hinges(*self._state())
-        self._population.space_bodies.drives.end(drives, fraction)
+            self._population.end()
 
     def apply(self, action: Action) -> None:
         """Apply an action at once.
@@ -428,7 +427,7 @@ class PymunkSimulation(BaseSimulation):
         self._integrate(k, time, with_particles, fraction)
         population = self._population
         if population.space_bodies.joints.has_breakable:
-            self._record_broken(population.break_joints(), self._after(k + 1))
+            self._record_broken(population.break_joints(), self._after(k + fraction))
         if population.has_pending_zones:
             self._update_zones()
         if self._recorder is not None:
@@ -443,7 +442,7 @@ class PymunkSimulation(BaseSimulation):
             k: index of the substep.
             time: start of the step, s.
             with_particles: whether to advance the particles; False if they have been advanced already.
-            fraction: fraction of the substep that counts; the rest is cut off.
+            fraction: length of a shorter substep as a fraction of h.
         """
         population, ledger = self._population, self._ledger
         space_bodies, tabletop, start = population.space_bodies, population.tabletop, time + k * self._h
@@ -465,7 +464,7 @@ class PymunkSimulation(BaseSimulation):
             self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations
         population.invalidate()
         if ledger is not None:
-            ledger.substep(opening_state, fraction)
+            ledger.substep(opening_state)
 
     def _update_zones(self) -> None:
         """Apply the effects of zones that bodies have entered."""

@@ -9,6 +9,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.metrics.clearance import rotate_points
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
@@ -62,6 +63,36 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
     if can_rest and scale < AT_REST_FRACTION * _lift_energy(scene):
         return EnergyDrift(0.0 if change == 0.0 else None, against)
     return EnergyDrift(_ratio(change, scale), against)
+
+
+def energy_gain(run: Trajectory, scene: Scene) -> float:
+    """Return the largest excess of the energy over its initial value, as a fraction of the exchanged energy.
+
+    It is 0 if work is done on the scene, or if the initial energy is not finite. The exchanged energy is the initial
+    kinetic energy and the energy that gravity, springs and attraction gave or took; at least the energy that lifts each
+    body by its own width.
+    """
+    links = scene.links
+    if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
+        return 0.0
+    if scene.bodies.kinematic.any():
+        return 0.0
+    matrix = contact_matrix(scene)
+    if matrix.surfaces.kicks.any() or matrix.moving_surfaces:
+        return 0.0
+    energy = energies(run, scene)
+    total = energy.total
+    if not math.isfinite(total[0]):  # attracting bodies start at one point: their potential is infinite
+        return 0.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        gain = float(np.nanmax(total - total[0]))
+        exchanged = float(energy.kinetic[0]) + float(np.nanmax(np.abs(energy.potential - energy.potential[0])))
+        moves = ~scene.bodies.fixed
+        lift = math.hypot(*scene.world.gravity) * float((scene.bodies.mass * 2.0 * scene.bodies.thin)[moves].sum())
+        exchanged = max(exchanged, lift)
+    if not math.isfinite(gain):
+        return math.inf
+    return gain / exchanged if exchanged > 0.0 else 0.0
 
 
 def _lift_energy(scene: Scene) -> float:

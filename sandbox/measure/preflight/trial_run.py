@@ -17,13 +17,14 @@ import numpy as np
 
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, start
-from sandbox.measure.metrics.energy import energies
+from sandbox.measure.metrics.invariants import energy_gain
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import Detail, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import initial_contacts
 from sandbox.measure.preflight.predictability import event_warning
 from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
+from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.filters import filter_table
@@ -51,10 +52,6 @@ MAX_JOINT_ERROR = 0.1
 """A joint with a larger error, as a fraction of its length, has come apart."""
 MAX_STACK_DISPLACEMENT = 0.5
 """A stack has fallen if one of its bodies has moved by a larger fraction of its width."""
-MAX_ENERGY_GAIN = 0.1
-"""Energy counts as created if it exceeds its initial value by a larger fraction of the exchanged energy: position
-correction and explicit Euler in free fall add less at usual steps.
-"""
 
 NAMING_KINDS = frozenset({"tunnelling", "depth"})
 """Kinds for which a trial run names each body at risk with its own speed, and the formulas only bounds."""
@@ -227,36 +224,6 @@ class TrialRun:
             "; restitution with friction can create energy for shapes other than balls: on reference, "
             "solver.impact = 'dissipative' prevents that"
         )
-
-
-def energy_gain(run: Trajectory, scene: Scene) -> float:
-    """Return the largest excess of the energy over its initial value, as a fraction of the exchanged energy.
-
-    It is 0 if work is done on the scene, or if the initial energy is not finite. The exchanged energy is the initial
-    kinetic energy and the energy that gravity, springs and attraction gave or took; at least the energy that lifts each
-    body by its own width.
-    """
-    links = scene.links
-    if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
-        return 0.0
-    if scene.bodies.kinematic.any():
-        return 0.0
-    matrix = contact_matrix(scene)
-    if matrix.surfaces.kicks.any() or matrix.moving_surfaces:
-        return 0.0
-    energy = energies(run, scene)
-    total = energy.total
-    if not math.isfinite(total[0]):  # attracting bodies start at one point: their potential is infinite
-        return 0.0
-    with np.errstate(over="ignore", invalid="ignore"):
-        gain = float(np.nanmax(total - total[0]))
-        exchanged = float(energy.kinetic[0]) + float(np.nanmax(np.abs(energy.potential - energy.potential[0])))
-        moves = ~scene.bodies.fixed
-        lift = math.hypot(*scene.world.gravity) * float((scene.bodies.mass * 2.0 * scene.bodies.thin)[moves].sum())
-        exchanged = max(exchanged, lift)
-    if not math.isfinite(gain):
-        return math.inf
-    return gain / exchanged if exchanged > 0.0 else 0.0
 
 
 def run_trial(scene: Scene, settings: Settings, engine: str, cover: float = 1.0) -> TrialRun | None:

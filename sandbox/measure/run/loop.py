@@ -181,7 +181,8 @@ class _StepLoop:
             simulation.finish(self._part)
             self.queue.frame = simulation.frame()
             recorder.record(self.queue.frame)
-            recorder.end_time = self._duration
+            if not simulation.makes_whole_steps:
+                recorder.end_time = self._duration
             self.queue.notify_end()
         elif self.queue.apply_due(now, is_last=True):
             recorder.replace_last(simulation.frame())

@@ -21,6 +21,7 @@ from sandbox.measure.metrics.invariants import joint_error
 from sandbox.measure.missed_contacts import Audit
 from sandbox.measure.run.loop import RunCallbacks, RunEnd, WorkCallback, run_loop
 from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
+from sandbox.measure.run.run_warnings import run_warnings
 from sandbox.progress import ProgressCallback
 from sandbox.provenance import versions
 from sandbox.scene.compile.filters import bits_of_layers
@@ -159,6 +160,8 @@ def _recorded_run(
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     info["joint_error"] = joint_error(trajectory, setup)
+    is_ok = end.status == "ok"
+    info["warnings"] = [*run_warnings(trajectory, setup.scene, (float(total[0]), float(total[-1])))] if is_ok else []
     return trajectory
 
 
@@ -179,7 +182,9 @@ def run_without_frames(
     scene, count = setup.scene, len(setup.bodies)
     outcome = {"status": status, "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
     outcome |= {"state_hash": None, "broken": 0}
-    info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
+    info = _info(
+        scene, engine, settings, actions, **outcome, warnings=[], energy_start=None, energy_end=None, joint_error=None
+    )
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
     unbroken = np.full(len(setup.links), np.nan)

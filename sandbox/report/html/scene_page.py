@@ -181,7 +181,8 @@ def run_page(run: Trajectory, replayed: bool = True) -> Page:
     sections.append(Section("Figures", definitions(_run_figures(run))))
     if len(run.time):
         sections.append(Section("Final state", _final(run)))
-    lead = isolated(str(run.reason)) if run.reason else None
+    remarks = [str(run.reason)] if run.reason else list(run.warnings)
+    lead = isolated("; ".join(remarks)) if remarks else None
     engine = run.info.get("engine")
     return Page(scene.title or "Untitled scene", f"Run on {engine}" if engine else "Run", sections, lead)
 

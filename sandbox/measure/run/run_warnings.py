@@ -1,0 +1,51 @@
+"""Warnings about a run that has reached its end: it ended after its duration, or gained energy without a source."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from sandbox.measure.metrics.invariants import energy_gain
+from sandbox.scene.compile.scene import Scene
+from sandbox.trajectory import Trajectory
+
+MAX_ENERGY_GAIN = 0.1
+"""Energy counts as created if it exceeds its initial value by a larger fraction of the exchanged energy: position
+correction and explicit Euler in free fall add less at usual steps.
+"""
+MAX_FRAMES = 200
+"""Largest number of frames at which the energy is computed."""
+
+
+def run_warnings(run: Trajectory, scene: Scene, energy: tuple[float, float]) -> Iterator[str]:
+    """Yield what to know about a run with the status `ok`.
+
+    Args:
+        run: the run.
+        scene: its scene.
+        energy: total energy at its start and end, J.
+    """
+    end, duration = float(run.time[-1]), scene.world.duration
+    if end > duration * (1.0 + 1e-9) and "game" not in run.info:
+        name = run.info["engine"]
+        yield f"{name} makes whole steps of dt only: the run ends at {end:.6g} s, after its duration of {duration:g} s"
+    if _may_gain(run, scene) and energy[1] > energy[0]:
+        frames = np.unique(np.linspace(0, len(run.time) - 1, min(len(run.time), MAX_FRAMES)).astype(np.int64)).tolist()
+        gain = energy_gain(run.at(frames), scene)
+        if gain > MAX_ENERGY_GAIN:
+            yield (
+                f"the energy rose from {energy[0]:.4g} to {energy[1]:.4g} J without a source{_remedy(run.info, scene)}"
+            )
+
+
+def _may_gain(run: Trajectory, scene: Scene) -> bool:
+    """Return whether nothing does work on a scene, as far as `energy_gain` does not see it."""
+    has_work = run.info["actions"] or "game" in run.info or scene.zones
+    return not (has_work or (scene.bodies.born > 0.0).any() or np.isfinite(run.retired_time).any())
+
+
+def _remedy(info: Mapping[str, Any], scene: Scene) -> str:
+    oscillates = len(scene.links) > 0 or bool(scene.attractions)
+    if info["engine"] == "reference" and info["settings"]["integrator"] == "explicit_euler" and oscillates:
+        return "; explicit Euler gains energy in every oscillation: use solver.integrator = 'semi_implicit_euler'"
+    return "; use a smaller dt or more substeps"
