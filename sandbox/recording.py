@@ -67,8 +67,7 @@ class Recording:
     @property
     def whole_scene(self) -> Scene:
         """The scene with the duration of the session."""
-        world = self.scene.world.model_copy(update={"duration": self.duration})
-        return self.scene.model_copy(update={"world": world})
+        return self.scene.with_duration(self.duration)
 
     def on(self, engine: str) -> Self:
         """Return the session with another engine from start to end.

@@ -69,3 +69,13 @@ def frame_count(scene: Scene, settings: Settings, actions: Sequence[Action] = ()
     """
     stretches = schedule(scene.world.duration, settings.dt, actions)
     return sum(stretch.steps for stretch in stretches), stretches[-1].part
+
+
+def with_whole_steps(scene: Scene, dt: float) -> Scene:
+    """Return a scene whose duration is a whole number of steps of dt, s: the next one, if its own is none.
+
+    Some engines make whole steps only (`Simulation.makes_whole_steps`). With such a duration all runs end at the same
+    time and can be compared to the end.
+    """
+    (stretch,) = schedule(scene.world.duration, dt)
+    return scene.with_duration((stretch.steps + 1) * dt) if stretch.part else scene

@@ -31,6 +31,7 @@ from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import as_scene
+from sandbox.schedule import with_whole_steps
 from sandbox.signals import defer_interrupt
 from sandbox.trajectory import Trajectory
 
@@ -55,7 +56,8 @@ def compare(
 
     The truth is the closed form of the scene, if it has one. Otherwise it is `exact`, or a fixed step refined until it
     converges, up to the time to which a second method confirms it. Errors, contacts and divergence are measured up to
-    `trusted_until`, drifts of energy and momentum over the whole run.
+    `trusted_until`, drifts of energy and momentum over the whole run. A duration that is not a whole number of steps is
+    taken to the next one, so that all runs end at the same time.
 
         sandbox.compare(scene, sweep={"solver.integrator": ["explicit_euler", "velocity_verlet", "rk4"]})
 
@@ -134,8 +136,12 @@ def compare_variants(
     engines = [engines] if isinstance(engines, str) else engines
     for name in engines or ():
         engine_named(name)
-    first = variants[0].scene
     wanted = [each.scene.solver.replace(**settings) if settings else each.scene.solver for each in variants]
+    same_scene = len(variants) == 1 or len({physics_of(each.scene) for each in variants}) == 1
+    variants = [
+        replace(each, scene=with_whole_steps(each.scene, own.dt)) for each, own in zip(variants, wanted, strict=True)
+    ]
+    first = variants[0].scene
     plan = list(zip(variants, wanted, _engines_of(variants, wanted, engines), strict=True))
     if tolerance is None:
         tolerance = min(default_tolerance(each.scene) for each in variants)
@@ -169,7 +175,7 @@ def compare_variants(
         doubt=doubt,
         interrupted=interrupted,
         truths=scoring.row_truths,
-        same_scene=len(variants) == 1 or len({physics_of(each.scene) for each in variants}) == 1,
+        same_scene=same_scene,
     )
 
 

@@ -14,9 +14,7 @@ from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.shapes import UNTURNABLE
-from sandbox.schedule import frame_count
 from sandbox.trajectory import Trajectory
 
 AT_REST_FRACTION = 1e-4
@@ -108,13 +106,10 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
     between moving bodies conserve momentum. None with drag, damping, thrusts, drives, joints or attraction between
     moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired
-    with its momentum; with kinematic bodies; or if the run did not reach its end or ended within a step, whose contacts
-    are not recorded.
+    with its momentum; with kinematic bodies; or if the run did not reach its end.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
-        return None
-    if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
         return None
     if world.has_drag or world.has_damping or scene.thrusts or scene.drives or _acts_on_static(scene):
         return None

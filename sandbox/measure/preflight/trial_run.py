@@ -242,7 +242,7 @@ def run_trial(scene: Scene, settings: Settings, engine: str, cover: float = 1.0)
     steps = max(1, max_substeps // settings.substeps)
     whole = needed <= max_substeps
     duration = scene.world.duration if whole else steps * settings.dt
-    part = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
+    part = scene.with_duration(duration)
     frames = duration / settings.dt
     every = max(1, int(frames // MAX_SUBSTEPS))
     try:

@@ -171,7 +171,7 @@ class _StepLoop:
         return self._game is not None and self._game.finished
 
     def finish(self) -> None:
-        """Make the last, incomplete step, and apply the actions at the end of the run."""
+        """Make the last step if it is incomplete, and apply the actions at the end of the run."""
         simulation, recorder = self._simulation, self._recorder
         now = simulation.time + ROUNDING * self._stretches[-1].dt
         if self._is_game_over():
@@ -179,10 +179,12 @@ class _StepLoop:
         elif self._part > 0.0:
             self.queue.apply_due(now)
             simulation.finish(self._part)
+            if simulation.makes_whole_steps:
+                recorder.steps += 1
+            else:
+                recorder.end_time = self._duration
             self.queue.frame = simulation.frame()
             recorder.record(self.queue.frame)
-            if not simulation.makes_whole_steps:
-                recorder.end_time = self._duration
             self.queue.notify_end()
         elif self.queue.apply_due(now, is_last=True):
             recorder.replace_last(simulation.frame())

@@ -57,6 +57,7 @@ from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import as_scene
+from sandbox.schedule import with_whole_steps
 from sandbox.trajectory import Trajectory
 
 DEFAULT_EFFORT = 10.0
@@ -141,6 +142,7 @@ def tradeoff(
     _check_arguments(seeds, zoom, effort, time_limit, repeats, most)
     check_objective(metric, tolerance, budget, fps)
     base = scene.solver.replace(**settings) if settings else scene.solver
+    scene = with_whole_steps(scene, base.dt)
     require_memory(scene, base, 4 * len(scene.bodies))
     deadline = math.inf if time_limit is None else clock_without_compilation() + time_limit
 

@@ -80,8 +80,7 @@ def _pictures(shot: ShotResult, moved: Sequence[int], figures: Markup, replayed:
     if shot.path is None:
         figures = concatenated(figures, paragraph(NOT_RECORDED, "soft remark"))
     elif replayed and shot.duration > 0.0:
-        lasting = shot.scene.world.model_copy(update={"duration": shot.duration})
-        scene = shot.scene.model_copy(update={"world": lasting})
+        scene = shot.scene.with_duration(shot.duration)
         canvas = replay(scene, [Track(ENGINE, css_class_of(ENGINE), _frames(shot))], None)
         figures = concatenated(canvas, figures)
     return fragment(TEMPLATE, "side", figures, _picture(shot, moved))

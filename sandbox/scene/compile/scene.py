@@ -1,7 +1,7 @@
 """Scene: the contents of a scene file, with the start state that follows from them."""
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from sandbox.echo import short_repr
 from sandbox.html_repr import HtmlRepr
@@ -36,6 +36,10 @@ class Scene(SceneDescription, HtmlRepr):
         from sandbox.scene.compile.bodies import elements_in
 
         return elements_in(self)
+
+    def with_duration(self, duration: float) -> Self:
+        """Return the scene with another duration, s."""
+        return self.model_copy(update={"world": self.world.model_copy(update={"duration": duration})})
 
     def source_index(self, element: int) -> int:
         """Return the index in `body_sources` of the source to which an element belongs.

@@ -228,7 +228,7 @@ def from_session(document: dict[str, Any], file: str = "<session>", overrides: I
     scene = from_document({**document, "world": {**world, "duration": NO_TIME}}, file, overrides)
     if scene.world.duration != NO_TIME:  # it was set
         return scene
-    return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.0})})
+    return scene.with_duration(0.0)
 
 
 def _parse_overrides(overrides: Iterable[Override], file: str) -> tuple[list[tuple[str, Any]], list[Fault]]:

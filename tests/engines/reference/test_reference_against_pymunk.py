@@ -182,13 +182,3 @@ def test_contact_rows_agree(name):
     assert np.abs(theirs.normal - ours.normal).max() < 1e-12  # pymunk's planes: see above
     assert np.abs(theirs.point - ours.point).max() < 1e-11  # as above, on a segment of some 1e4 m
     assert np.abs(theirs.impulse - ours.impulse).max() < 1e-11  # sums over 2,000 steps
-
-
-@pytest.mark.parametrize("fraction", [0.25, 0.5, 0.9])
-def test_partial_last_step_in_flight_matches_pymunk(fraction):
-    scene = scene_of(ball(0, 3, velocity=[2, 1], angular_velocity=1.0), world=EARTH, solver={"dt": 0.01, "substeps": 4})
-    theirs, ours = simulation_of(scene, "pymunk"), simulation_of(scene, **PYMUNK_SETTINGS)
-    for simulation in (theirs, ours):
-        advance(simulation, 10).finish(fraction)
-    assert difference(theirs, ours) < 1e-15 * 10  # one is interpolated, the other stepped
-    assert ours.time == (10 + fraction) * 0.01

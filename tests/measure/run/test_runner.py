@@ -94,7 +94,7 @@ def test_frames_lie_at_multiples_of_dt_and_at_the_duration(steps, substeps, ever
     expected = [k * dt for k in range(0, whole + 1, every)]
     if part or whole % every:
         expected.append((whole + part) * dt)
-    result = run(flight(duration, float(dt), substeps, every))
+    result = run(flight(duration, float(dt), substeps, every), "reference")
     assert len(result.time) == len(expected)
     assert result.time == pytest.approx([float(t) for t in expected], rel=1e-15)  # one rounding of k·dt
     assert (result.time[0], result.time[-1]) == (0.0, duration)
@@ -116,7 +116,7 @@ def test_partial_last_step_follows_the_scheme(steps: tuple[str, int, str], subst
             position[axis] += velocity[axis] * span
             velocity[axis] += gravity * span
         time += span
-    result = run(scene)
+    result = run(scene, "reference", integrator="explicit_euler")
     # 160 additions of numbers up to 30, each rounded by 4e-15 at most.
     assert result.position[-1, 0] == pytest.approx([float(x) for x in position], abs=1e-12)
     assert result.velocity[-1, 0] == pytest.approx([float(v) for v in velocity], abs=1e-12)  # likewise
@@ -176,7 +176,7 @@ ACTIONS: tuple[Action, ...] = (
 def test_impulse_acts_from_the_first_step_at_or_after_its_time(thousandths: int, part: str) -> None:
     steps = 10 + Fraction(part)
     kick = Impulse(time=thousandths / 1000, body="a", impulse=(2.0, -4.0))
-    result = run(flight(float(steps / 100)), actions=[kick])
+    result = run(flight(float(steps / 100)), "reference", actions=[kick])
     first = math.ceil(Fraction(thousandths, 10))  # index of the step
     for k, time in enumerate(result.time):
         after = max(Fraction(0), min(Fraction(k), steps) - first) / 100  # s since that step

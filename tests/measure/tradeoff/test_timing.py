@@ -32,7 +32,7 @@ def test_run_is_stepped_to_its_end(engine: str, monkeypatch: pytest.MonkeyPatch)
     for dt in (0.02, 0.03):  # 20 whole steps; 13 and a third
         seconds = run_seconds(scene, engine, scene.solver.replace(dt=dt))
         assert seconds > 0.0
-    assert ended == pytest.approx([0.4, 0.4], rel=1e-12)  # sum of the steps
+    assert ended == pytest.approx([0.4, 0.42 if engine == "pymunk" else 0.4], rel=1e-12)  # sum of the steps
 
 
 @pytest.mark.parametrize("error", [Divergence(0.1, "a", "is gone"), Exhaustion("enough")])
@@ -70,7 +70,7 @@ def test_runs_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) 
     [
         (0.02, 0.02 * module.WARM_UP_STEPS),  # of a run of 0.4 s
         (0.4, 0.4),
-        (0.5, 0.4),  # a step that the end of the run shortens
+        (0.5, 0.4),  # a step that the end of the run shortens, but not on pymunk
     ],
 )
 def test_warm_up_is_short_even_for_a_run_of_one_step(engine, dt, end, monkeypatch):
@@ -84,4 +84,5 @@ def test_warm_up_is_short_even_for_a_run_of_one_step(engine, dt, end, monkeypatc
     scene = scene_of(DROP)
     warm_up(scene, engine, scene.solver.replace(dt=dt))
     (simulation,) = started
+    end = dt if simulation.makes_whole_steps and dt > end else end
     assert simulation.time == pytest.approx(end, rel=1e-12)  # rounding of a sum
