@@ -38,8 +38,8 @@ from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.compare.result import short_key, value_text
-from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
 from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.run.run_warnings import joint_order_limit
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import load
 from sandbox.scene.files.overrides import AddressError, combinations
@@ -155,12 +155,10 @@ def _accuracy_lines(comparison: Comparison) -> Iterator[str]:
 def _joint_order(comparison: Comparison) -> Iterator[str]:
     """Yield the order to which the solver of rigid joints limits integrators, if integrators are compared."""
     rows = [row for row in comparison.rows if "solver.integrator" in row.set and row.status != "refused"]
-    if not rows or not len(comparison.scene.links.of(*CONSTRAINT_KINDS)):
-        return
     for method in sorted({str(row.settings["joints"]) for row in rows}):
-        order = 2 if method == "rattle" else 1
-        other = "" if order == 2 else "; `--set solver.joints=rattle` gives order 2"
-        yield f"rigid joints by {method} limit every integrator to order {order}{other}"
+        limit = joint_order_limit(comparison.scene, method)
+        if limit is not None:
+            yield limit.text
 
 
 def _named(events: Sequence[ContactMatch]) -> str:

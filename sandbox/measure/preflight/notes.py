@@ -12,6 +12,7 @@ from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, PymunkEngine, 
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
+from sandbox.measure.run.run_warnings import wasted_integrator
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySource
@@ -36,6 +37,7 @@ def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
         *(_contact_names(scene) if engine in (None, "pymunk") else ()),
         *_pixels(scene),
         *_flight(scene),
+        *(_joint_order(scene) if engine in (None, "reference") else ()),
         *_outlines(scene),
         *_audit(scene),
         *horizon_notes(scene),
@@ -86,6 +88,12 @@ def _flight(scene: Scene) -> Iterator[Diagnostic]:
         "reference, and `exact` have no such error"
     )
     yield Diagnostic("flight", message, {"body": body, "error": float(error[k])})
+
+
+def _joint_order(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a note if joints are less accurate than the stated integrator of `reference`."""
+    if text := wasted_integrator(scene, scene.solver.model_dump()):
+        yield Diagnostic("joint_order", f"reference: {text}", {"integrator": str(scene.solver.integrator)})
 
 
 def _outlines(scene: Scene) -> Iterator[Diagnostic]:

@@ -18,7 +18,7 @@ class World(Part):
     gravity: tuple[Acceleration, Acceleration] = (0.0, 0.0)
     """acceleration of free fall, m/s²"""
     duration: Annotated[float, Field(gt=0, le=1e9)] = 10.0
-    """duration of a run without a window, s"""
+    """duration of a run without a window, s; pymunk and box2d end it with a whole step of dt"""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
     """Seed of all random numbers of the scene."""
     linear_drag: Drag = 0.0
