@@ -131,6 +131,7 @@ class Info(StoredPart):
     versions: dict[str, str]
     status: Literal["ok", "diverged", "refused", "failed"]
     reason: str | None
+    warnings: tuple[str, ...] = ()
     steps: StoredCount
     seconds: Annotated[Finite, Field(ge=0)]
     work: dict[str, Annotated[StoredNumber, Field(ge=0)]] = Field(default_factory=dict)

@@ -37,7 +37,7 @@ def test_bounces_have_the_times_and_impulses_of_the_formula() -> None:
 )
 def test_frame_times_are_those_of_an_engine(solver: str) -> None:
     scene = drop_scene("restitution = 0.5", solver=solver)
-    assert np.array_equal(frame_times(scene, scene.solver), run(scene, "pymunk", audit=False).time)
+    assert np.array_equal(frame_times(scene, scene.solver), run(scene, "reference", audit=False).time)
 
 
 @pytest.mark.parametrize(
