@@ -242,7 +242,7 @@ class ReferenceTabletopSimulation(HasBodyStore, SteppedSimulation):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._log is None:
-            self._log = ContactLog(len(self.scene.fixed_names), can_repeat_pairs=False)
+            self._log = ContactLog(len(self.scene.fixed_names), self._stepper.can_repeat_pairs)
             self._log.record(self.time, self._stepper.drain_contacts())
         return self._log.take()
 

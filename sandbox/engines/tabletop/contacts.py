@@ -23,37 +23,49 @@ from sandbox.scene.description.fixed import Post, Wall
 
 
 class Cushions(NamedTuple):
-    """F static colliders; the first P are planes."""
+    """C cushions: P planes, then the G segments of walls and posts.
+
+    Each edge of a wall is a cushion of its own, so that a ball in a corner of the wall collides with both.
+    """
 
     planes: FloatArray
     """(P, 4) a point of the surface, m, and the unit normal pointing out of the solid"""
     segments: FloatArray
     """(G, 5) both ends and half the thickness, m; a post is a segment of length 0"""
-    first: IntArray
-    """(F + 1,) the first segment of each collider; the last entry is the number of segments"""
+    joints: FloatArray
+    """(G, 4) m, as in `StaticColliders.joints`"""
+    collider: IntArray
+    """(C,) index of the plane, wall or post, in ascending order"""
     height: FloatArray
-    """(F,) m, of the nose above the surface; 0 means the height of the ball's centre"""
+    """(C,) m, of the nose above the surface; 0 means the height of the ball's centre"""
     surface: IntArray
-    """(F,)"""
+    """(C,)"""
 
 
 def cushions_of(scene: Scene, surface: IntArray) -> Cushions:
-    """Return a scene's static colliders as arrays; `surface` (F,) are their surfaces."""
+    """Return the cushions of a scene; `surface` (F,) are the surfaces of its static colliders."""
     fixtures = static_colliders(scene)
-    first = np.searchsorted(fixtures.segment_collider, np.arange(len(scene.fixed) + 1))
+    collider = np.concatenate((fixtures.plane_collider, fixtures.segment_collider))
     height = [collider.height or 0.0 if isinstance(collider, Wall | Post) else 0.0 for collider in scene.fixed]
-    return Cushions(fixtures.planes, fixtures.segments, first, np.asarray(height, dtype=np.float64), surface)
+    return Cushions(
+        fixtures.planes,
+        fixtures.segments,
+        fixtures.joints,
+        collider,
+        np.asarray(height, dtype=np.float64)[collider],
+        surface[collider],
+    )
 
 
 @kernel
-def distance_to_collider(
+def distance_to_cushion(
     cushions: Cushions, k: int, x: float, y: float, vx: float, vy: float
 ) -> tuple[float, float, float]:
-    """Return the distance of a point from a collider's surface, m, and the unit normal into the collider.
+    """Return the distance of a point from the surface of a cushion, m, and the unit normal into the cushion.
 
     Args:
-        cushions: all colliders.
-        k: index of the collider.
+        cushions: all cushions.
+        k: index of the cushion.
         x: of the point, m.
         y: likewise.
         vx: its velocity, whose direction is the normal if the point is exactly on the middle of a wall.
@@ -62,20 +74,35 @@ def distance_to_collider(
     if k < len(cushions.planes):
         plane = cushions.planes[k]
         return (x - plane[0]) * plane[2] + (y - plane[1]) * plane[3], -plane[2], -plane[3]
-    best, nx, ny = math.inf, 0.0, 0.0
-    for j in range(cushions.first[k], cushions.first[k + 1]):
-        segment = cushions.segments[j]
-        ax, ay, bx, by, half = segment[0], segment[1], segment[2], segment[3], segment[4]
-        fraction = nearest_fraction(ax, ay, bx, by, x, y)
-        dx, dy = ax + fraction * (bx - ax) - x, ay + fraction * (by - ay) - y
-        distance = math.sqrt(dx * dx + dy * dy)
-        if distance - half < best:
-            best = distance - half
-            nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (0.0, 0.0)
-    if nx == 0.0 and ny == 0.0:
-        speed = math.sqrt(vx * vx + vy * vy)
-        nx, ny = (vx / speed, vy / speed) if speed > 0.0 else (1.0, 0.0)
-    return best, nx, ny
+    ax, ay, bx, by, half = cushions.segments[k - len(cushions.planes)]
+    fraction = nearest_fraction(ax, ay, bx, by, x, y)
+    dx, dy = ax + fraction * (bx - ax) - x, ay + fraction * (by - ay) - y
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance > 0.0:
+        return distance - half, dx / distance, dy / distance
+    speed = math.sqrt(vx * vx + vy * vy)
+    nx, ny = (vx / speed, vy / speed) if speed > 0.0 else (1.0, 0.0)
+    return -half, nx, ny
+
+
+@kernel
+def is_nearer_to_neighbour(cushions: Cushions, k: int, x: float, y: float) -> bool:
+    """Return whether a point is nearer to the next edge of the wall than to cushion k.
+
+    An end that two edges share acts only where both edges end there; otherwise a ball that slides along a straight wall
+    would bounce off the ends of its edges.
+    """
+    s = k - len(cushions.planes)
+    if s < 0:
+        return False
+    ax, ay, bx, by, _ = cushions.segments[s]
+    to_before_x, to_before_y, to_after_x, to_after_y = cushions.joints[s]
+    fraction = nearest_fraction(ax, ay, bx, by, x, y)
+    if fraction <= 0.0:
+        return bool((x - ax) * to_before_x + (y - ay) * to_before_y > 0.0)
+    if fraction >= 1.0:
+        return bool((x - bx) * to_after_x + (y - by) * to_after_y > 0.0)
+    return False
 
 
 DUE, IMPULSE_X, IMPULSE_Y, NORMAL_X, NORMAL_Y, POINT_X, POINT_Y, GAP, WIDTH = range(9)
@@ -106,7 +133,7 @@ def approach(
     """Return a pair's gap at a time, m, the normal from the first to the second, and the closing speed, m/s."""
     x, y, _, motion = state_at(balls, i, time_before_end)
     if other < 0:
-        gap, nx, ny = distance_to_collider(cushions, -1 - other, x, y, motion[0], motion[1])
+        gap, nx, ny = distance_to_cushion(cushions, -1 - other, x, y, motion[0], motion[1])
         return gap - balls.radius[i], nx, ny, motion[0] * nx + motion[1] * ny
     px, py, _, other_motion = state_at(balls, other, time_before_end)
     dx, dy = px - x, py - y
@@ -118,6 +145,15 @@ def approach(
         speed = math.sqrt(ux * ux + uy * uy)
         nx, ny = (ux / speed, uy / speed) if speed > 0.0 else (1.0, 0.0)
     return distance - balls.radius[i] - balls.radius[other], nx, ny, ux * nx + uy * ny
+
+
+@kernel
+def can_touch(balls: TabletopBalls, cushions: Cushions, i: int, other: int, time_before_end: float) -> bool:
+    """Return whether a pair can collide at a time: a ball does not where the wall's next edge is nearer."""
+    if other >= 0:
+        return True
+    x, y, _, _ = state_at(balls, i, time_before_end)
+    return not is_nearer_to_neighbour(cushions, -1 - other, x, y)
 
 
 @kernel
@@ -149,13 +185,9 @@ def time_of_impact(balls: TabletopBalls, cushions: Cushions, i: int, other: int)
             return -1.0
     start_gap, _, _, earlier_closing = approach(balls, cushions, i, other, max_time)
     if start_gap <= 0.0:  # in contact all the time
-        return (
-            max_time
-            if earlier_closing > RESTING_SPEED and start_gap > end_gap
-            else 0.0
-            if closing > RESTING_SPEED
-            else -1.0
-        )
+        if earlier_closing > RESTING_SPEED and start_gap > end_gap:
+            return max_time if can_touch(balls, cushions, i, other, max_time) else -1.0
+        return 0.0 if closing > RESTING_SPEED and can_touch(balls, cushions, i, other, 0.0) else -1.0
     # Between a time of overlap and one before it: false position, by the Illinois rule.
     low, high, low_gap, high_gap, last_side = latest, max_time, end_gap, start_gap, 0
     for _ in range(MAX_ITERATIONS):
@@ -171,7 +203,7 @@ def time_of_impact(balls: TabletopBalls, cushions: Cushions, i: int, other: int)
             high, high_gap = middle, gap
             low_gap = 0.5 * low_gap if last_side > 0 else low_gap
             last_side = 1
-    return middle if earlier_closing > RESTING_SPEED else -1.0
+    return middle if earlier_closing > RESTING_SPEED and can_touch(balls, cushions, i, other, middle) else -1.0
 
 
 @kernel
@@ -205,7 +237,7 @@ def append_new_pairs(
 ) -> int:
     """Append the pairs that a ball now overlaps and that are not listed yet; return the number of pairs."""
     x, y = balls.position[i, 0], balls.position[i, 1]
-    for k in range(-len(cushions.height), len(balls.in_play)):
+    for k in range(-len(cushions.collider), len(balls.in_play)):
         if count == len(pairs):
             return count
         if k < 0:
@@ -233,7 +265,8 @@ def write_geometry(balls: TabletopBalls, cushions: Cushions, i: int, other: int,
     gap, nx, ny, _ = approach(balls, cushions, i, other, 0.0)
     contact_distance = balls.radius[i] + 0.5 * gap
     row[IMPULSE_X] = row[IMPULSE_Y] = 0.0
-    row[NORMAL_X], row[NORMAL_Y], row[GAP] = nx, ny, gap
+    row[NORMAL_X], row[NORMAL_Y] = nx, ny
+    row[GAP] = gap if can_touch(balls, cushions, i, other, 0.0) else math.inf
     row[POINT_X], row[POINT_Y] = (
         balls.position[i, 0] + contact_distance * nx,
         balls.position[i, 1] + contact_distance * ny,
@@ -299,7 +332,7 @@ def resolve_hit(
         cushions: all.
         parameters: of collisions.
         i: index of a ball.
-        other: index of another ball, or of a collider, −1 − k.
+        other: index of another ball, or of a cushion, −1 − k.
         time_before_end: of the impact, before the end of the substep, s.
         row: (WIDTH,) of the contact; written to.
         work: (3,) J, energy changes of collisions by normal impulses, by friction impulses, and of friction with the
@@ -404,7 +437,7 @@ def resolve(
         balls: all.
         cushions: all.
         parameters: of collisions.
-        pairs: (M, 2) distinct pairs, first those in contact: a ball in play, and another ball or a collider −1 − k.
+        pairs: (M, 2) distinct pairs, first those in contact: a ball in play, and another ball or a cushion −1 − k.
             The rest is room for pairs that collisions bring into contact.
         rows: (M, WIDTH) row of each pair; written to.
         work: (3,) as of `resolve_hit`.
@@ -438,7 +471,7 @@ def resolve(
                 rows[k, DUE] = time_of_impact(balls, cushions, a, b)
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
-        depth = -approach(balls, cushions, i, other, 0.0)[0]
+        depth = -approach(balls, cushions, i, other, 0.0)[0] if can_touch(balls, cushions, i, other, 0.0) else 0.0
         was_hit = rows[k, IMPULSE_X] != 0.0 or rows[k, IMPULSE_Y] != 0.0
         if was_hit and 0.0 < depth <= parameters.slop:
             separate(balls, cushions, i, other, depth)

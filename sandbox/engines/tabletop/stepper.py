@@ -142,6 +142,11 @@ class TabletopStepper:
         assert self._balls is not None
         return self._balls
 
+    @property
+    def can_repeat_pairs(self) -> bool:
+        """Whether a ball and a wall can have several contacts at once, in a corner of the wall."""
+        return len(self._cushions.collider) > len(np.unique(self._cushions.collider))
+
     def check_in_play(self, index: int, name: str) -> None:
         """Refuse to set a ball in motion that is in a pocket.
 
@@ -184,7 +189,8 @@ class TabletopStepper:
         before = self._energy()
         advance_all(balls, h, self._displacement)
         self._attribute(Cause.FRICTION, before)
-        pairs, count = _distinct_pairs(finder.find_pairs(self._displacement / self._h), balls.in_play)
+        found = _with_cushions(finder.find_pairs(self._displacement / self._h), self._cushions.collider)
+        pairs, count = _distinct_pairs(found, balls.in_play)
         rows, work = np.zeros((len(pairs), WIDTH)), np.zeros(3)
         if count:
             initial_count = count
@@ -197,7 +203,7 @@ class TabletopStepper:
             if self.account is not None:
                 self.account.add_contacts(*work[:2].tolist())
                 self.account.add_unchecked(Cause.FRICTION, float(work[2]))  # may be positive: undone friction
-        self.touching = _touching(pairs[:count], rows[:count])
+        self.touching = _touching(pairs[:count], rows[:count], self._cushions.collider)
 
     def _apply_forces(self, forces: Iterable[tuple[int, tuple[FloatArray, float]]], h: float) -> None:
         """Apply constant forces and torques for a time, s, as one impulse."""
@@ -276,15 +282,35 @@ def _distinct_pairs(pairs: IntArray, in_play: BoolArray) -> tuple[IntArray, int]
     return np.concatenate((distinct, np.zeros((EXTRA_PAIRS + len(distinct), 2), np.int64))), len(distinct)
 
 
-def _touching(pairs: IntArray, rows: FloatArray) -> ContactBatch:
-    """Return contacts as a batch, from their rows (K, WIDTH)."""
+def _with_cushions(pairs: IntArray, collider: IntArray) -> IntArray:
+    """Return pairs (K, 2) in which each static collider, −1 − k, is replaced by each of its cushions.
+
+    Args:
+        pairs: pairs of balls, and of balls with static colliders.
+        collider: as `Cushions.collider`.
+    """
+    is_static = (pairs < 0).any(axis=1)
+    if not is_static.any():
+        return pairs
+    ball, wall = pairs[is_static].max(axis=1), -1 - pairs[is_static].min(axis=1)
+    begin, end = np.searchsorted(collider, wall), np.searchsorted(collider, wall, side="right")
+    count = end - begin
+    cushion = np.arange(count.sum()) + np.repeat(begin - (np.cumsum(count) - count), count)
+    return np.concatenate((pairs[~is_static], np.column_stack((np.repeat(ball, count), -1 - cushion))))
+
+
+def _touching(pairs: IntArray, rows: FloatArray, collider: IntArray) -> ContactBatch:
+    """Return contacts as a batch, from their rows (K, WIDTH); `collider` as in `Cushions`."""
     is_touching = (rows[:, GAP] < 0.0) | rows[:, IMPULSE_X : IMPULSE_X + 2].any(axis=1)  # other pairs were only close
     pairs, rows = pairs[is_touching], rows[is_touching]
     if not len(pairs):
         return NO_CONTACTS
     vectors = (_complex(rows[:, k : k + 2]) for k in (IMPULSE_X, NORMAL_X, POINT_X))
     impulse, normal, point = vectors
-    return ContactBatch(pairs[:, 0].copy(), pairs[:, 1].copy(), -impulse, normal, point)
+    second = pairs[:, 1].copy()
+    static = second < 0
+    second[static] = -1 - collider[-1 - second[static]]
+    return ContactBatch(pairs[:, 0].copy(), second, -impulse, normal, point)
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:

@@ -179,8 +179,9 @@ class StaticGeometry:
         nearest = np.full(count, np.inf)
         np.minimum.at(nearest, group, first2)
 
-        # A contact at the start is with the nearest segment, or with those at the same distance.
-        rested = known[group] & (first2 <= nearest[group] + TOLERANCE * contact**2)
+        # A contact at the start is with the nearest segments, unless the body has bounced off another one.
+        touched = first2 <= ((1.0 + TOLERANCE) * contact) ** 2
+        rested = known[group] & touched & (first2 <= nearest[group] + TOLERANCE * contact**2)
         through = _any(crossed & apart & ~rested, group, count)
         entered = _any(deep, group, count) & ~_any(~apart, group, count) & ~known
         in_time = history.found(when + 1, pair) & _any(approached, group, count)
