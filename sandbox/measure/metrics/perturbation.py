@@ -21,17 +21,20 @@ ULPS = 4.0
 """A coordinate so large that 1e-12 m is below its rounding is changed by this many units in the last place."""
 TOUCH_TOLERANCE = 1e-9
 """m: clearances and overlaps up to this count as contact; larger ones do not change by a displacement of 1e-12 m."""
+JITTER = 0.45
+"""Random displacement of touching bodies as a fraction of the gap: below 0.5, so that none closes."""
 PARALLEL_SINE = 1e-6
 """Sine of the angle up to which two contact normals count as parallel: their numerical derivative has seven digits."""
 
 
-def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -> Setup | None:
+def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, reverse: bool = False) -> Setup | None:
     """Return the scene with a displacement of every body that can collide or is attracted.
 
     The direction of each displacement follows from the state of the body and the seed, not from its index, so that an
-    additional body does not change those of the others. No contact is made or broken: a body with contacts in one
-    direction only, such as a box in a stack, moves perpendicular to it. Bodies that are wedged, such as the balls of a
-    rack, or joined, move together with all bodies that they are connected with. If that is not possible either, the
+    additional body does not change those of the others. No overlap is made: a body with contacts in one direction only,
+    such as a box in a stack, moves perpendicular to it. Bodies that are wedged or joined move together with all bodies
+    that they are connected with; without joints they also part, by some `amount` at each contact, as the balls of a
+    rack, so that impacts that reach several of them at once come in an order. If that is not possible either, the
     velocity changes by `amount` in m/s. Polygons without contacts are also rotated, by `amount` over their radius.
     Static and driven bodies are not displaced.
 
@@ -39,6 +42,8 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
         start: scene or setup; it stays unchanged.
         amount: displacement, m.
         seed: seed of the directions.
+        reverse: take the opposite directions. Of a scene and its reverse, one has impacts that are simultaneous in the
+            original in one order and the other in the opposite order.
 
     Returns:
         The perturbed setup; None if there is no such body, so that no difference can grow.
@@ -68,6 +73,8 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
         for label in labels if len(labels) > 1 else ():
             outward.setdefault(label, []).append(normal)
 
+    is_joined = np.isin(np.arange(len(bodies)), joined)
+    reversal = -1.0 if reverse else 1.0
     position, velocity, angle = bodies.position.copy(), bodies.velocity.copy(), bodies.angle.copy()
     mixed = _hash_rows(np.column_stack((bodies.position, bodies.velocity, bodies.radius)), seed)
     order = np.argsort(group, kind="stable")
@@ -75,16 +82,20 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
         if not able[members].any():
             continue
         chosen, label = int(mixed[members].min()), int(group[members[0]])
-        direction = _free_direction(chosen)
+        direction, along = reversal * _free_direction(chosen), None
         if label in outward:
             along = _perpendicular(outward[label])
             if along is None:
                 velocity[members] += amount * direction
                 continue
-            direction = along if chosen % 2 else -along
+            direction = reversal * (along if chosen % 2 else -along)
         elif len(members) == 1 and not bodies.round[label]:
             angle[label] += math.copysign(amount, direction[0]) / bodies.radius[label]
-        position[members] += _shift(position[members], amount * direction)
+        shift = _shift(position[members], amount * direction)
+        if len(members) > 1 and not is_joined[members].any():
+            jitter = np.stack([reversal * _free_direction(int(each)) for each in mixed[members]])
+            shift = shift + _parting(position[members], bodies.radius[members], amount, jitter, along)
+        position[members] += shift
     return replace(setup, bodies=replace(bodies, position=position, velocity=velocity, angle=angle))
 
 
@@ -173,6 +184,27 @@ def _shift(positions: FloatArray, wanted: FloatArray) -> FloatArray:
     smallest = np.sign(wanted) * 0.5 * ULPS * digit
     rounded = np.round(wanted / digit) * digit
     return np.where(np.abs(rounded) < np.abs(smallest), smallest, rounded)
+
+
+def _parting(
+    position: FloatArray, radius: FloatArray, amount: float, jitter: FloatArray, along: FloatArray | None
+) -> FloatArray:
+    """Return displacements that part M bodies in contact, (M, 2) m: a stretch about their centre, and a random part.
+
+    The gap between two discs of one size is 0.1 to 1.9 times `amount`, so that impacts can be passed on faster through
+    two gaps than through one. Bodies that can be displaced along a line only part by less across it.
+
+    Args:
+        position: centres, (M, 2) m.
+        radius: (M,) m.
+        amount: m.
+        jitter: random unit vectors, (M, 2).
+        along: unit vector of the line; None for displacements in the plane.
+    """
+    rounding = 16.0 * float(np.spacing(np.abs(position).max()))  # which must not close a gap
+    stretch = max(amount, rounding) / (2.0 * float(radius.min()))
+    shift: FloatArray = stretch * (position - position.mean(axis=0)) + JITTER * max(amount, rounding) * jitter
+    return shift if along is None else np.outer(shift @ along, along)
 
 
 def agreement_time(a: Trajectory, b: Trajectory, scene: Scene, tolerance: float) -> float:

@@ -192,7 +192,7 @@ def test_second_methods_that_do_not_converge_share_one_limit_of_work(monkeypatch
     assert {*tried} == {"other_0", "other_1", "other_2"}
 
 
-@pytest.mark.parametrize(("ends", "reason"), [("agrees_until", "smaller steps disagree"), ("horizon", "chaotic")])
+@pytest.mark.parametrize(("ends", "reason"), [("agrees_until", "smaller steps disagree"), ("horizon", "unpredictable")])
 def test_truth_names_the_first_of_two_reasons_to_end(ends: str, reason: str, monkeypatch: pytest.MonkeyPatch) -> None:
     original = witness.refine
 
@@ -203,7 +203,7 @@ def test_truth_names_the_first_of_two_reasons_to_end(ends: str, reason: str, mon
     install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk())
     truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
     assert truth.trusted_until == 0.3
-    assert [word for word in ("smaller steps disagree", "chaotic") if word in truth.about] == [reason]
+    assert [word for word in ("smaller steps disagree", "unpredictable") if word in truth.about] == [reason]
 
 
 def test_second_method_that_has_not_converged_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,10 +63,23 @@ def boxes(count: int) -> str:
     return "".join(f"[[box]]\nname = 'b{k}'\nposition = [0, {k + 0.5}]\nsize = [1, 1]\n" for k in range(count))
 
 
-def test_touching_balls_of_a_rack_are_displaced_together() -> None:
-    offset = displacements(loads(RACK + "[[ball]]\nname = 'cue'\nposition = [-5, 0]\nradius = 0.5\n"))
-    assert (offset[:-1] == offset[0]).all()
-    assert (offset[-1] != offset[0]).any()
+@pytest.mark.parametrize("reverse", [False, True])
+def test_touching_balls_of_a_rack_part_by_different_gaps(reverse: bool) -> None:
+    scene = loads(RACK)
+    other = perturb(scene, reverse=reverse)
+    pairs = [pair for pair, _ in touching_pairs(scene)]
+    assert len(pairs) == 18
+    positions = np.stack((scene.bodies.position, other.bodies.position))
+    gaps = [np.diff(clearance(scene, scene.bodies, positions, np.zeros((2, 10)), pair))[0] for pair in pairs]
+    assert min(gaps) > 0.09 * PERTURBATION  # 0.1 and rounding
+    assert max(gaps) < 2.0 * PERTURBATION
+    assert len(np.unique(np.round(np.divide(gaps, PERTURBATION), 2))) > 9  # rounding is 0.001 of it
+
+
+def test_reversed_perturbation_of_free_bodies_is_opposite() -> None:
+    scene = load(find("gas"))
+    # positions of 10 m have a resolution of 2e-15 m
+    assert displacements(scene, reverse=True) == pytest.approx(-displacements(scene), abs=4e-15)
 
 
 def test_boxes_of_a_stack_are_displaced_along_their_contacts() -> None:
