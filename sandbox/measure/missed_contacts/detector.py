@@ -136,6 +136,11 @@ class Audit:
             self._examine()
 
     @property
+    def has_bodies(self) -> bool:
+        """Whether any body can miss a contact."""
+        return len(self._core) > 0
+
+    @property
     def times(self) -> FloatArray:
         """Start of the substep of each missed contact, (M,) s."""
         self._examine()

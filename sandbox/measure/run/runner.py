@@ -31,7 +31,7 @@ from sandbox.scene.description.base import MAX_STEPS
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import as_scene
-from sandbox.schedule import Stretch, schedule
+from sandbox.schedule import ROUNDING, Stretch, schedule
 from sandbox.signals import reraise_interrupt
 from sandbox.trajectory import Contacts, Trajectory
 
@@ -220,6 +220,8 @@ class TimedAudit:
         self._simulation = simulation
         self._known, self._scene = len(simulation.bodies), simulation.scene
         self._layers_before = self._layers() if len(setup.scene.layers) > 1 else None
+        self._removed: list[int] = []
+        """indices of the bodies that were removed before the last substep"""
         self.seconds = 0.0
         """s, time spent in the audit"""
         simulation.watch(self)
@@ -228,14 +230,14 @@ class TimedAudit:
         """Audit one substep."""
         began = perf_counter()
         self._update(len(end))
-        self._audit(time, start, end, touching, self._shared_layers())
+        self._audit(time, self._without_removed(start, time), end, touching, self._shared_layers())
         self.seconds += perf_counter() - began
 
     def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
         """Audit many substeps, as `Audit.observe_path`; bodies that change their layer are not passed in this way."""
         began = perf_counter()
         self._update(path.shape[1])
-        self._audit.observe_path(times, path, pairs, self._shared_layers())
+        self._audit.observe_path(times, self._without_removed(path, times[0]), pairs, self._shared_layers())
         self.seconds += perf_counter() - began
 
     def _update(self, bodies: int) -> None:
@@ -247,6 +249,18 @@ class TimedAudit:
         if bodies != self._known:
             self._audit.joined(self._simulation.bodies)
             self._known = bodies
+
+    def _without_removed(self, position: FloatArray, time: float) -> FloatArray:
+        """Return positions (..., N, 2), m, with nan for bodies that were removed before a time, s."""
+        if not self._audit.has_bodies:
+            return position
+        retired = self._simulation.retired
+        if len(retired) != len(self._removed):  # some were removed since, perhaps at the end of this substep
+            self._removed = [body for body, when in retired.items() if when <= time * (1.0 + ROUNDING)]
+        if self._removed:
+            position = position.copy()
+            position[..., self._removed, :] = np.nan
+        return position
 
     def _layers(self) -> IntArray:
         """Return the layer of each body as a bit, (N,)."""
