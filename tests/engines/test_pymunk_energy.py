@@ -233,3 +233,18 @@ def test_contacts_that_separate_and_return_are_booked_once() -> None:
     ]
     # Munk2D starts a contact point that it remembers with its old impulse and reports that again.
     closed_account(scene_of(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)
+
+
+@pytest.mark.fail_slow(60)  # 400 substeps with a ledger
+def test_run_that_diverges_does_so_with_a_ledger_too() -> None:
+    # The moment of inertia of the ball is far below that of its mass at the pivot.
+    balls = [ball("tiny", 0, 0, angular_velocity=1.0) | {"radius": 1e-9}, ball("turned", 1, 3)]
+    joints = [
+        {"kind": "pivot", "between": ["tiny"], "at": [2.57, 0]},
+        {"kind": "motor", "between": ["turned"], "rate": 3.0},
+    ]
+    scene = scene_of(ball=balls, joint=joints, substeps=100, solver={"dt": 1 / 60}, world={"duration": 0.1})
+    plain, accounted = (sandbox.run(scene, "pymunk", audit=False, account=account) for account in (False, True))
+    assert (accounted.status, accounted.reason) == (plain.status, plain.reason)
+    assert plain.status == "diverged"
+    assert np.array_equal(accounted.position, plain.position, equal_nan=True)

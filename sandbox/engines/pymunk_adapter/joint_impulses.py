@@ -130,7 +130,7 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_s
     no_force = np.zeros((len(motor_links), 2))
     if not len(motor_links):
         return JointImpulses(motor_links.a, motor_links.b, no_force, no_force, no_force, np.zeros(0))
-    unknown = np.linalg.lstsq(_unit_responses(rigid, position, angle), _stacked(joint_sums), rcond=None)[0]
+    unknown = _least_squares(_unit_responses(rigid, position, angle), _stacked(joint_sums))
     first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
     signs = np.sign(unknown[first[rigid.kind == LinkKind.MOTOR]])
     return JointImpulses(
@@ -154,10 +154,17 @@ def set_unknown_sums(
         known: (N,) whether the sum on each body is known.
     """
     table, rows = _unit_responses(joints.by_kind.rigid, position, angle), np.repeat(known, 3)
-    unknown = np.linalg.lstsq(table[rows], _stacked(joint_sums)[rows], rcond=None)[0]
+    unknown = _least_squares(table[rows], _stacked(joint_sums)[rows])
     found = (table[~rows] @ unknown).reshape(-1, 3)
     others = np.flatnonzero(~known)
     joint_sums.linear[others], joint_sums.angular[others] = found[:, :2], found[:, 2]
+
+
+def _least_squares(table: FloatArray, sums: FloatArray) -> FloatArray:
+    """Return the impulses (U,) that fit sums (R,) best by a table (R, U); nan if a diverging state has overflowed."""
+    if not (np.isfinite(table).all() and np.isfinite(sums).all()):
+        return np.full(table.shape[1], np.nan)
+    return np.asarray(np.linalg.lstsq(table, sums, rcond=None)[0], dtype=np.float64)
 
 
 def _component_counts(links: JointArrays) -> IntArray:
