@@ -1,10 +1,10 @@
-"""Polygonal and compound bodies, drawn by a compiled rasteriser if numba is installed, else with pygame's polygons.
+"""Polygonal and compound bodies, drawn by a compiled rasteriser or with pygame's polygons.
 
-The two differ only in antialiasing. The rim of a body lies inside its edge.
+The two differ only in antialiasing. The scene decides: if it has more than `FEW_POLYGONS` such bodies and numba is
+installed, the compiled rasteriser draws them. The rim of a body lies inside its edge.
 """
 
 import math
-import sys
 
 import numpy as np
 import pygame
@@ -21,7 +21,7 @@ from sandbox.window.render.particles import flat_pixels, is_flat, packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf
 
 FEW_POLYGONS = 8
-"""Number of bodies up to which numba is not imported for their sake; its import takes 0.4 s."""
+"""Number of bodies of a scene up to which numba is not imported for their sake; its import takes 0.4 s."""
 ARC_ERROR = 0.1
 """px, largest distance between an arc and its chords"""
 MAX_ARC_CHORDS = 256
@@ -72,8 +72,8 @@ class PolygonRenderer:
         if style.hollow:
             line = np.full(len(indices), style.line)
         is_near = bool((np.abs(centre).max(axis=1) + bodies.radius[indices] * scale < SDL_COORDINATE_LIMIT).all())
-        worth = len(indices) > FEW_POLYGONS or "numba" in sys.modules
-        if worth and is_near and _in_one_pass(surface, geometry, indices, centre, angle, scale, colours, line, style):
+        is_many = np.count_nonzero(~bodies.round) > FEW_POLYGONS
+        if is_many and is_near and _in_one_pass(surface, geometry, indices, centre, angle, scale, colours, line, style):
             return
         rows = zip(
             indices.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True

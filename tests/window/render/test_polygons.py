@@ -1,6 +1,7 @@
 """Bodies of other shapes than discs: filling, edges, and agreement of the compiled and the pygame renderer."""
 
 import math
+import sys
 
 import numpy as np
 import pygame
@@ -91,6 +92,21 @@ def test_compiled_and_pygame_rims_of_hollow_bodies_agree(shape, antialias):
         assert differ.max() < 0.02  # a colour is rounded once or twice
     else:
         assert (differ > 0.02).sum() <= 4  # the centre of a pixel may be on the edge within rounding
+
+
+@pytest.mark.parametrize(("boxes", "is_compiled"), [(1, False), (8, False), (9, True)])
+@pytest.mark.parametrize("shown", [1, 9])
+def test_rasteriser_depends_on_the_scene_only(boxes: int, is_compiled: bool, shown: int, monkeypatch) -> None:
+    calls = []
+    monkeypatch.setattr(module, "_in_one_pass", lambda *_: bool(calls.append(True)) or True)
+    monkeypatch.setattr(module, "_draw_plain", lambda *_: None)
+    monkeypatch.setitem(sys.modules, "numba", object())  # whether anything else has imported it does not matter
+    bodies = scene(box=[{"size": [1, 1], "position": [2 * k, 0]} for k in range(boxes)]).bodies
+    indices, tint = np.arange(min(shown, boxes)), np.zeros((min(shown, boxes), 3), np.uint8)
+    surface, style = pygame.Surface((240, 240), 0, 32), CircleStyle(0.0, False, True)
+    centre = np.full((len(indices), 2), 120.0)
+    PolygonRenderer().draw(surface, bodies, indices, centre, bodies.angle[indices], 20.0, tint, style)
+    assert bool(calls) == is_compiled
 
 
 @pytest.mark.parametrize("few", [0, 100])
