@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from sandbox.scene.description.world import Settings, World
     from sandbox.scene.errors import Fault, SceneError
     from sandbox.scene.files.load import dumps, load, loads
-    from sandbox.trajectory import Contacts, Frame, Trajectory
+    from sandbox.trajectory import Contacts, Frame, RunFailedError, Trajectory
 
 __all__ = [
     "ENGINES",
@@ -91,6 +91,7 @@ __all__ = [
     "Refusal",
     "Remove",
     "Reshape",
+    "RunFailedError",
     "Scene",
     "SceneError",
     "SetParameter",
@@ -158,6 +159,7 @@ _HOMES = {
     "Refusal": "sandbox.engines.contract",
     "Remove": "sandbox.action",
     "Reshape": "sandbox.action",
+    "RunFailedError": "sandbox.trajectory",
     "Scene": "sandbox.scene.compile.scene",
     "SceneError": "sandbox.scene.errors",
     "SetParameter": "sandbox.action",

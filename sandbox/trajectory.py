@@ -168,6 +168,22 @@ class Contacts:
             yield ContactEvent(time, *map(tuple, vectors))
 
 
+class RunFailedError(RuntimeError):
+    """A run was refused, diverged or failed.
+
+    Attributes:
+        run: the run, with the frames up to its end.
+    """
+
+    def __init__(self, run: "Trajectory") -> None:
+        super().__init__(f"{run.info['engine']}: {run.status}: {run.reason}")
+        self.run = run
+
+    def __reduce__(self) -> tuple[type[Self], tuple["Trajectory"]]:
+        """Keep the run when the error is pickled for another process."""
+        return type(self), (self.run,)
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory(HtmlRepr):
     """Recorded run: T frames of N bodies, and C contacts. The attributes are the arrays of a stored run."""
@@ -302,6 +318,16 @@ class Trajectory(HtmlRepr):
         """Reason for a status other than `ok`; None if the status is `ok`."""
         reason = self.info["reason"]
         return None if reason is None else str(reason)
+
+    def raise_if_failed(self) -> Self:
+        """Return the run if its status is `ok`.
+
+        Raises:
+            RunFailedError: it is not; a refused run has no frames.
+        """
+        if self.status != "ok":
+            raise RunFailedError(self)
+        return self
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -47,6 +47,7 @@ def run(
     on_progress: ProgressCallback | None = None,
     bout: HeadlessGame | None = None,
     on_work: WorkCallback | None = None,
+    strict: bool = False,
     **settings: Any,
 ) -> Trajectory:
     """Run a scene from start to end.
@@ -62,6 +63,7 @@ def run(
         bout: game played during the run; the run ends with the game. Its actions are among those of the result.
         on_work: callback with the steps done and the work counters. An exception that it raises ends the run without a
             result.
+        strict: raise `RunFailedError` unless the status of the run is `ok`, as `Trajectory.raise_if_failed`.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Returns:
@@ -72,6 +74,7 @@ def run(
 
     Raises:
         UnknownEngineError: no engine has that name.
+        RunFailedError: with `strict`, the run was refused, diverged or failed.
         SceneError: the name or path is not that of a valid scene.
         TooLargeError: the frames would not fit into memory, or the number of steps exceeds the limit.
         pydantic.ValidationError: a setting is invalid.
@@ -88,7 +91,8 @@ def run(
         if account:
             simulation.account()
     except Refusal as refusal:
-        return run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
+        refused = run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
+        return refused.raise_if_failed() if strict else refused
     resolved = simulation.settings
     bodies = len(setup.bodies) + sum(isinstance(action, Spawn) for action in actions)
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
@@ -110,7 +114,7 @@ def run(
         info["causes"] = [cause.value for cause in Cause]
     trajectory = _recorded_run(setup, simulation, recorder, end, timed_audit, info)
     simulation.close()
-    return trajectory
+    return trajectory.raise_if_failed() if strict else trajectory
 
 
 def _schedule(scene: Scene, settings: Settings, actions: tuple[Action, ...]) -> list[Stretch]:

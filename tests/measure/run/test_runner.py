@@ -2,8 +2,11 @@
 
 import json
 import math
+import pickle
+import re
 from decimal import Decimal
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +23,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, loads
-from sandbox.trajectory import Trajectory
+from sandbox.trajectory import RunFailedError, Trajectory
 
 CROWD = """
 title = "Crowd"
@@ -323,3 +326,32 @@ def test_progress_increases_to_1() -> None:
     assert fractions[-1] == 1.0
     assert fractions == sorted(fractions)
     assert fractions[0] > 0.0
+
+
+# Runs that do not reach their end
+
+
+@pytest.mark.parametrize(
+    ("settings", "actions", "status"),
+    [
+        ({"integrator": "rk4"}, (), "refused"),
+        ({}, (Force(time=0.0, body="a", force=(1e14, 0.0)),), "diverged"),
+        ({}, (Remove(time=0.1, body="a"), Impulse(time=0.2, body="a", impulse=(1.0, 0.0))), "failed"),
+    ],
+)
+def test_run_that_is_not_ok_raises_only_if_asked(
+    settings: dict[str, Any], actions: tuple[Action, ...], status: str
+) -> None:
+    done = run(flight(1.0), "pymunk", actions=actions, **settings)
+    assert done.status == status
+    with pytest.raises(RunFailedError, match=f"^pymunk: {status}: ") as caught:
+        done.raise_if_failed()
+    assert caught.value.run is done
+    assert pickle.loads(pickle.dumps(caught.value)).run.reason == done.reason
+    with pytest.raises(RunFailedError, match=re.escape(str(done.reason))):
+        run(flight(1.0), "pymunk", actions=actions, strict=True, **settings)
+
+
+def test_run_that_is_ok_is_returned_by_raise_if_failed() -> None:
+    done = run(flight(1.0), strict=True)
+    assert done.raise_if_failed() is done
