@@ -204,9 +204,9 @@ def starting_errors(scene: Scene) -> FloatArray:
 def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     """Return the largest relative error of any joint in any frame; None if the scene has no constraint.
 
-    Lengths are relative to the length of the rod or rope, or the bound of the slide; if that is 0, and for pivots and
-    grooves, to the diameter of the smaller body. Angles are in rad. Only recorded frames count, so that with
-    `record_every` larger errors can occur between them. The error of a diverged state is infinite.
+    Lengths are relative to the length of the rod or rope, or the bound of the slide; if that is negligible, and for
+    pivots and grooves, to the size of the smaller moving body (`joint_scales`). Angles are in rad. Only recorded frames
+    count, so that with `record_every` larger errors can occur between them. The error of a diverged state is infinite.
     """
     setup = Setup.of(start)
     links = setup.links
@@ -218,12 +218,29 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
 
 
 def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
-    """Return the scale of the error of each joint, (J,): a length in m, or 1 rad."""
-    diameter = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
+    """Return the scale of the error of each joint, (J,): a length in m, or 1 rad.
+
+    It is the first of these lengths that is not `NEGLIGIBLE` against the largest of them: the length of the rod or
+    rope, or the bound of the slide; the diameter of the smaller body, and of the larger one; the longer arm of the
+    anchors. A body that cannot move does not count beside one that can: a static body may be a point.
+    """
     length = np.where(np.isin(links.kind, (LinkKind.ROD, LinkKind.PULLEY)), links.figures[:, 0], 0.0)
     length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
+    ends = np.column_stack((links.a, links.b))
+    arms = np.hypot(*np.stack((links.anchor_a, links.anchor_b)).transpose(2, 1, 0))
+    counts = (ends >= 0) & ~bodies.immovable[ends]
+    counts |= (ends >= 0) & ~counts.any(axis=1, keepdims=True)
+    diameter = 2.0 * bodies.radius[ends]
+    small = np.where(counts, diameter, np.inf).min(axis=1)
+    large, arm = (np.where(counts, each, 0.0).max(axis=1) for each in (diameter, arms))
+    candidates = np.column_stack((length, small, large, arm))
+    first = (candidates > NEGLIGIBLE * candidates.max(axis=1, keepdims=True)).argmax(axis=1)
     turning = np.isin(links.kind, (LinkKind.ROTARY_LIMIT, LinkKind.GEAR))
-    return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, diameter)))
+    return np.asarray(np.where(turning, 1.0, candidates[np.arange(len(first)), first]))
+
+
+NEGLIGIBLE = 1e-3
+"""Fraction of the largest length of a joint and its bodies below which a length is no scale of an error."""
 
 
 def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.measure.metrics.invariants import joint_error, joint_errors
+from sandbox.measure.metrics.invariants import joint_error, joint_errors, joint_scales
 from sandbox.measure.run.runner import run
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import from_document, loads
 from tests.measure.metrics.test_energy import resting_run
 
 TWO = """
@@ -98,3 +98,24 @@ def test_diverged_joint_has_infinite_error() -> None:
 def test_scene_without_joints_has_no_joint_error() -> None:
     scene = loads(TWO)
     assert run(scene, audit=False).info["joint_error"] is None
+
+
+@pytest.mark.parametrize("kind", ["pivot", "rod"])
+def test_scale_of_an_error_does_not_depend_on_the_order_of_the_bodies_or_on_points(kind: str) -> None:
+    """A plank of 0.4 m hangs by its end from the world, from a static point, or from one that moves."""
+    plank = {"name": "plank", "position": [0.2, 0.0], "size": [0.4, 0.05]}
+    point = {"name": "point", "position": [0.0, 0.0], "radius": 1e-9, "mass": 1.0}
+    anchors, found = [[-0.2, 0.0], [0.0, 0.0]], []
+    for ball in ([], [{**point, "fixed": True}], [point]):
+        between = ["plank", "point"] if ball else ["plank"]
+        for names, ends in ((between, anchors), (between[::-1], anchors[::-1])) if ball else ((between, anchors),):
+            joint = {"kind": kind, "between": names, "anchors": ends, **({"length": 0.0} if kind == "rod" else {})}
+            scene = from_document({"box": [plank], "ball": ball, "joint": [joint]})
+            found += joint_scales(scene.links, scene.bodies).tolist()
+    assert found == pytest.approx([math.hypot(0.4, 0.05)] * len(found), rel=1e-12)  # rounding
+
+
+def test_scale_of_an_error_of_points_is_the_longer_arm_of_their_joint() -> None:
+    points = [{"name": name, "position": [x, 0.0], "radius": 1e-9} for name, x in (("a", 0.0), ("b", 2.57))]
+    scene = from_document({"ball": points, "joint": [{"kind": "pivot", "between": ["a", "b"], "at": [2.57, 0.0]}]})
+    assert joint_scales(scene.links, scene.bodies).tolist() == [2.57]
