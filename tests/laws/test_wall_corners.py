@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.measure.run.runner import run
@@ -66,6 +66,7 @@ def test_ball_that_leaves_through_a_corner_is_counted_as_missed(shot: tuple[floa
 @pytest.mark.fail_slow(60)  # compiles the stepper
 @pytest.mark.parametrize("engine", ["reference", "pymunk"])
 @given(st.floats(0.1, 4.4), st.floats(0.5, 3.0), st.sampled_from([0.0, -0.01, -1.0]), st.floats(-1e-3, 1e-3))
+@example(x=1.15, vx=1.0, vy=0.0, gap=-2e-4)  # it overlaps an edge that bends away, and comes to the next one
 def test_vertices_of_a_wall_that_is_almost_straight_do_nothing(
     engine: str, x: float, vx: float, vy: float, gap: float
 ) -> None:
@@ -74,5 +75,6 @@ def test_vertices_of_a_wall_that_is_almost_straight_do_nothing(
         run(scene_of(walls, [x, RADIUS + gap], [vx, vy], 0.5), engine, audit=False) for walls in (plain, WITH_VERTICES)
     )
     on_wall = one.position[:, 0, 0] < SIDE  # beyond it, the ball passes the end
-    # 46 edges are tilted by 1e-6 to either side; the end of an edge would deflect a ball that overlaps it by 0.1 rad.
-    assert np.allclose(one.position[on_wall], many.position[on_wall], rtol=0.0, atol=1e-4)
+    # Edges are tilted by 1e-6, and hits on them remove an overlap up to the slop, 0.3 mm, in which a ball rests on a
+    # straight wall. The end of an edge would deflect a ball by 0.1 rad.
+    assert np.allclose(one.position[on_wall], many.position[on_wall], rtol=0.0, atol=4e-4)

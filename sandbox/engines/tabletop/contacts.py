@@ -89,8 +89,8 @@ def distance_to_cushion(
 def is_nearer_to_neighbour(cushions: Cushions, k: int, x: float, y: float) -> bool:
     """Return whether a point is nearer to the next edge of the wall than to cushion k.
 
-    An end that two edges share acts only where both edges end there; otherwise a ball that slides along a straight wall
-    would bounce off the ends of its edges.
+    An end that two edges share acts only where both are nearest there; otherwise a ball that slides along a slightly
+    bent wall would bounce off the ends of its edges.
     """
     s = k - len(cushions.planes)
     if s < 0:

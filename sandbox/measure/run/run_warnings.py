@@ -11,11 +11,12 @@ import numpy as np
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS, energy_gain
 from sandbox.scene.compile.scene import Scene
+from sandbox.schedule import ROUNDING
 from sandbox.trajectory import Trajectory
 
 MAX_ENERGY_GAIN = 0.1
 """Energy counts as created if it exceeds its initial value by a larger fraction of the exchanged energy: position
-correction and explicit Euler in free fall add less at usual steps.
+correction adds less at usual steps.
 """
 MAX_FRAMES = 200
 """Largest number of frames at which the energy is computed."""
@@ -30,7 +31,7 @@ def run_warnings(run: Trajectory, scene: Scene, energy: tuple[float, float]) -> 
         energy: total energy at its start and end, J.
     """
     end, duration = float(run.time[-1]), scene.world.duration
-    if end > duration * (1.0 + 1e-9) and "game" not in run.info:
+    if end > duration * (1.0 + ROUNDING) and "game" not in run.info:
         name = run.info["engine"]
         yield f"{name} makes whole steps of dt only: the run ends at {end:.6g} s, after its duration of {duration:g} s"
     if run.info["engine"] == "reference" and (text := wasted_integrator(scene, run.info["settings"])):

@@ -13,7 +13,7 @@ from sandbox.measure.metrics.clearance import clearance
 from sandbox.measure.metrics.perturbation import PERTURBATION, agreement_time, perturb, touching_pairs
 from sandbox.scene.compile.contacts import pair_table
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from tests.runs_by_hand import run_of, scene_of
 from tests.samples import each_shipped_scene
@@ -74,6 +74,27 @@ def test_touching_balls_of_a_rack_part_by_different_gaps(reverse: bool) -> None:
     assert min(gaps) > 0.09 * PERTURBATION  # 0.1 and rounding
     assert max(gaps) < 2.0 * PERTURBATION
     assert len(np.unique(np.round(np.divide(gaps, PERTURBATION), 2))) > 9  # rounding is 0.001 of it
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize("seed", range(20))
+def test_parting_discs_of_a_pyramid_on_a_floor_do_not_overlap(seed: int, reverse: bool) -> None:
+    rows = [(row, k) for row in range(4) for k in range(4 - row)]
+    positions = [[k + 0.5 * row, 0.5 + row * math.sqrt(0.75)] for row, k in rows]
+    scene = from_document(
+        {
+            "plane": [{"point": [0, 0], "normal": [0, 1]}],
+            "ball": [{"position": position, "radius": 0.5} for position in positions],
+        }
+    )
+    other = perturb(scene, seed=seed, reverse=reverse)
+    poses = np.stack((scene.bodies.position, other.bodies.position))
+    parted = 0
+    for pair, _ in touching_pairs(scene):
+        gap = np.diff(clearance(scene, scene.bodies, poses, np.zeros((2, len(rows))), pair))[0]
+        assert gap >= -1e-15  # rounding of positions up to 4 m
+        parted += gap > 0.01 * PERTURBATION
+    assert parted == 18  # all but the four contacts with the floor
 
 
 def test_reversed_perturbation_of_free_bodies_is_opposite() -> None:
