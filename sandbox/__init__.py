@@ -14,190 +14,112 @@ Each public name is imported when it is first used, so `import sandbox` takes a 
 import importlib
 from typing import TYPE_CHECKING, Any
 
+# For type checkers: the names of `_NAMES`, each exported by its `as`
 if TYPE_CHECKING:
     from sandbox.action import (
-        ActionError,
-        Drive,
-        Force,
-        Impulse,
-        Launch,
-        Move,
-        Pull,
-        Remove,
-        Reshape,
-        SetParameter,
-        Spawn,
-        Strike,
-        Switch,
-        Throttle,
-        Toggle,
+        ActionError as ActionError,
+        Drive as Drive,
+        Force as Force,
+        Impulse as Impulse,
+        Launch as Launch,
+        Move as Move,
+        Pull as Pull,
+        Remove as Remove,
+        Reshape as Reshape,
+        SetParameter as SetParameter,
+        Spawn as Spawn,
+        Strike as Strike,
+        Switch as Switch,
+        Throttle as Throttle,
+        Toggle as Toggle,
     )
-    from sandbox.batch.query import StoredRuns, open_store
-    from sandbox.batch.store import Store
-    from sandbox.engines.contract import Divergence, Refusal
-    from sandbox.engines.exact.tabletop.shots import Table
-    from sandbox.engines.pymunk_adapter.capture import CaptureError, CaptureWarning, from_pymunk
-    from sandbox.engines.pymunk_adapter.game_capture import GameCapture, capture
-    from sandbox.engines.reference.integrate import IntegrationResult, integrate
-    from sandbox.engines.reference.integrators import INTEGRATORS
-    from sandbox.engines.registry import ENGINES, UnknownEngineError
-    from sandbox.engines.switching import start
-    from sandbox.frame_table import FrameTable
-    from sandbox.games.billiards.shots import horizon, odds, sensitivity, windows
-    from sandbox.games.billiards.shots.shot import Spread
-    from sandbox.measure.compare import compare
-    from sandbox.measure.run.ensemble import Ensemble, ensemble
-    from sandbox.measure.run.runner import run
-    from sandbox.measure.run.sessions import play_out
-    from sandbox.measure.tradeoff import tradeoff
-    from sandbox.recording import Recording
-    from sandbox.scene.compile.demands import demands
-    from sandbox.scene.compile.scene import Scene
-    from sandbox.scene.compile.setup import Setup
-    from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
-    from sandbox.scene.description.discs import Ball
-    from sandbox.scene.description.surface import Stroke
-    from sandbox.scene.description.world import Settings, World
-    from sandbox.scene.errors import Fault, SceneError
-    from sandbox.scene.files.load import dumps, load, loads
-    from sandbox.trajectory import Contacts, Frame, RunFailedError, Trajectory
+    from sandbox.batch.query import StoredRuns as StoredRuns, open_store as open_store
+    from sandbox.batch.store import Store as Store
+    from sandbox.engines.contract import Divergence as Divergence, Refusal as Refusal
+    from sandbox.engines.exact.tabletop.shots import Table as Table
+    from sandbox.engines.reference.integrate import IntegrationResult as IntegrationResult, integrate as integrate
+    from sandbox.engines.reference.integrators import INTEGRATORS as INTEGRATORS
+    from sandbox.engines.registry import ENGINES as ENGINES, UnknownEngineError as UnknownEngineError
+    from sandbox.engines.switching import start as start
+    from sandbox.frame_table import FrameTable as FrameTable
+    from sandbox.games.billiards.shots import (
+        horizon as horizon,
+        odds as odds,
+        sensitivity as sensitivity,
+        windows as windows,
+    )
+    from sandbox.games.billiards.shots.shot import Spread as Spread
+    from sandbox.measure.compare import compare as compare
+    from sandbox.measure.run.ensemble import Ensemble as Ensemble, ensemble as ensemble
+    from sandbox.measure.run.runner import run as run
+    from sandbox.measure.run.sessions import play_out as play_out
+    from sandbox.measure.tradeoff import tradeoff as tradeoff
+    from sandbox.pymunk_capture.game_capture import GameCapture as GameCapture, capture as capture
+    from sandbox.pymunk_capture.space_capture import (
+        CaptureError as CaptureError,
+        CaptureWarning as CaptureWarning,
+        from_pymunk as from_pymunk,
+    )
+    from sandbox.recording import Recording as Recording
+    from sandbox.scene.compile.demands import demands as demands
+    from sandbox.scene.compile.scene import Scene as Scene
+    from sandbox.scene.compile.setup import Setup as Setup
+    from sandbox.scene.description.bodies import (
+        Box as Box,
+        Capsule as Capsule,
+        Compound as Compound,
+        Polygon as Polygon,
+    )
+    from sandbox.scene.description.discs import Ball as Ball
+    from sandbox.scene.description.surface import Stroke as Stroke
+    from sandbox.scene.description.world import Settings as Settings, World as World
+    from sandbox.scene.errors import Fault as Fault, SceneError as SceneError, SettingsError as SettingsError
+    from sandbox.scene.files.load import dumps as dumps, load as load, loads as loads
+    from sandbox.trajectory import (
+        Contacts as Contacts,
+        Frame as Frame,
+        RunFailedError as RunFailedError,
+        Trajectory as Trajectory,
+    )
 
-__all__ = [
-    "ENGINES",
-    "INTEGRATORS",
-    "ActionError",
-    "Ball",
-    "Box",
-    "Capsule",
-    "CaptureError",
-    "CaptureWarning",
-    "Compound",
-    "Contacts",
-    "Divergence",
-    "Drive",
-    "Ensemble",
-    "Fault",
-    "Force",
-    "Frame",
-    "FrameTable",
-    "GameCapture",
-    "Impulse",
-    "IntegrationResult",
-    "Launch",
-    "Move",
-    "Polygon",
-    "Pull",
-    "Recording",
-    "Refusal",
-    "Remove",
-    "Reshape",
-    "RunFailedError",
-    "Scene",
-    "SceneError",
-    "SetParameter",
-    "Settings",
-    "Setup",
-    "Spawn",
-    "Spread",
-    "Store",
-    "StoredRuns",
-    "Strike",
-    "Stroke",
-    "Switch",
-    "Table",
-    "Throttle",
-    "Toggle",
-    "Trajectory",
-    "UnknownEngineError",
-    "World",
-    "capture",
-    "compare",
-    "demands",
-    "dumps",
-    "ensemble",
-    "from_pymunk",
-    "horizon",
-    "integrate",
-    "load",
-    "loads",
-    "odds",
-    "open_store",
-    "play_out",
-    "run",
-    "sensitivity",
-    "start",
-    "tradeoff",
-    "windows",
-]
-
-_HOMES = {
-    "ENGINES": "sandbox.engines.registry",
-    "INTEGRATORS": "sandbox.engines.reference.integrators",
-    "ActionError": "sandbox.action",
-    "Ball": "sandbox.scene.description.discs",
-    "Box": "sandbox.scene.description.bodies",
-    "Capsule": "sandbox.scene.description.bodies",
-    "CaptureError": "sandbox.engines.pymunk_adapter.capture",
-    "CaptureWarning": "sandbox.engines.pymunk_adapter.capture",
-    "Compound": "sandbox.scene.description.bodies",
-    "Contacts": "sandbox.trajectory",
-    "Divergence": "sandbox.engines.contract",
-    "Drive": "sandbox.action",
-    "Ensemble": "sandbox.measure.run.ensemble",
-    "Fault": "sandbox.scene.errors",
-    "Force": "sandbox.action",
-    "Frame": "sandbox.trajectory",
-    "FrameTable": "sandbox.frame_table",
-    "GameCapture": "sandbox.engines.pymunk_adapter.game_capture",
-    "Impulse": "sandbox.action",
-    "IntegrationResult": "sandbox.engines.reference.integrate",
-    "Launch": "sandbox.action",
-    "Move": "sandbox.action",
-    "Polygon": "sandbox.scene.description.bodies",
-    "Pull": "sandbox.action",
-    "Recording": "sandbox.recording",
-    "Refusal": "sandbox.engines.contract",
-    "Remove": "sandbox.action",
-    "Reshape": "sandbox.action",
-    "RunFailedError": "sandbox.trajectory",
-    "Scene": "sandbox.scene.compile.scene",
-    "SceneError": "sandbox.scene.errors",
-    "SetParameter": "sandbox.action",
-    "Settings": "sandbox.scene.description.world",
-    "Setup": "sandbox.scene.compile.setup",
-    "Spawn": "sandbox.action",
-    "Spread": "sandbox.games.billiards.shots.shot",
-    "Strike": "sandbox.action",
-    "Store": "sandbox.batch.store",
-    "Stroke": "sandbox.scene.description.surface",
-    "Switch": "sandbox.action",
-    "Table": "sandbox.engines.exact.tabletop.shots",
-    "Throttle": "sandbox.action",
-    "Toggle": "sandbox.action",
-    "Trajectory": "sandbox.trajectory",
-    "UnknownEngineError": "sandbox.engines.registry",
-    "World": "sandbox.scene.description.world",
-    "capture": "sandbox.engines.pymunk_adapter.game_capture",
-    "compare": "sandbox.measure.compare",
-    "demands": "sandbox.scene.compile.demands",
-    "dumps": "sandbox.scene.files.load",
-    "ensemble": "sandbox.measure.run.ensemble",
-    "from_pymunk": "sandbox.engines.pymunk_adapter.capture",
-    "horizon": "sandbox.games.billiards.shots",
-    "integrate": "sandbox.engines.reference.integrate",
-    "load": "sandbox.scene.files.load",
-    "loads": "sandbox.scene.files.load",
-    "open_store": "sandbox.batch.query",
-    "StoredRuns": "sandbox.batch.query",
-    "odds": "sandbox.games.billiards.shots",
-    "play_out": "sandbox.measure.run.sessions",
-    "run": "sandbox.measure.run.runner",
-    "sensitivity": "sandbox.games.billiards.shots",
-    "start": "sandbox.engines.switching",
-    "tradeoff": "sandbox.measure.tradeoff",
-    "windows": "sandbox.games.billiards.shots",
+_NAMES = {
+    "sandbox.action": (
+        "ActionError Drive Force Impulse Launch Move Pull Remove Reshape SetParameter Spawn Strike Switch "
+        "Throttle Toggle"
+    ),
+    "sandbox.batch.query": "StoredRuns open_store",
+    "sandbox.batch.store": "Store",
+    "sandbox.engines.contract": "Divergence Refusal",
+    "sandbox.engines.exact.tabletop.shots": "Table",
+    "sandbox.engines.reference.integrate": "IntegrationResult integrate",
+    "sandbox.engines.reference.integrators": "INTEGRATORS",
+    "sandbox.engines.registry": "ENGINES UnknownEngineError",
+    "sandbox.engines.switching": "start",
+    "sandbox.frame_table": "FrameTable",
+    "sandbox.games.billiards.shots": "horizon odds sensitivity windows",
+    "sandbox.games.billiards.shots.shot": "Spread",
+    "sandbox.measure.compare": "compare",
+    "sandbox.measure.run.ensemble": "Ensemble ensemble",
+    "sandbox.measure.run.runner": "run",
+    "sandbox.measure.run.sessions": "play_out",
+    "sandbox.measure.tradeoff": "tradeoff",
+    "sandbox.pymunk_capture.game_capture": "GameCapture capture",
+    "sandbox.pymunk_capture.space_capture": "CaptureError CaptureWarning from_pymunk",
+    "sandbox.recording": "Recording",
+    "sandbox.scene.compile.demands": "demands",
+    "sandbox.scene.compile.scene": "Scene",
+    "sandbox.scene.compile.setup": "Setup",
+    "sandbox.scene.description.bodies": "Box Capsule Compound Polygon",
+    "sandbox.scene.description.discs": "Ball",
+    "sandbox.scene.description.surface": "Stroke",
+    "sandbox.scene.description.world": "Settings World",
+    "sandbox.scene.errors": "Fault SceneError SettingsError",
+    "sandbox.scene.files.load": "dumps load loads",
+    "sandbox.trajectory": "Contacts Frame RunFailedError Trajectory",
 }
-
+"""Public names by the module that has them."""
+_HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
+__all__ = sorted(_HOMES, key=lambda name: (not name.isupper(), name))
 
 _PACKAGE = "sandbox2d"
 """Name of the distribution package."""

@@ -38,6 +38,13 @@ def format_percent(fraction: float) -> str:
     return f"{100 * fraction:.0f} %" if is_plain else f"{format_si(100 * fraction)} %"
 
 
+def format_fraction(fraction: float) -> str:
+    """Return a fraction that may exceed 1: in percent up to 1, such as `63 %`, and above as a multiple, `3.1 times`."""
+    if abs(fraction) <= 1.0:
+        return format_percent(fraction)
+    return f"{format_number(fraction)} times"
+
+
 def format_time(time: float, step: float = 0.01) -> str:
     """Return a time in seconds with enough decimals that each step changes it, such as `12.34 s` at 10 ms.
 

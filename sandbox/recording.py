@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from sandbox.action import Action, ActionError, Switch, actions_from_json, actions_to_json
 from sandbox.atomic_write import atomic_write
 from sandbox.echo import short_repr
+from sandbox.jsonable import to_json
 from sandbox.resource_limits import SESSION_SIZE, read_limited
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -31,6 +32,44 @@ class Press(NamedTuple):
     """name of the control"""
     value: float
     """new value of the control; 0 releases it"""
+
+
+@dataclass(frozen=True)
+class ReplayCheck:
+    """Comparison of the replay of a recorded game with the game."""
+
+    is_equal: bool
+    """whether all bodies have the states of the game after each step, bit for bit"""
+    step: int | None = None
+    """first step, from 1, after which a body has departed from the game by more than rounding; None if none has, or if
+    the step of the game varies, so that only the end can be compared"""
+    departed: str | None = None
+    """the body that has departed then"""
+    largest: float | None = None
+    """m, largest distance of any body from the game after any step; None if only the end can be compared"""
+    body: str | None = None
+    """body that is farthest from the game at the end, or is missing"""
+    distance: float | None = None
+    """m, of that body from the game at the end; None if it is missing, or the replay did not reach the end"""
+    reason: str | None = None
+    """why the replay did not reach the end; None if it did"""
+
+
+@dataclass(frozen=True)
+class RecordedGame:
+    """Program whose space was recorded: what the recording lacks, and how the program ended."""
+
+    omitted: tuple[str, ...] = ()
+    """what scene and actions cannot state, and a replay therefore lacks"""
+    inexact: tuple[str, ...] = ()
+    """reasons for which a replay may differ by rounding"""
+    end: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
+    """states of the bodies at the end of the game: x, y, m; velocity, m/s; angle, rad; angular velocity, rad/s; None
+    where pymunk has computed no finite number"""
+    state_hash: str | None = None
+    """hash of that state, as of a replay that equals the game; None if it was not computed"""
+    replay: ReplayCheck | None = None
+    """comparison of the replay with the game; None if there was none"""
 
 
 @dataclass(frozen=True)
@@ -56,6 +95,8 @@ class Recording:
     """changes of the controls of a game; the actions that resulted are in `actions`"""
     score: float | None = None
     """score of a game at the end; None if unknown"""
+    game: RecordedGame | None = None
+    """the program, if the session is that of a game outside the sandbox"""
     at: float | None = field(default=None, compare=False)
     """s, time to which the session had been rewound when it was saved; None if it was saved at its end"""
 
@@ -72,7 +113,8 @@ class Recording:
     def on(self, engine: str) -> Self:
         """Return the session with another engine from start to end.
 
-        `state_hash` and `score` of the result are None, because they depend on the engine.
+        `state_hash` and `score` of the result are None, because they depend on the engine; so is the check of a game's
+        replay.
 
         Args:
             engine: name of the engine.
@@ -81,7 +123,8 @@ class Recording:
             action.model_copy(update={"engine": None}) if isinstance(action, Switch) else action
             for action in self.actions
         )
-        return replace(self, engine=engine, actions=actions, state_hash=None, score=None)
+        game = None if self.game is None else replace(self.game, replay=None)
+        return replace(self, engine=engine, actions=actions, state_hash=None, score=None, game=game)
 
     def save(self, path: str | Path) -> Path:
         """Write the recording to a JSON file.
@@ -112,6 +155,8 @@ class Recording:
         }
         if self.presses or self.score is not None:
             document |= {"presses": [list(press) for press in self.presses], "score": self.score}
+        if self.game is not None:
+            document["game"] = to_json(self.game)
         if self.at is not None:
             document["at"] = self.at
         return json.dumps(document, indent=1, ensure_ascii=False)
@@ -147,6 +192,7 @@ class Recording:
                 state_hash=_part(document, "state_hash", (str, type(None))),
                 presses=presses_from(_part(document, "presses", list, [])),
                 score=_part(document, "score", (int, float, type(None)), None),
+                game=_game_from(_part(document, "game", (dict, type(None)), None)),
                 at=None if at is None else float(at),
             )
         except ActionError as error:
@@ -202,6 +248,24 @@ def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], 
     if not isinstance(value, kind) or isinstance(value, bool):
         raise ValueError(f"`{key}` is missing or of the wrong type")
     return value
+
+
+_GAME: TypeAdapter[RecordedGame] = TypeAdapter(RecordedGame)
+
+
+def _game_from(value: Mapping[str, Any] | None) -> RecordedGame | None:
+    """Read the program of a recording from JSON values.
+
+    Raises:
+        ValueError: a value has another type.
+    """
+    if value is None:
+        return None
+    try:
+        return _GAME.validate_json(json.dumps(value), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"`game`: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
 
 
 def presses_from(values: Sequence[Any]) -> tuple[Press, ...]:

@@ -119,6 +119,15 @@ class GameInfo(StoredPart):
     lamps: tuple[tuple[Time, tuple[str, ...]], ...] = ()
 
 
+class WorstJointInfo(StoredPart):
+    """The joint with the largest relative error of a run."""
+
+    name: str
+    error: float
+    """m or rad; may be infinite after a divergence"""
+    unit: Literal["m", "rad"]
+
+
 class Info(StoredPart):
     """Description and results of a run, as `measure.run` writes them. Earlier versions lack the keys with defaults."""
 
@@ -141,6 +150,7 @@ class Info(StoredPart):
     """J; may be infinite or nan after a divergence"""
     energy_end: float | None
     joint_error: float | None = None
+    worst_joint: WorstJointInfo | None = None
     broken: StoredCount = 0
     causes: tuple[str, ...] = ()
     game: GameInfo | None = None

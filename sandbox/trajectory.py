@@ -231,8 +231,9 @@ class Trajectory(HtmlRepr):
     has a single layer"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """scene, engine, settings, actions, seed, status, reason, steps, seconds, work, energy_start, energy_end,
-    joint_error (the largest constraint violation, relative to a length; None without joints), broken (number of broken
-    joints), audited, state_hash (of the last state), versions; causes (names of the columns of `account`)"""
+    joint_error (the largest constraint violation, relative to a length; None without joints), worst_joint (its joint,
+    with the violation in m or rad), broken (number of broken joints), audited, state_hash (of the last state),
+    versions; causes (names of the columns of `account`)"""
 
     @classmethod
     def from_frames(

@@ -1,5 +1,6 @@
 """The public interface: names of `import sandbox`, their behaviour, and the cost of the import."""
 
+import ast
 import subprocess
 import sys
 from importlib.metadata import version
@@ -20,6 +21,13 @@ TEXT = '[world]\nduration = 0.1\n[[ball]]\nname = "a"\nposition = [0, 0]\nveloci
 def test_public_names_are_sorted_and_listed_by_dir() -> None:
     assert sandbox.__all__ == sorted(sandbox.__all__, key=lambda name: (not name.isupper(), name))
     assert dir(sandbox) == sorted(sandbox.__all__)
+
+
+def test_type_checkers_see_the_public_names() -> None:
+    tree = ast.parse(Path(sandbox.__file__).read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    seen = {(alias.asname, each.module) for each in imports for alias in each.names if alias.asname == alias.name}
+    assert seen == set(sandbox._HOMES.items())
 
 
 @pytest.mark.parametrize("name", sandbox.__all__)

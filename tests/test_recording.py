@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.action import Impulse
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording, ReplayCheck
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
@@ -25,6 +25,9 @@ RECORDING = Recording(
     actions=(Impulse(time=0.5, body="a", impulse=(1.0, 2.0)),),
     duration=1.5,
     state_hash="00ff",
+    game=RecordedGame(
+        ("a joint",), ("a rounding",), {"a": (0.5, None, 0.0, -1.0, 2.0, 3.0)}, "ff00", ReplayCheck(False, 3, "a", 0.5)
+    ),
 )
 
 
@@ -77,6 +80,18 @@ def test_text_that_is_not_a_recording_is_a_fault(text: str) -> None:
     assert fault_paths(text) == [""]
 
 
+@pytest.mark.parametrize("game", [{}, {"omitted": ["a"]}, {"inexact": []}, {"replay": {"is_equal": True}}, None])
+def test_keys_of_a_recorded_game_may_be_missing(game: dict[str, Any] | None) -> None:
+    """Recordings of earlier versions have no program, and later ones may have more keys."""
+    found = Recording.from_json(json.dumps({**document(), "game": game})).game
+    assert (found is None) == (game is None)
+    if found is not None and game is not None:
+        assert [*found.omitted] == game.get("omitted", [])
+    without = document()
+    del without["game"]
+    assert Recording.from_json(json.dumps(without)) == dataclasses.replace(RECORDING, game=None)
+
+
 @pytest.mark.parametrize("key", ["format", "scene", "engine", "settings", "actions", "duration"])
 def test_recording_without_a_required_key_is_a_fault(key: str) -> None:
     without = document()
@@ -89,6 +104,9 @@ def test_recording_without_a_required_key_is_a_fault(key: str) -> None:
     [
         ({"scene": 3}, ""), ({"engine": 3}, ""), ({"engine": None}, ""), ({"settings": []}, ""), ({"actions": {}}, ""),
         ({"duration": "1"}, ""), ({"duration": True}, ""), ({"duration": -1.0}, ""), ({"duration": math.nan}, ""),
+        ({"game": 3}, ""), ({"game": []}, ""), ({"game": {"omitted": "a joint"}}, ""), ({"game": {"replay": {}}}, ""),
+        ({"game": {"replay": {"is_equal": 1}}}, ""), ({"game": {"end": {"a": [True]}}}, ""),
+        ({"game": {"end": {"\ud800": 1}}}, ""),
         ({"duration": math.inf}, ""), ({"duration": 10**400}, ""), ({"state_hash": 3}, ""), ({"state_hash": []}, ""),
         ({"settings": {"dt": -1}}, "settings.dt"), ({"settings": {"zzz": -1}}, "settings.zzz"),
         ({"settings": {"\ud800": 1}}, "settings"), ({"actions": [3]}, "actions"), ({"actions": ["\ud800"]}, "actions"),

@@ -109,7 +109,7 @@ def _choices() -> dict[str, tuple[object, ...]]:
 
 
 def _accepts(engine: str, choice: dict[str, object]) -> bool:
-    """Tell whether an engine accepts a choice for one of the scenes that it may be for."""
+    """Return whether an engine accepts a choice for one of the scenes that it may be for."""
     for text in TRIALS:
         scene = sandbox.loads(text)
         if not ENGINES[engine].missing(scene, scene.solver.replace(**choice)):

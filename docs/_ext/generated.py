@@ -48,6 +48,6 @@ def _expand_page(_: Any, __: str, source: list[str]) -> None:
 
 
 def _is_generated(env: Any, page: str) -> bool:
-    """Tell whether a page has such blocks: those pages are read at every build, as the code may have changed."""
+    """Return whether a page has such blocks: those pages are read at every build, as the code may have changed."""
     path = Path(env.doc2path(page))
     return path.suffix == ".md" and "{generated}" in path.read_text(encoding="utf-8")

@@ -46,7 +46,7 @@ class ClusterExecutor:
         try:
             distributed: Any = importlib.import_module("distributed")  # its functions have no types
         except ImportError:
-            raise ExecutorError("a cluster needs the package distributed: pip install 'sandbox2d[cluster]'") from None
+            raise ExecutorError("a cluster needs the package distributed: pip install -e '.[cluster]'") from None
         is_file = address.endswith(".json")
         if not (Path(address).is_file() if is_file else ADDRESS.fullmatch(address)):
             raise ExecutorError(

@@ -275,7 +275,7 @@ def fetch(job: Job, store: Store, options: RunOptions) -> RunRecord | str | None
 
 
 def is_sufficient(stored: StoredRun, options: RunOptions) -> bool:
-    """Tell whether a stored run has all that the options ask for."""
+    """Return whether a stored run has all that the options ask for."""
     if options.force or stored.is_recorded_failure:
         return False
     if stored.status == "refused":
@@ -286,7 +286,7 @@ def is_sufficient(stored: StoredRun, options: RunOptions) -> bool:
 
 
 def is_audited(stored: StoredRun) -> bool:
-    """Tell whether the missed contacts of a stored run were counted."""
+    """Return whether the missed contacts of a stored run were counted."""
     return stored.missed_contacts is not None
 
 
@@ -311,8 +311,11 @@ def with_earlier_audit(job: Job, store: Store | None, options: RunOptions) -> Ru
 def identify(job: Job) -> tuple[Settings, str]:
     """Return the resolved settings of a job, and the id of its run."""
     settings = engine_named(job.engine).resolve(job.scene, job.scene.solver)
-    game = None if job.player is None else job.player.to_dict(job.scene)
-    return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)
+    if job.player is None:
+        game, deciding = None, versions(job.engine)
+    else:  # a player may try its actions on another engine
+        game, deciding = job.player.to_dict(job.scene), versions()
+    return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, deciding, job.actions, game)
 
 
 def _stored(job: Job, number: str, trajectory: Trajectory) -> StoredRun:
@@ -355,7 +358,11 @@ def _difference(run: Trajectory, job: Job, settings: Settings) -> str | None:
     for table in ("solver", "play") if job.player is None else ("solver",):  # they do not affect the run
         scene.pop(table, None)
         stated.pop(table, None)
-    wanted: dict[str, Any] = {"engine": job.engine, "seed": job.scene.world.seed, "versions": dict(versions())}
+    wanted: dict[str, Any] = {
+        "engine": job.engine,
+        "seed": job.scene.world.seed,
+        "versions": dict(versions(job.engine)),
+    }
     if run.status != "refused":  # an engine that refuses a scene need not have resolved its settings
         wanted["settings"] = settings.model_dump(mode="json")
     if job.player is None:  # otherwise the actions of the game are among them

@@ -128,7 +128,7 @@ def _rows(
         columns = {name: getattr(ends, name)[m] for name in Members._fields}
         row = replace(
             pilot,
-            id=id_of_document(document, task.engine, settings, seed, versions()),
+            id=id_of_document(document, task.engine, settings, seed, versions(task.engine)),
             scene_hash=hash_of(document),
             seed=seed,
             seconds=seconds,

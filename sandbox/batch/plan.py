@@ -215,7 +215,7 @@ class Plan:
                 yield from self._runs(self._variant(label, path, self._point(weight * (len(axis.points) - 1)), 0), 1)
 
     def has_useless_seeds(self, label: str) -> bool:
-        """Tell whether several seeds are swept by their key, and the first two give one run.
+        """Return whether several seeds are swept by their key, and the first two give one run.
 
         Raises:
             SceneError: the scene has faults.
@@ -247,7 +247,7 @@ class Plan:
         """Check the scenes before the first run: all of them, or those of one axis at a time in a large plan.
 
         Args:
-            is_stored: tells whether the run of a plan key is stored; its scene has been checked then.
+            is_stored: returns whether the run of a plan key is stored; its scene has been checked then.
             visit: called with the job of each scene that is checked, for further checks.
             progress: called with the progress.
 
@@ -430,10 +430,10 @@ class Plan:
         if not self._has_keys(variant.label, variant.path):
             return None
         _, digest = self._source(variant.path)
-        return hash_of([digest, engine, values, dict(versions())])
+        return hash_of([digest, engine, values, dict(versions(engine))])
 
     def _has_keys(self, label: str, path: str) -> bool:
-        """Tell whether the file of a scene and its values determine a run: they do unless a game is played."""
+        """Return whether the file of a scene and its values determine a run: they do unless a game is played."""
         if path not in self._keyed:
             changes_game = any(key.startswith("play") for key in (*self._swept, *(key for key, _ in self._set_values)))
             try:
@@ -443,6 +443,18 @@ class Plan:
             except SceneError:  # reported when its scenes are checked
                 self._keyed[path] = False
         return self._keyed[path]
+
+    def recordings(self) -> Iterator[tuple[str, Recording]]:
+        """Yield the recorded sessions of the plan, with their labels.
+
+        Raises:
+            SceneError: one cannot be read.
+        """
+        for label, path in self.scenes:
+            if _is_recording(path):
+                source, _ = self._source(path)
+                assert isinstance(source, Recording)
+                yield label, source
 
     def _source(self, path: str) -> tuple[SceneText | Recording, str]:
         """Return a parsed scene file or a recorded session, and the digest of the file.
@@ -460,7 +472,7 @@ class Plan:
 
 
 def _are_alike(first: _Variant, second: _Variant) -> bool:
-    """Tell whether two seeds give one run: nothing is random; a game and its player are.
+    """Return whether two seeds give one run: nothing is random; a game and its player are.
 
     Raises:
         SceneError: one of the scenes has faults.

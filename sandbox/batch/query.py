@@ -15,6 +15,7 @@ import math
 import os
 import re
 import sqlite3
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -44,8 +45,8 @@ NUMBERS = (
 )  # fmt: skip
 """Columns of figures"""
 FIRST = ("id", "scene", "title", "engine")
-LAST = ("seed", "status", "reason", *NUMBERS, "state_hash")
-MORE = ("created", "scene_hash", "path", "size", "settings", "set_values", "versions", "work", "details")
+LAST = ("seed", "status", "reason", *NUMBERS, "state_hash", "versions")
+MORE = ("created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
 """Columns that a table has only if they are named"""
 Z95 = 1.959963984540054
 """97.5 % quantile of the normal distribution: two-sided bounds of 95 %"""
@@ -89,6 +90,8 @@ class RunGroup:
     """lower bound of the rate, with a confidence of 95 % together with the upper one (Wilson 1927)"""
     success_high: float
     """upper bound of the rate"""
+    versions: int
+    """different versions of sandbox and its packages among the runs of one engine, the most; 1 unless they are mixed"""
     quantities: Mapping[str, QuantityStatistics]
 
 
@@ -259,7 +262,8 @@ class StoredRuns:
             QueryError: an expression or a name is wrong, or a column of `of` has no numbers.
         """
         keys, quantities = [self.column(name) for name in by], [self.column(name) for name in of]
-        parts = [*map(quoted_column, (*keys, *quantities)), f"({self.expression(success)}\n)", "status = 'ok'"]
+        parts = [*map(quoted_column, (*keys, *quantities, "engine", "versions"))]
+        parts += [f"({self.expression(success)}\n)", "status = 'ok'"]
         rows = self._execute(f"SELECT {', '.join(parts)} FROM {self._source}{self._filter(where)}")
         groups: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
         for row in rows:
@@ -272,6 +276,18 @@ class StoredRuns:
             _group(dict(zip(keys, values, strict=True)), groups[values], quantities, quantiles)
             for values in sorted(groups, key=_sort_key)
         ]
+
+    def versions(self, where: str | None = None) -> dict[str, dict[str, int]]:
+        """Return the number of runs of each engine by their versions, a JSON object each, the oldest first.
+
+        Raises:
+            QueryError: the filter is wrong.
+        """
+        selected = f"SELECT engine, versions, count(*) FROM {self._source}{self._filter(where)}"
+        found: dict[str, dict[str, int]] = {}
+        for engine, versions, count in self._execute(f"{selected} GROUP BY 1, 2 ORDER BY min(added)"):
+            found.setdefault(str(engine), {})[str(versions)] = int(count)
+        return found
 
     def trajectory(self, run: str) -> Trajectory:
         """Return a run with its arrays.
@@ -468,7 +484,7 @@ def _authorize(action: int, table: str | None, column: str | None, *_: object) -
 
 
 def _ends(text: str, k: int) -> bool:
-    """Tell whether a name ends at a place of a text."""
+    """Return whether a name ends at a place of a text."""
     return k == len(text) or not (text[k].isalnum() or text[k] in "_.")
 
 
@@ -509,7 +525,11 @@ def _sort_key(values: tuple[Any, ...]) -> tuple[tuple[int, Any], ...]:
 def _group(
     keys: Mapping[str, Any], rows: Sequence[tuple[Any, ...]], quantities: Sequence[str], quantiles: Sequence[float]
 ) -> RunGroup:
-    """Return the statistics of a group, whose rows have the quantities, success, and whether the status is ok."""
+    """Return the statistics of a group.
+
+    Its rows have the quantities, engine, versions, success, and whether the status is ok.
+    """
+    by_engine = Counter(engine for engine, _ in {(row[-4], row[-3]) for row in rows})
     successes = sum(bool(row[-2]) for row in rows)
     low, high = wilson_bounds(successes, len(rows))
     return RunGroup(
@@ -519,6 +539,7 @@ def _group(
         success_rate=successes / len(rows),
         success_low=low,
         success_high=high,
+        versions=max(by_engine.values()),
         quantities={
             name: _statistics([row[k] for row in rows if row[-1] and _is_number(row[k])], quantiles)
             for k, name in enumerate(quantities)

@@ -103,6 +103,8 @@ class RunRow:
     """J"""
     joint_error: float | None
     """largest in any recorded frame, relative or in rad; None without joints"""
+    worst_joint: Mapping[str, Any] | None
+    """its joint: name, error (None if infinite), unit of the error; None without joints"""
     broken_joints: int
     contacts: int | None
     """contacts with an impulse; one that lasts counts once; None if they were not counted"""
@@ -184,6 +186,7 @@ class RunRow:
             energy_start=finite(stored.energy_start),
             energy_end=finite(stored.energy_end),
             joint_error=finite(stored.joint_error),
+            worst_joint=details.get("worst_joint"),
             broken_joints=stored.broken_joints or 0,
             contacts=stored.contacts,
             first_contact=stored.first_contact,
@@ -219,6 +222,7 @@ def details_of(run: Trajectory, scene: Scene, has_game: bool) -> dict[str, Any]:
         "simulated": float(run.time[-1]) if len(run.time) else 0.0,
         "audited": bool(run.info["audited"]),
         "warnings": list(run.warnings),
+        "worst_joint": to_json(run.info.get("worst_joint")),
         "retired": {name: time for name, time in retired if time == time},
         "pocketed": _pocketed(run, scene),
         "game": {key: game.get(key) for key in GAME} if has_game else None,

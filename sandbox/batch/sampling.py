@@ -77,7 +77,7 @@ def sampled_axis(ranges: Sequence[SampledRange], sampling: Sampling) -> SweepAxi
     try:
         import scipy.stats  # noqa: F401, found before the first point is drawn
     except ImportError:
-        raise AddressError("drawing samples needs scipy: pip install 'sandbox2d[sample]'") from None
+        raise AddressError("drawing samples needs scipy: pip install -e '.[sample]'") from None
     return SweepAxis(tuple(each.key for each in ranges), _SampledPoints(tuple(ranges), sampling))
 
 

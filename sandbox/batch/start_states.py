@@ -34,7 +34,7 @@ UNSUPPORTED = (
 
 
 def is_start_key(path: str) -> bool:
-    """Tell whether a path is the seed, or one of the start state of a ball."""
+    """Return whether a path is the seed, or one of the start state of a ball."""
     if path == SEED:
         return True
     if not path.startswith("ball."):
@@ -167,7 +167,7 @@ class StartStates:
 
 
 def _is_state(value: Any, length: int) -> bool:
-    """Tell whether a value can be one of a start state: a number, or an array of numbers."""
+    """Return whether a value can be one of a start state: a number, or an array of numbers."""
     if length and not (isinstance(value, list | tuple) and len(value) == length):
         return False
     numbers = value if length else [value]

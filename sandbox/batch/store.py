@@ -178,7 +178,7 @@ class Store:
         return self._with_file(self._select("WHERE plan_key = ? ORDER BY rowid DESC LIMIT 1", (plan_key,)))
 
     def has_planned(self, plan_key: str) -> bool:
-        """Tell whether there is a row with the key of a plan; it may be damaged, or its file missing."""
+        """Return whether there is a row with the key of a plan; it may be damaged, or its file missing."""
         with self._faults():
             return bool(self._execute("SELECT 1 FROM runs WHERE plan_key = ? LIMIT 1", (plan_key,)))
 
@@ -470,7 +470,7 @@ def _layout_of_table() -> tuple[list[Any], list[Any]]:
 
 
 def _are_values(columns: Sequence[Any]) -> bool:
-    """Tell whether columns are of set values: paths, without a type, nullable, and without a default."""
+    """Return whether columns are of set values: paths, without a type, nullable, and without a default."""
     return all("." in str(name) and row[2:] == ("", 0, None, 0, 0) for row in columns for name in row[1:2])
 
 

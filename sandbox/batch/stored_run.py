@@ -218,12 +218,12 @@ def column_of(path: str) -> str:
 
 
 def has_column(path: str) -> bool:
-    """Tell whether a set value has a column: the title and the seed have columns of their own."""
+    """Return whether a set value has a column: the title and the seed have columns of their own."""
     return "." in path and column_of(path) != "world.seed"
 
 
 def is_setting(column: str) -> bool:
-    """Tell whether a column is of a setting, whose value is known of every run."""
+    """Return whether a column is of a setting, whose value is known of every run."""
     return column.startswith(SOLVER)
 
 
@@ -261,7 +261,7 @@ def canonical_json(document: object) -> str:
 
 
 def _is_text(value: str) -> bool:
-    """Tell whether a text was UTF-8: other bytes have become surrogates."""
+    """Return whether a text was UTF-8: other bytes have become surrogates."""
     return value.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 

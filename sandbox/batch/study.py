@@ -175,7 +175,7 @@ class Study:
 
 
 def is_study(path: str | Path) -> bool:
-    """Tell whether a file is a study: TOML with a table `[study]`. A file that cannot be read is none."""
+    """Return whether a file is a study: TOML with a table `[study]`. A file that cannot be read is none."""
     if Path(path).suffix.lower() != ".toml":
         return False
     try:
@@ -226,7 +226,7 @@ def _fault(file: str, lines: Lines, error: Any) -> Fault:
 
 
 def _is_type(part: Any) -> bool:
-    """Tell whether a part of pydantic's location names the member of a union, which is no key."""
+    """Return whether a part of pydantic's location names the member of a union, which is no key."""
     return isinstance(part, str) and (
         part in ("int", "str", "constrained-int") or part.startswith(("list[", "function"))
     )

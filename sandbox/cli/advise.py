@@ -3,12 +3,13 @@
 import re
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
+import numpy as np
 
 from sandbox.cli.common import (
     collect_errors,
@@ -26,13 +27,17 @@ from sandbox.cli.options import (
     time_limit_option,
 )
 from sandbox.cli.progress import status_line
+from sandbox.cli.recordings import is_recording, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.registry import UnknownEngineError, engine_named
-from sandbox.measure.advice.result import Advice, Knob, OtherEngine
+from sandbox.measure.advice.result import Advice, Knob, MeasuredSetting, OtherEngine
 from sandbox.measure.advice.study import DEFAULT_FPS, DEFAULT_ZOOM, advise
 from sandbox.measure.advice.text import (
+    OBJECTIONS,
+    cheapest_head,
+    coverage_sentence,
     engine_text,
     error_text,
     fallback_head,
@@ -53,6 +58,7 @@ from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.sessions import read_session
 from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS
 from sandbox.recording import Recording
+from sandbox.recording_remarks import is_in_pixels, remarks_on
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import load
@@ -68,6 +74,8 @@ TIME_UNITS = {"s": 1e3, "ms": 1.0, "us": 1e-3, "µs": 1e-3, "μs": 1e-3}
 LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 """Units of `--tolerance` besides px, m"""
 PX = "px"
+PIXELS = 1.0
+"""Pixels per unit of length, if that is the pixel"""
 QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*")
 
 
@@ -120,17 +128,23 @@ class _Options(OutputOptions):
     fps: float
     budget: tuple[float, str] | None
     tolerance: tuple[float, str]
-    zoom: float
+    given_zoom: float | None
+    pixels: bool
     effort: float
     time_limit: float | None
     repeats: int
     out: Path | None
 
-    @property
-    def tolerance_metres(self) -> float:
-        """The tolerance, m."""
+    def zoom(self, recording: Recording | None) -> float:
+        """Pixels per metre: as given; 1 for the recording of a game whose bodies have the sizes of pixel graphics."""
+        if self.pixels or (self.given_zoom is None and _looks_like_pixels(recording)):
+            return PIXELS
+        return DEFAULT_ZOOM if self.given_zoom is None else self.given_zoom
+
+    def tolerance_metres(self, zoom: float) -> float:
+        """The tolerance, m, at so many pixels per metre."""
         number, unit = self.tolerance
-        return number / self.zoom if unit == PX else number * LENGTH_UNITS[unit]
+        return number / zoom if unit == PX else number * LENGTH_UNITS[unit]
 
     @property
     def budget_ms(self) -> float | None:
@@ -158,7 +172,14 @@ class _Options(OutputOptions):
     metavar="LENGTH",
     help="largest allowed error of a position: 1px, 5mm, 2cm or 0.02m; default: 1px",
 )
-@click.option("--zoom", type=POSITIVE, default=DEFAULT_ZOOM, metavar="PX", help="pixels per metre; default: 50")
+@click.option(
+    "--zoom",
+    "given_zoom",
+    type=POSITIVE,
+    metavar="PX",
+    help="pixels per metre; default: 50, or as --pixels for the recording of a game whose bodies look like pixels",
+)
+@click.option("--pixels", is_flag=True, help="the unit of length is the pixel, as --zoom 1")
 @click.option(
     "--effort",
     type=POSITIVE,
@@ -191,6 +212,7 @@ def advise_command(**given: Any) -> int:
         with collect_errors(faults, "--engine", (UnknownEngineError,)):
             engine_named(options.engine)
     read = _read(options, faults)
+    zoom = options.zoom(read if isinstance(read, Recording) else None)
     advice: Advice | None = None
     if read is not None and not faults:
         with (
@@ -201,9 +223,9 @@ def advise_command(**given: Any) -> int:
                 read,
                 options.engine,
                 fps=options.fps,
-                tolerance=options.tolerance_metres,
+                tolerance=options.tolerance_metres(zoom),
                 budget=options.budget_ms,
-                zoom=options.zoom,
+                zoom=zoom,
                 effort=options.effort,
                 time_limit=options.time_limit,
                 repeats=options.repeats,
@@ -211,41 +233,64 @@ def advise_command(**given: Any) -> int:
             )
     if advice is None:
         return exit_with_errors(faults, options.as_json, scene=options.scene)
+    remarks = _remarks(read, options)
+    report_remarks(options.scene, remarks)
     if options.as_json:
-        print_json(advice.document(options.scene))
+        print_json(advice.document(options.scene) | ({"remarks": remarks} if remarks else {}))
     elif not options.quiet:
         print_advice(options.scene, advice)
     status = 0 if advice.is_met else 1
     if advice.interrupted:
         click.echo("interrupted: what was measured so far is kept", err=True)
         status = 130
-    return max(status, _write_page(advice, options))
+    return max(status, _write_page(advice, options, remarks))
+
+
+def _looks_like_pixels(recording: Recording | None) -> bool:
+    return recording is not None and recording.game is not None and is_in_pixels(recording.scene)
+
+
+def _remarks(read: Scene | Recording | None, options: _Options) -> list[str]:
+    """Return the remarks on a recording, and that its unit of length is taken for the pixel; empty for a scene."""
+    if not isinstance(read, Recording):
+        return []
+    remarks = [*remarks_on(read)]
+    if options.given_zoom is None and not options.pixels and _looks_like_pixels(read):
+        bodies = read.scene.bodies
+        width = 2.0 * float(np.median(bodies.radius[~bodies.fixed]))
+        remarks.append(
+            f"bodies are {width:.3g} units wide, so the unit of length is taken for the pixel, as with --pixels; "
+            f"--zoom {DEFAULT_ZOOM:g} takes it for a metre"
+        )
+    return remarks
 
 
 def _read(options: _Options, faults: list[Fault]) -> Scene | Recording | None:
     """Return the scene or the recording; add faults of it, and of the page to write, to the faults."""
     read: Scene | Recording | None = None
     with collect_errors(faults):
-        if scene_paths([options.scene])[0][1].lower().endswith(".json"):
+        if is_recording(scene_paths([options.scene])[0][1]):
             read = read_session(scene_paths([options.scene])[0][1])
             if options.overrides:
                 raise SceneError([Fault("--set", None, "", "a recording has its scene and settings within it")])
         else:
             read = load(scene_path(options.scene), options.overrides)
+    if options.pixels and options.given_zoom is not None:
+        faults.append(Fault("--pixels", None, "", "is --zoom 1; leave out one of them"))
     if options.out is not None:
         name = shorten(str(options.out), MAX_NAMED)
         faults += [Fault("--out", None, "", f"{name}: {reason}") for reason in reasons_not_writable(options.out)]
     return read
 
 
-def _write_page(advice: Advice, options: _Options) -> int:
+def _write_page(advice: Advice, options: _Options, remarks: Sequence[str]) -> int:
     """Write the page of `--out`; return 2 if it cannot be written."""
     if options.out is None:
         return 0
     from sandbox.report.html.advice import write_advice
 
     try:
-        write_advice(advice, options.out)
+        write_advice(advice, options.out, remarks)
     except OSError as error:
         click.echo(f"--out: {error.filename}: {error.strerror}", err=True)
         return 2
@@ -262,6 +307,9 @@ def print_advice(scene: str, advice: Advice) -> None:
         advice: the advice.
     """
     name = f"{scene} ({advice.scene})" if advice.scene else scene
+    coverage = coverage_sentence(advice)
+    if coverage is not None:
+        _print_item(coverage, "")
     _print_heading(f"{name}: {target_text(advice)}")
     for sentence in (*truth_sentences(advice), *recording_sentences(advice)):
         _print_item(sentence, "")
@@ -285,6 +333,11 @@ def _print_present(advice: Advice) -> None:
         _print_item(f"note: {note}")
 
 
+def _print_objections(setting: MeasuredSetting) -> None:
+    for each in setting.objections[:MAX_RISKS]:
+        _print_item(f"objection: {each}")
+
+
 def _print_risks(advice: Advice, risks: tuple[Any, ...]) -> None:
     for risk in risks[:MAX_RISKS]:
         _print_item(f"{risk_label(risk)}: {risk_text(risk, advice.fps)}")
@@ -295,13 +348,14 @@ def _print_risks(advice: Advice, risks: tuple[Any, ...]) -> None:
 def _print_recommended(advice: Advice) -> None:
     chosen = advice.recommended
     if chosen is not None:
-        _print_heading(f"2. Cheapest setting within the tolerance: {setting_text(chosen, advice.fps)}", blank=True)
+        _print_heading(f"2. {cheapest_head(advice)}: {setting_text(chosen, advice.fps)}", blank=True)
         _print_item(figures_text(advice, chosen))
     else:
-        _print_heading(f"2. Cheapest setting within the tolerance: {no_setting_text(advice)}", blank=True)
+        _print_heading(f"2. {cheapest_head(advice)}: {no_setting_text(advice)}", blank=True)
     if advice.fallback is not None:
         _print_item(f"{fallback_head(advice)}: {setting_text(advice.fallback, advice.fps)}")
         _print_item(figures_text(advice, advice.fallback))
+        _print_objections(advice.fallback)
     elif chosen is not None and advice.fits_budget(chosen) is False:
         _print_item("no setting that was tried is within the budget")
     if advice.remaining_risks:
@@ -340,7 +394,7 @@ def _knob_cells(advice: Advice, knob: Knob) -> list[Any]:
     if setting.status != "ok":
         remark = shorten(error_text(advice, setting), MAX_REASON)
     elif (is_within := advice.is_within_tolerance(setting)) is not None:
-        remark = "within" if is_within else "too large"
+        remark = "too large" if not is_within else f"within, {OBJECTIONS}" if setting.objections else "within"
     return [
         f"{INDENT}{knob.change}",
         _error_cell(advice, setting),

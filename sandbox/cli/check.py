@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import click
 
-from sandbox.cli.common import exit_with_errors, expand_folders, print_faults, scene_path
+from sandbox.cli.common import exit_with_errors, expand_folders, print_faults
 from sandbox.cli.options import json_option, quiet_option, set_option
+from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_MESSAGE, shorten
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
@@ -29,7 +30,7 @@ from sandbox.measure.preflight import (
 from sandbox.scene.compile.demands import JOINT_LIMITS, JOINTS, Item, bill
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
-from sandbox.scene.files.load import dumps, load
+from sandbox.scene.files.load import dumps
 
 
 class EngineSupport(NamedTuple):
@@ -79,6 +80,8 @@ class CheckDocument:
     warnings: Sequence[Diagnostic] = ()
     notes: Sequence[Diagnostic] = ()
     game: GameSummary | None = field(default=None, metadata=in_json(optional=True))
+    remarks: Sequence[str] | None = field(default=None, metadata=in_json(optional=True))
+    """of a recording: what it lacks, and that its scene is checked without its actions"""
 
 
 @dataclass
@@ -116,7 +119,8 @@ def check_command(
     """Validate scenes and predict numerical problems: required physics, engines that can run the scene, warnings.
 
     Warnings come from formulas and from a trial run of at most 10,000 substeps on --engine (default: pymunk). SCENES
-    are files, folders of files, or names of shipped scenes. Exit status 1: no engine can run a scene, or it fails.
+    are files, folders of files, names of shipped scenes, or recorded sessions (.json), whose scenes are checked without
+    their actions. Exit status 1: no engine can run a scene, or it fails.
     """
     if expand:
         if len(scenes) > 1 or as_json:
@@ -146,6 +150,7 @@ def check_command(
             click.echo(str(fault), err=True)
         else:
             answers.add(document, _status(document, engine))
+            report_remarks(name, document.remarks or ())
             if not as_json:
                 _print(scene, document, quiet)
     if as_json:
@@ -166,8 +171,8 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
     Raises:
         SceneError: the scene has faults.
     """
-    scene = load(scene_path(name), overrides)
-    rules = fitting_rules(scene, scene_path(name))
+    path, scene, remarks = read_scene(name, overrides)
+    rules = fitting_rules(scene, path)
     items = bill(scene)
     missing = {each.name: each.missing(scene, scene.solver) for each in ENGINES.values()}
     safe = largest_safe_dt(scene, engine=engine)
@@ -186,6 +191,7 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
         warnings=answer.warnings,
         notes=[*notes(scene, engine), *answer.refuted],
         game=None if rules is None else GameSummary(scene.play.game or "", tuple(rules.controls)),
+        remarks=remarks or None,
     )
 
 
@@ -199,7 +205,7 @@ def _status(document: CheckDocument, engine: str | None) -> int:
 def _expand(name: str, overrides: tuple[str, ...]) -> int:
     """Print a scene as TOML with its presets expanded, and return the exit status."""
     try:
-        click.echo(dumps(load(scene_path(name), overrides)), nl=False)
+        click.echo(dumps(read_scene(name, overrides).scene), nl=False)
     except SceneError as error:
         return exit_with_errors(error.faults)
     return 0

@@ -185,7 +185,10 @@ def scene_path(name: str) -> str:
     path = scene_paths([name])[0][1]
     for ending, kind in ((".json", "a recorded session"), (".npz", "a stored run")):
         if path.lower().endswith(ending):
-            raise SceneError([Fault(name, None, "", f"is {kind}, not a scene; use `sandbox replay {shorten(name)}`")])
+            remedy = f"`sandbox replay {shorten(name)}` shows it"
+            if ending == ".json":
+                remedy += f", `sandbox export {shorten(name)} --to FILE.toml` writes its scene"
+            raise SceneError([Fault(name, None, "", f"is {kind}, not a scene; {remedy}")])
     return path
 
 

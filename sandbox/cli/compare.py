@@ -18,7 +18,6 @@ from sandbox.cli.common import (
     parse_engines,
     plural,
     require_folder,
-    scene_path,
     write_json,
 )
 from sandbox.cli.minimise import faults_of, minimised
@@ -33,6 +32,7 @@ from sandbox.cli.options import (
     verbose_option,
 )
 from sandbox.cli.progress import status_line
+from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
@@ -41,7 +41,6 @@ from sandbox.measure.compare.result import short_key, value_text
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.run_warnings import joint_order_limit
 from sandbox.scene.errors import Fault, SceneError
-from sandbox.scene.files.load import load
 from sandbox.scene.files.overrides import AddressError, combinations
 
 MAX_LISTED = 5
@@ -231,6 +230,8 @@ class _Request(NamedTuple):
     variants: list[Variant]
     smallest: Path | None
     """file of `--minimise`"""
+    remarks: tuple[str, ...]
+    """on a recording"""
 
 
 @click.command(name="compare")
@@ -265,8 +266,10 @@ class _Request(NamedTuple):
 def compare_command(**given: Any) -> int:
     """Run a scene on several engines, or with several values, and measure each error against the best known truth.
 
-    SCENE is a file or the name of a shipped scene. The truth is a closed form, the event-driven engine, or a run with
-    ever smaller steps. Exit status 1: an engine failed, diverged, or refused the scene although it was named.
+    SCENE is a file, the name of a shipped scene, or a recorded session (.json), whose scene is compared without its
+    actions, because no truth with actions is known; `sandbox run --engine` applies them. The truth is a closed form,
+    the event-driven engine, or a run with ever smaller steps. Exit status 1: an engine failed, diverged, or refused the
+    scene although it was named.
     """
     options = _Options(**given)
     faults: list[Fault] = []
@@ -287,6 +290,9 @@ def compare_command(**given: Any) -> int:
     is_engine_chosen = request.engines is not None or bool(request.axes)
     status = _report_problems(options.scene, comparison, is_engine_chosen)
     document = comparison.document(options.scene)
+    if request.remarks:
+        document["remarks"] = [*request.remarks]
+        report_remarks(options.scene, request.remarks)
     if not options.is_silent:
         print_comparison(options.scene, comparison, options.why, not is_engine_chosen, options.verbose)
     if comparison.interrupted:
@@ -296,7 +302,7 @@ def compare_command(**given: Any) -> int:
         status = _minimise(comparison, request, options, document) or status
     if options.as_json:
         print_json(document)
-    return _write(comparison, document, options, status)
+    return _write(comparison, document, options, status, request.remarks)
 
 
 def _checked(options: _Options, faults: list[Fault]) -> _Request:
@@ -309,9 +315,11 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
     faults += repeated_keys(options.overrides, options.sweeps)
     variants: list[Variant] = []
     path = ""
+    remarks: tuple[str, ...] = ()
     with collect_errors(faults), collect_errors(faults, "--sweep", (AddressError,)):
-        path = scene_path(options.scene)
-        variants = _variants(path, options.overrides, axes)
+        read = read_scene(options.scene)
+        path, remarks = read.path, read.remarks
+        variants = _variants(options.scene, options.overrides, axes)
     if options.tolerance is not None and not math.isfinite(options.tolerance):
         faults.append(Fault("--tolerance", None, "", f"is {options.tolerance} m; it must be finite"))
     with collect_errors(faults):
@@ -329,7 +337,7 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
     if options.out is not None and not faults:
         with collect_errors(faults):
             make_folder(options.out)
-    return _Request(names, axes, variants, smallest)
+    return _Request(names, axes, variants, smallest, remarks)
 
 
 def _choose_engine(request: _Request, options: _Options) -> _Request:
@@ -371,7 +379,7 @@ def _minimise(comparison: Comparison, request: _Request, options: _Options, docu
     return minimised_scene.status
 
 
-def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Sequence[Any]]]) -> list[Variant]:
+def _variants(name: str, overrides: Sequence[str], axes: Sequence[tuple[str, Sequence[Any]]]) -> list[Variant]:
     """Return the scene with each combination of swept values, the last sweep changing fastest.
 
     Raises:
@@ -384,7 +392,7 @@ def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Seq
     failed = 0
     for point in combinations(axes):
         try:
-            found.append(Variant(load(path, (*overrides, *point)), dict(point)))
+            found.append(Variant(read_scene(name, (*overrides, *point)).scene, dict(point)))
         except SceneError as error:
             faults |= dict.fromkeys(relabelled(fault, keys) for fault in error.faults)
             failed += 1
@@ -395,7 +403,9 @@ def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Seq
     return found
 
 
-def _write(comparison: Comparison, document: dict[str, object], options: _Options, status: int) -> int:
+def _write(
+    comparison: Comparison, document: dict[str, object], options: _Options, status: int, remarks: Sequence[str]
+) -> int:
     """Write the page, the plots and the document into the folder of `--out`, and return the exit status."""
     out = options.out
     if out is None:
@@ -405,7 +415,7 @@ def _write(comparison: Comparison, document: dict[str, object], options: _Option
 
     try:
         plot_comparison(comparison, out)
-        write_comparison(comparison, out / "report.html")
+        write_comparison(comparison, out / "report.html", remarks)
         write_json(document, out / "comparison.json")
     except OSError as error:
         click.echo(f"--out: {out}: {error.strerror or error}", err=True)

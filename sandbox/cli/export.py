@@ -1,6 +1,7 @@
-"""Command `export`: write a stored run as csv, parquet, gif, mp4 or png, or a scene as a program for pymunk."""
+"""Command `export`: write a stored run as csv, parquet, gif, mp4 or png, or a scene as a pymunk program or as TOML."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,14 +11,18 @@ import numpy as np
 
 from sandbox.atomic_write import atomic_write
 from sandbox.batch.find_run import find_run, read_run
-from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows, plural, scene_path
+from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows, plural
 from sandbox.cli.export_options import TABLES, Options, check_options, check_times
 from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.progress import ProgressBars, progress_bars
+from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
+from sandbox.echo import short_repr
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
+from sandbox.recording_remarks import remarks_on
 from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.files.load import dumps
 from sandbox.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -32,7 +37,7 @@ if TYPE_CHECKING:
     "targets",
     multiple=True,
     metavar="FILE",
-    help="file to write: .csv, .parquet, .gif, .mp4 or .png, or .py from a scene; may be repeated",
+    help="file to write: .csv, .parquet, .gif, .mp4 or .png, or .py or .toml from a scene; may be repeated",
 )
 @click.option("--runs", is_flag=True, help="write a table of all runs of the folder DIR, one row per run")
 @click.option("--contacts", is_flag=True, help="write tables of contacts instead of states")
@@ -48,16 +53,17 @@ if TYPE_CHECKING:
 @click.option(
     "--overlay", "overlays", multiple=True, metavar="NAME", help="overlay to draw, such as velocities; may be repeated"
 )
-@set_option("set a value of the scene first; for a .py only")
-@click.option("--force", is_flag=True, help="replace an existing .py")
+@set_option("set a value of the scene first; for a .py or .toml only")
+@click.option("--force", is_flag=True, help="replace an existing .py or .toml")
 @json_option
 @quiet_option("print no file names and no progress")
 def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
-    """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png; or a scene as a program (.py).
+    """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png; or a scene as .py or .toml.
 
     RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json). With --runs it is a folder with any
-    number of runs. For a .py it is a scene: the file is a program that needs only pymunk, with make_space() and step()
-    to use in a game, which computes the same states as the engine pymunk.
+    number of runs. For a .py or .toml it is a scene, or a session, whose scene is written without its actions. The .py
+    is a program that needs only pymunk, with make_space() and step() to use in a game, which computes the same states
+    as the engine pymunk.
     """
     options = Options(**given)
     faults: list[Fault] = []
@@ -94,13 +100,23 @@ def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
         click.echo(f"interrupted: {len(files)} of {len(options.targets)} files are complete and kept", err=True)
     for fault in faults:
         click.echo(str(fault), err=True)
-    _print_files(run, files, faults, as_json, quiet)
+    remarks = remarks_on(source) if isinstance(source, Recording) else ()
+    report_remarks(run, remarks)
+    _print_files(run, files, faults, as_json, quiet, remarks)
     return 2 if faults else status
 
 
-def _print_files(run: str, files: list[dict[str, Any]], faults: list[Fault], as_json: bool, quiet: bool) -> None:
+def _print_files(
+    run: str,
+    files: list[dict[str, Any]],
+    faults: list[Fault],
+    as_json: bool,
+    quiet: bool,
+    remarks: Sequence[str] = (),
+) -> None:
     if as_json:
-        print_json({"run": run, "files": files} | ({"faults": fault_rows(faults)} if faults else {}))
+        more: dict[str, Any] = {"faults": fault_rows(faults)} if faults else {}
+        print_json({"run": run, "files": files} | more | ({"remarks": remarks} if remarks else {}))
     elif not quiet:
         for file in files:
             counts = [plural(file[f"{noun}s"], noun) for noun in ("row", "frame", "line") if f"{noun}s" in file]
@@ -108,18 +124,24 @@ def _print_files(run: str, files: list[dict[str, Any]], faults: list[Fault], as_
 
 
 def _export_program(name: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
-    """Write a scene as a program, and return the exit status."""
-    from sandbox.scene.files.load import load
-
-    text = ""
+    """Write a scene as a program or as TOML, and return the exit status."""
+    texts: dict[str, str] = {}
+    remarks: tuple[str, ...] = ()
+    divided: tuple[str, ...] = ()
     with collect_errors(faults):
-        scene = load(scene_path(name), options.overrides)
+        _, scene, remarks = read_scene(name, options.overrides)
         if not faults:
-            text = _program_text(name, scene)
+            for kind in options.suffixes:
+                if kind == ".py":
+                    texts[kind], divided = _program_text(name, scene)
+                else:
+                    texts[kind] = dumps(scene)
     if faults:
         return exit_with_errors(faults, as_json, run=name, files=[])
     files: list[dict[str, Any]] = []
     for target in options.targets:
+        kind = Path(target).suffix.lower()
+        text = texts[kind]
         try:
             with atomic_write(Path(target)) as temporary:
                 temporary.write_text(text, encoding="utf-8", newline="\n")
@@ -127,23 +149,39 @@ def _export_program(name: str, options: Options, faults: list[Fault], as_json: b
             faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
             click.echo(str(faults[-1]), err=True)
         else:
-            files.append({"path": target, "format": "py", "lines": text.count("\n")})
-    _print_files(name, files, faults, as_json, quiet)
+            files.append({"path": target, "format": kind[1:], "lines": text.count("\n")})
+            if divided and kind == ".py":
+                files[-1]["divided_walls"] = list(divided)
+    report_remarks(name, remarks)
+    _print_files(name, files, faults, as_json, quiet, remarks)
+    if files and divided and not as_json and not quiet:
+        click.echo(f"note: {_note_of_division(divided)}")
     return 2 if faults else 0
 
 
-def _program_text(name: str, scene: "Scene") -> str:
-    """Return the program of a scene, with the warnings of `check`.
+def _note_of_division(names: Sequence[str]) -> str:
+    """Return how the states of a program with divided walls differ from those of its scene."""
+    walls = f"wall{'s' if len(names) > 1 else ''} {', '.join(map(short_repr, names))}"
+    return (
+        f"{walls}: divided into walls of two points. The states are those of the scene with divided walls, bit for "
+        "bit. In the scene itself, the sandbox corrects the normals of contacts where segments join, which pymunk "
+        "cannot: its states differ after the first contact there, and in the program a box may catch on a joint."
+    )
+
+
+def _program_text(name: str, scene: "Scene") -> tuple[str, tuple[str, ...]]:
+    """Return the program of a scene, with the warnings of `check`, and the names of the walls that it divides.
 
     Raises:
         SceneError: a program cannot express the scene; the error has all reasons.
     """
-    from sandbox.engines.pymunk_adapter.program import obstacles, program_text
     from sandbox.measure.preflight import floor_3_digits, largest_safe_dt, run_preflight
+    from sandbox.pymunk_export import obstacles, program_text, with_divided_walls
 
-    found = obstacles(scene)
+    found = obstacles(scene, divides_walls=True)
     if found:
         raise SceneError([Fault(name, None, each.path, each.message) for each in found])
+    scene, divided = with_divided_walls(scene)
     _hide_pygame_prompt()
     from sandbox.window.view_bounds import predict_bounds, view_bounds
 
@@ -152,7 +190,8 @@ def _program_text(name: str, scene: "Scene") -> str:
     if safe_dt is not None and np.isfinite(safe_dt):
         reason = f"With this number of substeps, no body of the scene can do so up to DT = {floor_3_digits(safe_dt)}."
     view = view_bounds(scene, predict_bounds(scene, "pymunk"))
-    return program_text(scene, view=view, step_reason=reason, warnings=warnings)
+    note = f"Note: {_note_of_division(divided)}" if divided else ""
+    return program_text(scene, view=view, step_reason=reason, warnings=warnings, note=note), divided
 
 
 def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:

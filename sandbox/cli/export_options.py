@@ -13,7 +13,8 @@ from sandbox.window.playback.snapshot import OVERLAYS
 TABLES = (".csv", ".parquet")
 FILMS = (".gif", ".mp4")
 PICTURES = (*FILMS, ".png")
-PROGRAMS = (".py",)
+PROGRAMS = (".py", ".toml")
+"""Files that are written from a scene: a program, or the scene itself"""
 MIN_SIZE, MAX_WIDTH, MAX_HEIGHT = 16, 7680, 4320
 """px: a smaller picture is illegible, and few players support more than 8K"""
 MAX_RATE = 240.0
@@ -47,7 +48,7 @@ class Options:
 
     @property
     def has_program(self) -> bool:
-        """Whether a target is a program."""
+        """Whether a target is written from a scene: a program, or the scene itself."""
         return not self.suffixes.isdisjoint(PROGRAMS)
 
     @property
@@ -128,7 +129,7 @@ def _target_faults(options: Options) -> list[tuple[str, str]]:
         suffix = path.suffix.lower()
         named = shorten(target, MAX_NAMED)
         if suffix not in (*TABLES, *PICTURES, *PROGRAMS):
-            found.append(("--to", f"{named}: the name must end in .csv, .parquet, .gif, .mp4, .png or .py"))
+            found.append(("--to", f"{named}: the name must end in .csv, .parquet, .gif, .mp4, .png, .py or .toml"))
         if path.absolute() in seen:
             found.append(("--to", f"{named}: is given twice"))
         seen.add(path.absolute())
@@ -176,18 +177,23 @@ def _run_table_faults(options: Options) -> list[tuple[str, str]]:
 
 
 def _program_faults(options: Options) -> list[tuple[str, str]]:
-    """Return the faults of a program: it is written from a scene, and an existing one may have been edited."""
+    """Return the faults of files that are written from a scene; an existing one may have been edited."""
     if not options.has_program:
         return []
     found = [
-        (option, "does not apply to a program")
+        (option, "does not apply to a program or a scene")
         for option, time in (("--from", options.start), ("--until", options.until))
         if time is not None
     ]
     for target in options.targets:
         path, named = Path(target), shorten(target, MAX_NAMED)
         if path.suffix.lower() not in PROGRAMS:
-            found.append(("--to", f"{named}: is written from a run, a program from a scene; export them separately"))
+            found.append(
+                (
+                    "--to",
+                    f"{named}: is written from a run, a program or a scene file from a scene; export them separately",
+                )
+            )
         elif path.is_file() and not options.force:
             found.append(("--to", f"{named}: exists already; add --force to replace it, or name another file"))
     return found

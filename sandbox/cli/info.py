@@ -3,6 +3,7 @@
 import difflib
 import json
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import click
@@ -10,8 +11,8 @@ import click
 from sandbox.cli.options import json_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import new_table, print_folded_table
-from sandbox.echo import short_repr
-from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.echo import MAX_NAMED, short_repr, shorten
+from sandbox.scene.files.shipped_scenes import SCHEMA, shipped
 
 
 @click.command(name="engines")
@@ -55,7 +56,13 @@ Node = dict[str, Any]
 @click.option(
     "--json", "as_json", is_flag=True, help="print TABLE as JSON Schema too; without TABLE the output is always JSON"
 )
-def schema_command(table: str | None, as_json: bool) -> int:
+@click.option(
+    "--install",
+    "place",
+    metavar="PATH",
+    help="write the JSON Schema into a folder, or beside a scene file, and print the line that lets editors find it",
+)
+def schema_command(table: str | None, as_json: bool, place: str | None) -> int:
     """Print the keys of a table of the scene file, or the JSON Schema of the whole file.
 
     TABLE is the name of a table, such as ball, solver, joint, body.box or pinball.bumper. Without it, the JSON Schema
@@ -63,6 +70,12 @@ def schema_command(table: str | None, as_json: bool) -> int:
     """
     from sandbox.scene.files.json_schema import dumps, schema  # imports the whole scene
 
+    if place is not None:
+        if table is not None or as_json:
+            raise click.UsageError("--install writes the schema of the whole file; use it without TABLE and --json")
+        if not place:  # an empty path would be the working folder
+            raise click.BadParameter("names no folder or scene file", param_hint="--install")
+        return _install(dumps(), Path(place))
     if table is None:
         click.echo(dumps(), nl=False)
         return 0
@@ -74,6 +87,38 @@ def schema_command(table: str | None, as_json: bool) -> int:
         return 0
     for node in found:
         _print_table(root, table, node)
+    return 0
+
+
+def _install(text: str, place: Path) -> int:
+    """Write the schema into a folder, or beside a scene file, and print the first line that a scene there needs."""
+    from sandbox.atomic_write import atomic_write
+    from sandbox.cli.common import reasons_not_writable  # imports numpy, which `scenes` does not need
+
+    try:
+        folder = place if place.is_dir() else place.parent
+        is_missing = folder is not place and not place.is_file()
+    except (OSError, ValueError) as error:  # a name that is too long, or with a null character
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        click.echo(f"--install: {shorten(str(place), MAX_NAMED)}: {reason}", err=True)
+        return 2
+    target = folder / SCHEMA
+    reasons = ["there is no such folder or scene file"] if is_missing else reasons_not_writable(target)
+    if not reasons:
+        try:
+            with atomic_write(target) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            reasons = [error.strerror or str(error)]
+    if reasons:
+        click.echo(f"--install: {shorten(str(place), MAX_NAMED)}: {reasons[0]}", err=True)
+        return 2
+    line = f"#:schema {SCHEMA}"
+    click.echo(f"written: {target}")
+    if place.is_file() and place.read_bytes().startswith(line.encode()):
+        click.echo(f"{place.name} begins with `{line}` already")
+    else:
+        click.echo(f"first line of {'the scene files there' if place.is_dir() else place.name}: {line}")
     return 0
 
 

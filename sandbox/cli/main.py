@@ -37,6 +37,7 @@ COMMANDS = {
     "record": ("record:record_command", "play a game that uses pymunk, and keep the session as a recording"),
     "import": ("import_level:import_command", "convert a level (.svg of Inkscape, .tmx of Tiled) to a scene file"),
     "check": ("check:check_command", "validate scenes and predict numerical problems before a run"),
+    "warm": ("warm:warm_command", "compile all functions in advance, so that nothing waits for it later"),
     "scenes": ("info:scenes_command", "list the shipped scenes"),
     "engines": ("info:engines_command", "list the engines and the physics that each models"),
     "schema": ("info:schema_command", "print the keys of a table of the scene file, or the whole JSON Schema"),

@@ -7,15 +7,26 @@ import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from sandbox.cli.common import exit_with_errors, plural, reasons_not_writable
 from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.progress import progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.jsonable import to_json
+from sandbox.recording import Recording, ReplayCheck
+from sandbox.recording_remarks import remarks_on, replay_sentence
 from sandbox.scene.errors import Fault
+
+if TYPE_CHECKING:
+    from sandbox.pymunk_capture.game_capture import GameCapture
+
+
+OWN_OPTIONS = ("--to", "--force", "--steps", "--json", "--quiet")
+"""Options of this command, which a game after whose name they stand gets instead"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +49,10 @@ class RecordDocument:
     """what the recording lacks"""
     inexact: Sequence[str] = ()
     """reasons for which a replay may differ by rounding"""
+    replay: ReplayCheck | None = None
+    """comparison of the replay with the game; None if there was none"""
+    remarks: Sequence[str] = ()
+    """what commands that take the recording repeat: what it lacks, and how far its replay departs from the game"""
     ended: str | None = None
     """why the game ended, if it did not end by itself"""
 
@@ -63,16 +78,22 @@ def record_command(
 
     GAME.py runs as `python GAME.py [ARGUMENTS]` would run it, in this process; options of this command come before it.
     Its pymunk spaces are watched: the scene is the space before its first step, and what the game changes between two
-    steps becomes an action. `sandbox replay`, `run`, `compare` and `advise` take the recording. What a scene cannot
-    have, such as collision callbacks, is listed on standard error.
+    steps becomes an action. At the end the recording is replayed, and compared with the game. `sandbox replay`, `run`,
+    `advise` and `export` take the recording; `check`, `compare` and `tradeoff` take its scene, without actions. What a
+    scene cannot have, such as collision callbacks, is listed on standard error, and by these commands again.
     """
     path = Path(target) if target is not None else Path(f"{Path(game).stem}.json")
     faults = _faults(game, path, force)
     if faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game)))
-    from sandbox.engines.pymunk_adapter.capture import CaptureError
-    from sandbox.engines.pymunk_adapter.game_capture import capture
+    from sandbox.pymunk_capture.game_capture import capture
+    from sandbox.pymunk_capture.space_capture import CaptureError
 
+    misplaced = [each for each in arguments if each.partition("=")[0] in OWN_OPTIONS]
+    if misplaced:
+        click.echo(
+            f"{game}: {', '.join(misplaced)}: passed to the game; options of this command come before GAME.py", err=True
+        )
     ended: str | None = None
     status = 0
     with capture(max_steps=steps) as captured, _started_as(game, arguments, is_quiet=as_json):
@@ -89,14 +110,19 @@ def record_command(
             ended, status = f"{type(error).__name__}: {error}", 1
     if not captured.spaces and not faults:
         faults = [Fault(game, None, "", "no pymunk space made a step, so that there is nothing to record")]
+    recording: Recording | None = None
     if not faults:
         try:
-            captured.recording.save(path)
+            captured.recording.save(path)  # before the replay, which may take as long as the game
+            recording = _checked(captured, as_json or quiet)
+            recording.save(path)
+        except CaptureError as error:
+            faults = [Fault(game, None, "", f"its space cannot be a scene: {error}")]
         except OSError as error:
             faults = [Fault(str(path), None, "", f"cannot be written: {error.strerror or error}")]
-    if faults:
+    if recording is None or faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game, ended=ended)))
-    recording = captured.recording
+    check = None if recording.game is None else recording.game.replay
     document = RecordDocument(
         game=game,
         recording=str(path),
@@ -107,6 +133,8 @@ def record_command(
         actions=len(recording.actions),
         omitted=captured.omitted,
         inexact=captured.inexact,
+        replay=check,
+        remarks=remarks_on(recording),
         ended=ended,
     )
     if as_json:
@@ -114,13 +142,31 @@ def record_command(
     elif not quiet:
         bodies = f"{document.bodies:,} {'body' if document.bodies == 1 else 'bodies'}"
         steps_made = f"{plural(document.steps, 'step')} of {1000.0 * recording.settings.dt:.4g} ms"
+        if not captured.has_constant_step:
+            steps_made += " (median)"
         summary = f"{bodies}, {steps_made}, {plural(document.actions, 'action')}"
         click.echo(f"written: {shorten(str(path), MAX_NAMED)} ({summary})")
-    for each in captured.omitted:
-        click.echo(f"{game}: left out: {each}", err=True)
-    for each in captured.inexact:
-        click.echo(f"{game}: a replay may differ by rounding: {each}", err=True)
+        if check is not None and check.is_equal:
+            click.echo(replay_sentence(recording.scene, check))
+    for each in document.remarks:
+        click.echo(f"{game}: {each}", err=True)
     return status
+
+
+def _checked(captured: "GameCapture", is_silent: bool) -> Recording:
+    """Return the recording with the check of its replay; without it if Ctrl-C ends the replay.
+
+    Raises:
+        CaptureError: the space cannot be a scene.
+    """
+    from sandbox.measure.run.replay_check import checked_recording
+
+    try:
+        with progress_bars(is_silent) as bars:
+            return checked_recording(captured, bars.callback("replaying the recording"))
+    except KeyboardInterrupt:
+        click.echo("interrupted: the recording is kept, and its replay was not compared with the game", err=True)
+        return captured.recording
 
 
 def _faults(game: str, path: Path, force: bool) -> list[Fault]:

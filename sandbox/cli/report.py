@@ -13,9 +13,9 @@ from sandbox.cli.common import (
     expand_folders,
     parse_engines,
     reasons_not_writable,
-    scene_path,
 )
 from sandbox.cli.options import OutputOptions, engines_option, json_option, quiet_option, set_option, time_limit_option
+from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.measure.compare import compare
@@ -24,7 +24,6 @@ from sandbox.measure.tradeoff import Tradeoff, tradeoff
 from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
-from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.signals import defer_interrupt
 
@@ -92,13 +91,15 @@ class _Report:
 def report_command(**given: Any) -> int:
     """Compare many scenes and write one self-contained HTML page.
 
-    SCENES are files, folders of files, or names of shipped scenes; default: all benchmark scenes. A scene takes about
-    10 s of processor time (11 benchmarks took 107 s), a quarter of it with --effort 0.
+    SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json), whose scenes are compared
+    without their actions; default: all benchmark scenes. A scene takes about 10 s of processor time (11 benchmarks took
+    107 s), a quarter of it with --effort 0.
     """
     options = _Options(**given)
     faults: list[Fault] = []
     engines = parse_engines(options.engines, faults)
-    scenes = _read_scenes(options, faults)
+    remarks: dict[str, tuple[str, ...]] = {}
+    scenes = _read_scenes(options, remarks, faults)
     out = options.out
     if not faults:
         with collect_errors(faults):
@@ -114,7 +115,9 @@ def report_command(**given: Any) -> int:
         for number, (name, scene) in enumerate(scenes, 1):
             if not options.quiet:
                 click.echo(f"{number}/{len(scenes)} {name}", err=True)
-            _add_scene(report, name, scene, options)
+            _add_scene(report, name, scene, options, remarks[name])
+            if remarks[name]:
+                report.documents[-1]["remarks"] = [*remarks[name]]
     except KeyboardInterrupt:
         report.status = 130
         click.echo(f"interrupted: {len(report.documents)} of {len(scenes)} scenes are complete and kept", err=True)
@@ -132,13 +135,17 @@ def report_command(**given: Any) -> int:
     return report.status
 
 
-def _read_scenes(options: _Options, faults: list[Fault]) -> list[tuple[str, Scene]]:
-    """Return the names and scenes; add faults of scenes and numbers out of range to the faults."""
+def _read_scenes(
+    options: _Options, remarks: dict[str, tuple[str, ...]], faults: list[Fault]
+) -> list[tuple[str, Scene]]:
+    """Return the names and scenes; add remarks on recordings, and faults of scenes and numbers out of range."""
     read: list[tuple[str, Scene]] = []
     default = (scene.name for scene in shipped() if scene.name.startswith(DEFAULT_SCENES))
     for name in expand_folders(options.scenes) or default:
         with collect_errors(faults):
-            read.append((name, load(scene_path(name), options.overrides)))
+            _, scene, remarks[name] = read_scene(name, options.overrides)
+            report_remarks(name, remarks[name])
+            read.append((name, scene))
     for flag, value in (("--effort", options.effort), ("--time-limit", options.time_limit)):
         if value is not None and not math.isfinite(value):
             faults.append(Fault(flag, None, "", f"is {value:g}; it must be finite"))
@@ -149,7 +156,7 @@ def _read_scenes(options: _Options, faults: list[Fault]) -> list[tuple[str, Scen
     return read
 
 
-def _add_scene(report: _Report, name: str, scene: Scene, options: _Options) -> None:
+def _add_scene(report: _Report, name: str, scene: Scene, options: _Options, remarks: tuple[str, ...]) -> None:
     """Compare a scene on all engines, search its trade-off, and add both to the report.
 
     Raises:
@@ -187,7 +194,7 @@ def _add_scene(report: _Report, name: str, scene: Scene, options: _Options) -> N
         return
     with defer_interrupt():
         document = None if searched is None else searched.document(name)
-        report.overview.add(SceneReport(name, found, tradeoff=document))
+        report.overview.add(SceneReport(name, found, tradeoff=document, remarks=remarks))
         report.documents.append({**found.document(name), "status": "ok", "reason": None, "tradeoff": document})
     if searched is not None and searched.interrupted:
         raise KeyboardInterrupt

@@ -47,6 +47,7 @@ from sandbox.cli.options import (
     workers_option,
 )
 from sandbox.cli.progress import RunMonitor, status_line
+from sandbox.cli.recordings import report_remarks
 from sandbox.cli.run_batch import MAX_PROBLEMS, RunBatch, report_problems
 from sandbox.cli.run_tables import MAX_TIMED, RunsDocument, print_ledgers, print_runs, print_scores, score_rows
 from sandbox.cli.streams import JsonSpool, print_json
@@ -55,6 +56,7 @@ from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
 from sandbox.jsonable import to_json
 from sandbox.measure.run.recorder import TooLargeError, require_memory
+from sandbox.recording_remarks import remarks_on
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError
@@ -174,13 +176,15 @@ def run_command(**given: Any) -> int:
     finally:
         if store is not None:
             store.close()
+    for name, remarks in _remarks(batch).items():
+        report_remarks(name, remarks)
     status = report_problems(batch)
     _print_results(batch, options, status)
     return _draw(batch, options, status)
 
 
 def _has_store(out: Path) -> bool:
-    """Tell whether a folder has a store; opening reports a path that cannot be used."""
+    """Return whether a folder has a store; opening reports a path that cannot be used."""
     try:
         return (out / DATABASE).is_file()
     except OSError:  # a name that is too long
@@ -365,7 +369,8 @@ def _print_results(batch: RunBatch, options: _Options, status: int) -> None:
     rows = batch.ordered_rows
     scores = [] if batch.study.seeds is None else score_rows(rows or [batch.games[k] for k in sorted(batch.games)])
     if options.as_json:
-        document = RunsDocument(runs=rows, scores=scores or None, interrupted=batch.status == 130)
+        remarks = _remarks(batch) or None
+        document = RunsDocument(runs=rows, scores=scores or None, remarks=remarks, interrupted=batch.status == 130)
         if batch.spool is None:
             print_json(to_json(document))
         else:
@@ -385,6 +390,12 @@ def _print_results(batch: RunBatch, options: _Options, status: int) -> None:
         is_plain = not (options.overrides or options.sweeps or options.plot or options.out or options.verbose)
         if len(rows) == 1 and is_plain and not status:
             _suggest_next(rows[0].scene)
+
+
+def _remarks(batch: RunBatch) -> dict[str, tuple[str, ...]]:
+    """Return the remarks on each recording that has some."""
+    found = {label: remarks_on(recording) for label, recording in batch.plan.recordings()}
+    return {label: remarks for label, remarks in found.items() if remarks}
 
 
 def _print_summary(batch: RunBatch) -> None:

@@ -12,6 +12,7 @@ import click
 from sandbox.batch.run_row import RunRow
 from sandbox.cli.tables import add_columns, heads_of, new_table, print_legend, print_line, print_table
 from sandbox.engines.energy_ledger import Cause
+from sandbox.formatting import format_number, format_quantity
 from sandbox.games.scores import QUANTILES, Scores, ScoreStatistics
 from sandbox.jsonable import finite, in_json
 from sandbox.measure.metrics.energy import LedgerDocument
@@ -39,7 +40,7 @@ LEGEND = {
     "*: a warning about the run is printed below the table",
     "× real time": "simulated time / computing time (without compilation); above 1 is faster than real time",
     "energy, J": "kinetic + potential energy at the start → at the end, J",
-    "joint error": "largest error of any joint in any recorded frame, relative to its length",
+    "joint error": "largest error of any joint in any recorded frame, relative to its length, and in m or rad",
     "broken": "joints that broke",
     "first contact, s": "time at which the first contact begins, s",
     "contacts": "contacts; one that lasts counts once",
@@ -72,6 +73,8 @@ class RunsDocument:
     """completed runs, in the order of the table"""
     scores: Sequence[ScoresDocument] | None = field(metadata=in_json(optional=True))
     """distributions of scores over the seeds; None if there are none"""
+    remarks: Mapping[str, Sequence[str]] | None = field(metadata=in_json(optional=True))
+    """by the name of a recording: what it lacks of its game, and how far its replay departs; None if there are none"""
     interrupted: bool
     """whether an interrupt ended the runs early"""
 
@@ -183,7 +186,7 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     start, end = row.energy_start, row.energy_end
     yield "–" if start is None else f"{_number(start)} → {_number(end)}"
     if show.joint_errors:
-        yield _percent_error(row.joint_error)
+        yield _joint_error(row)
     if show.broken_joints:
         yield f"{row.broken_joints:,}"
     if show.first_contacts:
@@ -238,15 +241,24 @@ def _game_end(row: RunRow) -> str:
 
 
 def _differs(rows: Sequence[RunRow], setting: str) -> bool:
-    """Tell whether a setting differs between runs of one scene on one engine; defaults differ between them anyway."""
+    """Return whether a setting differs between runs of one scene on one engine; defaults differ between them anyway."""
     values: dict[tuple[str, str], set[str]] = {}
     for row in rows:
         values.setdefault((row.scene, row.engine), set()).add(str(row.settings[setting]))
     return any(len(found) > 1 for found in values.values())
 
 
-def _percent_error(value: float | None) -> str:
-    return "–" if value is None else f"{100.0 * value:.2g} %"
+def _joint_error(row: RunRow) -> str:
+    """Return the largest error of a joint, relative and as a length or an angle, such as `0.12 %, 0.42 mm`."""
+    if row.joint_error is None:
+        return "–"
+    worst, relative = row.worst_joint, f"{100.0 * row.joint_error:.2g} %"
+    if row.joint_error > 1.0:
+        relative = f"{format_number(row.joint_error, 2)} lengths"
+    if worst is None or worst["error"] is None:
+        return relative
+    size = format_quantity(float(f"{worst['error']:.2g}"), worst["unit"])
+    return size if worst["unit"] == "rad" else f"{relative}, {size}"
 
 
 def _setting(value: object) -> str:

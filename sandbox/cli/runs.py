@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -32,7 +33,7 @@ DEFAULT_LIMIT = 50
 IS_OK = "status = 'ok'"
 DEFAULT_QUANTITIES = ("energy_end", "contacts", "missed_contacts")
 QUANTILES = (0.1, 0.5, 0.9)
-TEXTS = ("id", "scene", "title", "engine", "status", "reason")
+TEXTS = ("id", "scene", "title", "engine", "status", "reason", "versions")
 """Columns that are justified to the left"""
 MAX_CELLS = 100_000
 """Cells of a heat map"""
@@ -205,6 +206,8 @@ def _answer(runs: StoredRuns, options: _Options) -> int:
     if options.by is not None:
         quantities = DEFAULT_QUANTITIES if options.of is None else tuple(parse_names(options.of))
         groups = runs.group(options.keys, quantities, options.where, options.success, QUANTILES)
+        if any(group.versions > 1 for group in groups):
+            _note_mixture(runs, options)
         _print_groups(
             groups,
             quantities,
@@ -227,6 +230,28 @@ def _answer(runs: StoredRuns, options: _Options) -> int:
     return 0
 
 
+def _note_mixture(runs: StoredRuns, options: _Options) -> None:
+    """Say on standard error that groups have runs of different versions of one engine, and how many of each."""
+    for engine, counts in runs.versions(options.where).items():
+        if len(counts) > 1:
+            names = _differing(list(counts))
+            parts = ", ".join(f"{count:,} of {names[text]}" for text, count in counts.items())
+            click.echo(
+                f"note: runs of {engine} by several versions are taken together: {parts}; --by versions separates them",
+                err=True,
+            )
+
+
+def _differing(texts: Sequence[str]) -> dict[str, str]:
+    """Return versions, JSON objects, as short texts of the parts in which they differ."""
+    read = {text: json.loads(text) for text in dict.fromkeys(texts)}
+    keys = dict.fromkeys(key for each in read.values() for key in each)
+    differing = [key for key in keys if len({each[key] for each in read.values() if key in each}) > 1]
+    return {
+        text: ", ".join(f"{key} {each[key]}" for key in differing if key in each) or "–" for text, each in read.items()
+    }
+
+
 def _informative(table: Columns) -> Columns:
     """Return the columns of a list in which the runs differ, and the few that are always of interest."""
     always = ("id", "engine", "status", "seconds", "contacts")
@@ -236,6 +261,12 @@ def _informative(table: Columns) -> Columns:
         if name in always or len(cells) > 1:
             found[name] = values
     found.pop("state_hash", None)
+    pairs = list(zip(table["engine"].tolist(), found.pop("versions", table["engine"]).tolist(), strict=True))
+    if len(set(pairs)) > len({engine for engine, _ in pairs}):
+        import numpy as np
+
+        names = {engine: _differing([text for each, text in pairs if each == engine]) for engine in dict(pairs)}
+        found["versions"] = np.asarray([names[engine][text] for engine, text in pairs], object)
     return found
 
 
@@ -328,6 +359,8 @@ def _plot(runs: StoredRuns, options: _Options, quantity: str) -> int:
     if message is not None:
         click.echo(f"--plot: {message}", err=True)
         return 2
+    if "versions" not in options.keys:
+        _note_mixture(runs, options)
     if not options.is_silent:
         click.echo(f"drawn: {target}")
     return 0

@@ -16,7 +16,6 @@ from sandbox.cli.common import (
     parse_engines,
     require_folder,
     require_plot_file,
-    scene_path,
     write_json,
 )
 from sandbox.cli.options import (
@@ -31,8 +30,10 @@ from sandbox.cli.options import (
     verbose_option,
 )
 from sandbox.cli.progress import status_line
+from sandbox.cli.recordings import is_recording, read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
 from sandbox.measure.compare import compare
@@ -46,8 +47,8 @@ from sandbox.measure.tradeoff.result import Tradeoff
 from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS, MAX_POINTS, tradeoff
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
-from sandbox.scene.files.load import load
-from sandbox.scene.files.toml_edit import write_solver, written
+from sandbox.scene.files.solver_in_file import write_solver
+from sandbox.scene.files.toml_changes import written
 
 ROUNDING = 1e-12
 """m; a part of an error below this is a rounding error, as coordinates of up to 1 km are exact to 1e-13 m."""
@@ -192,11 +193,11 @@ def _failures(found: Tradeoff) -> list[str]:
 
 
 def _split(each: ErrorBudget, found: Tradeoff) -> str:
-    residual = (
-        f"at most {_part(each.residual)} from the model (the error left with {each.substep_factor} times the substeps)"
+    parts = (
+        f"{_part(each.time_step)} from the time step and {_part(each.solver)} from the iterations; "
+        f"{_part(each.residual)} are left with {each.substep_factor} times the substeps "
+        f"({_part(each.residual_before)} with {each.substep_factor // 2} times)"
     )
-    model = residual if each.model is None else f"{_part(each.model)} from the model"
-    parts = f"{_part(each.time_step)} from the time step, {_part(each.solver)} from the iterations, {model}"
     trusted = found.scene.world.duration if found.best is None else found.best.trusted_until
     until = f", while the truth is trusted ({trusted:.3g} s)" if trusted < found.scene.world.duration else ""
     return (
@@ -328,16 +329,17 @@ class _Options(OutputOptions):
 def tradeoff_command(**given: Any) -> int:
     """Measure error against cost over engines and settings, and recommend a setting.
 
-    SCENE is a file or the name of a shipped scene. The settings that are tried and their errors are the same on every
-    machine; times are those of this machine. If the times of two settings differ by less than the timing noise, counted
-    work decides which is cheaper. Exit status 1: no setting is within the tolerance or the
-    budget; the nearest is shown.
+    SCENE is a file, the name of a shipped scene, or a recorded session (.json), whose scene is measured without its
+    actions; `sandbox advise` also runs settings with them. The settings that are tried and their errors are the same on
+    every machine; times are those of this machine. If the times of two settings differ by less than the timing noise,
+    counted work decides which is cheaper. Exit status 1: no setting is within the tolerance or the budget; the nearest
+    is shown.
     """
     options = _Options(**given)
     faults: list[Fault] = []
     names = parse_engines(options.engines, faults)
     _check_numbers(options, faults)
-    path, read = _read(options, faults)
+    path, read, remarks = _read(options, faults)
     found: Tradeoff | None = None
     if read is not None and not faults:
         with (
@@ -365,6 +367,9 @@ def tradeoff_command(**given: Any) -> int:
         named = {"scene": options.scene, "metric": options.metric}
         return exit_with_errors(faults, options.as_json, **named, **nulls, **lists)
     document = found.document(options.scene)
+    if remarks:
+        document["remarks"] = [*remarks]
+        report_remarks(options.scene, remarks)
     if options.as_json:
         print_json(document)
     elif not options.quiet:
@@ -398,17 +403,20 @@ def _check_numbers(options: _Options, faults: list[Fault]) -> None:
             faults.append(Fault(flag, None, "", f"is {value:g}; it must be positive and finite"))
 
 
-def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None]:
-    """Return the file of the scene and the scene; add faults of the scene and of files to write to the faults."""
+def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None, tuple[str, ...]]:
+    """Return the file, the scene, and remarks on a recording; add faults, also of files to write, to the faults."""
     read: Scene | None = None
     path = options.scene
+    remarks: tuple[str, ...] = ()
     with collect_errors(faults):
-        path = scene_path(options.scene)
-        read = load(path, options.overrides)
+        path, read, remarks = read_scene(options.scene, options.overrides)
     if options.write and options.overrides:
         faults.append(
             Fault("--write", None, "", "cannot be combined with --set, because the file does not contain those changes")
         )
+    elif options.write and is_recording(path):
+        remedy = f"write its scene with `sandbox export {shorten(options.scene)} --to FILE.toml` first"
+        faults.append(Fault("--write", None, "", f"cannot write into a recording; {remedy}"))
     elif options.write and read is not None:
         with collect_errors(faults):
             write_solver(path, {})  # without changes: raises if the file cannot be written
@@ -419,7 +427,7 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None]:
     if options.out is not None and not faults:
         with collect_errors(faults):
             make_folder(options.out)
-    return path, read
+    return path, read, remarks
 
 
 def _write_results(found: Tradeoff, document: dict[str, object], path: str, options: _Options) -> int:

@@ -10,6 +10,7 @@ import click
 from sandbox.batch.find_run import find_run, read_run
 from sandbox.cli.common import collect_errors, engine_advice, exit_with_errors, reasons_not_writable, scene_path
 from sandbox.cli.options import CommandFunction, set_option
+from sandbox.cli.recordings import report_remarks
 from sandbox.cli.streams import OutputError
 from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.engines.contract import Refusal
@@ -17,6 +18,7 @@ from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_nam
 from sandbox.games.contract import UnsuitableSceneError
 from sandbox.games.registry import fitting_rules, has_rules, rules_in_window
 from sandbox.recording import Recording
+from sandbox.recording_remarks import remarks_on
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
@@ -238,6 +240,8 @@ def replay_command(run: str, engine: str | None, **window: Any) -> int:
     if source is None or show is None:
         return exit_with_errors(faults)
 
+    if isinstance(source, Recording):
+        report_remarks(run, remarks_on(source))
     from sandbox.window.app_state import AppState
 
     app_state, first, known = AppState(show.engine), show, source
@@ -287,8 +291,7 @@ def _computed(source: Trajectory | Recording, engine: str | None) -> "LiveView":
             raise SceneError([Fault("<run>", None, "play.game", str(error))]) from None
         rules = None  # the window plays such a scene without rules, too
     game = None if rules is None else GameSession(rules, session.presses)
-    played = Session(session.scene, session.engine, session.settings, session.actions, game, session.duration)
-    return LiveView(played, film, until=session.duration)
+    return LiveView(Session.of_recording(session, game), film, until=session.duration)
 
 
 def _session_of(run: Trajectory, scene: Scene, duration: float) -> Recording:

@@ -13,7 +13,6 @@ from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
-from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
 from sandbox.arrays import BoolArray
@@ -34,7 +33,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.fixed import AWAY, PlaneReach
 from sandbox.scene.description.world import Settings
-from sandbox.scene.errors import path_of
+from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.validate.references import generators
 from sandbox.trajectory import Contacts, Frame
@@ -446,13 +445,8 @@ class SwitchableSimulation:
     def _switch(self, action: Switch) -> None:
         try:
             wanted = self.wanted.replace(**action.settings)
-        except ValidationError as error:
-            from sandbox.scene.files.diagnosis import explained  # only faults need it
-
-            faults = (
-                f"{shorten(path_of(location, {}), MAX_NAMED)}: {message}"
-                for location, message in explained(error, ("solver",))
-            )
+        except SettingsError as error:
+            faults = (f"{shorten(each.path, MAX_NAMED)}: {each.message}" for each in error.faults)
             raise ActionError(shorten("; ".join(faults), MAX_MESSAGE)) from None
         engine, plane_reach = action.engine or self.engine, self.plane_reach if action.resumes else None
         self._hand_over(engine, wanted, self.bodies, self.frame(), dict(self.retired), plane_reach)

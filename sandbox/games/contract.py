@@ -126,6 +126,15 @@ class HasLog(Protocol):
 
 
 @runtime_checkable
+class HasRanking(Protocol):
+    """Rules of a game whose score does not always count as a high score, such as the consolation points of a crash."""
+
+    @property
+    def is_ranked(self) -> bool:
+        """Whether the score of the finished game may enter the high scores."""
+
+
+@runtime_checkable
 class HasObservation(Protocol):
     """Rules that return numbers for learning agents: the state of the game that a player reads from the window."""
 

@@ -4,7 +4,6 @@ The file maps each table, `<game>: <title of the scene>`, to a list of pairs of 
 """
 
 import json
-import os
 import re
 from dataclasses import dataclass
 from itertools import count
@@ -17,9 +16,7 @@ from sandbox.atomic_write import atomic_write
 from sandbox.resource_limits import read_limited
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.document import NestingError, check_text
-
-FOLDER = "SANDBOX_DATA"
-"""Environment variable with the data folder; default: that of the platform."""
+from sandbox.user_folders import data_folder
 
 FILE = "high-scores.json"
 
@@ -122,7 +119,7 @@ def opened(path: Path | None = None) -> HighScores:
         path: path of the file; default: in the data folder.
 
     Raises:
-        OSError: the file cannot be read, or a damaged file cannot be renamed.
+        OSError: the file cannot be read, a damaged file cannot be renamed, or the user has no folder for it.
     """
     path = path or data_folder() / FILE
     scores = HighScores(path)
@@ -136,18 +133,6 @@ def opened(path: Path | None = None) -> HighScores:
         first = str(error).splitlines()[0]
         return HighScores(path, f"the high-score file is damaged and was renamed to {renamed}: {first}")
     return scores
-
-
-def data_folder() -> Path:
-    """Return the data folder of the user: `SANDBOX_DATA`, or that of the platform."""
-    configured = os.environ.get(FOLDER)
-    if configured:
-        return Path(configured)
-    if os.name == "nt":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "sandbox"
-    # Source: XDG Base Directory Specification, 0.8: $XDG_DATA_HOME, else ~/.local/share; a relative path is ignored.
-    home = Path(os.environ.get("XDG_DATA_HOME", ""))
-    return (home if home.is_absolute() else Path.home() / ".local" / "share") / "sandbox"
 
 
 def table_of(scene: Scene) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, get_args
 
 from sandbox.echo import MAX_NAMED, printable, short_repr, shorten
+from sandbox.levels.merging import merge_boxes
 from sandbox.levels.outlines import (
     CircleShape,
     LevelShape,
@@ -312,6 +313,16 @@ class LevelBuilder:
             name = f"{base} {self._copies[base] + 1}"
         self._names.add(name)
         return name
+
+    def merge_boxes(self) -> None:
+        """Merge static boxes that share a whole side, and note it."""
+        self._blocks, merged = merge_boxes(self._blocks, self.options.scale)
+        for first, *others in merged:
+            names = shorten(", ".join(short_repr(block.values["name"]) for block in others), MAX_NAMED)
+            self.warn(
+                first.element,
+                f"is one box with {names}, as bodies would stop at the seams; another colour or key keeps boxes apart",
+            )
 
     def build(self, title: str) -> ImportedLevel:
         """Return the scene.

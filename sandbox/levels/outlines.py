@@ -1,11 +1,11 @@
-"""Shapes of a level: lines, circles, rectangles and polygons under affine transforms; curves as polygons; merging.
+"""Shapes of a level: lines, circles, rectangles and polygons under affine transforms; curves as polygons.
 
 Transforms map coordinates of a drawing, y down, to metres, y up. Curves become polygons with corners on the curve. The
 sides are at most a tolerance away from it.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -332,41 +332,3 @@ def contains_point(outline: Sequence[Point], point: Point) -> bool:
         if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):
             inside = not inside
     return inside
-
-
-class TileRectangle(NamedTuple):
-    """A rectangle with sides along the axes, in the units of a map, y down."""
-
-    x: float
-    y: float
-    width: float
-    height: float
-
-
-def merge_rectangles(rectangles: Iterable[TileRectangle]) -> list[TileRectangle]:
-    """Return rectangles of which neighbours with a whole side in common are merged: rows first, then equal rows.
-
-    A flat floor becomes one rectangle, so that bodies do not catch on seams. Rectangles of different width in the rows
-    of a vertical face keep seams there. Takes O(n log n) time.
-    """
-    rows = _merged_along(sorted(set(rectangles), key=lambda r: (r.y, r.height, r.x, r.width)), 0)
-    return sorted(_merged_along(sorted(rows, key=lambda r: (r.x, r.width, r.y, r.height)), 1), key=lambda r: (r.y, r.x))
-
-
-def _merged_along(ordered: Sequence[TileRectangle], axis: int) -> list[TileRectangle]:
-    """Return rectangles with neighbours along an axis merged; those of one strip follow each other in order."""
-    merged: list[TileRectangle] = []
-    across = 1 - axis
-    for each in ordered:
-        last = merged[-1] if merged else None
-        if (
-            last is not None
-            and (last[across], last[across + 2]) == (each[across], each[across + 2])
-            and each[axis] <= last[axis] + last[axis + 2]  # they touch, or overlap
-        ):
-            end = max(last[axis] + last[axis + 2], each[axis] + each[axis + 2])
-            size = end - last[axis]
-            merged[-1] = last._replace(width=size) if axis == 0 else last._replace(height=size)
-        else:
-            merged.append(each)
-    return merged

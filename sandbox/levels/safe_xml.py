@@ -33,8 +33,8 @@ class XmlNode:
     tag: str
     """name; of a namespace other than SVG with its prefix or its address"""
     attributes: dict[str, str]
-    line: int
-    """line of its start tag, from 1"""
+    line: int | None
+    """line of its start tag, from 1; None if it was read from JSON"""
     children: list["XmlNode"] = field(default_factory=list)
     text: str = ""
     """its characters, without those of its children"""

@@ -56,7 +56,7 @@ from sandbox.levels.tables import LevelRole
 from sandbox.scene.errors import SceneError
 from sandbox.scene.geometry.polygon import signed_area
 
-NEEDS_SVGELEMENTS = 'svg files need the `import` extra: pip install "sandbox2d[import]"'
+NEEDS_SVGELEMENTS = 'svg files need the `import` extra: pip install -e ".[import]"'
 
 MAX_PATH_TEXT = 1_000_000
 """Characters of all path data of a drawing; they are parsed in up to 5 s."""
@@ -167,6 +167,7 @@ class _Drawing:
         except ElementError as error:
             refuse(builder.file, str(error), root.line, "svg")
         self._walk_children(root, context)
+        builder.merge_boxes()
         return builder.build(title)
 
     def _gravity(self, text: str) -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""Maps of Tiled (.tmx, with tilesets .tsx) to scenes.
+"""Maps of Tiled (.tmx, with tilesets .tsx, .tsj or .json) to scenes.
 
 The files are read and checked here; pytmx then decodes layers, objects and properties from the checked elements, which
 means that it opens no file. Object layers give objects; tile layers give the collision shapes of their tiles, which are
@@ -27,15 +27,14 @@ from sandbox.levels.builder import (
     role_of_words,
 )
 from sandbox.levels.level_files import read_text, refuse
+from sandbox.levels.merging import TileRectangle, merge_rectangles
 from sandbox.levels.outlines import (
     Affine,
     CircleShape,
     LevelShape,
     LineShape,
     PolygonShape,
-    TileRectangle,
     ellipse_shape,
-    merge_rectangles,
     rectangle_shape,
     rotation,
     translation,
@@ -68,7 +67,7 @@ from sandbox.levels.tilesets import (
 from sandbox.scene.description.base import Point
 from sandbox.scene.errors import SceneError
 
-NEEDS_PYTMX = 'tmx files need the `import` extra: pip install "sandbox2d[import]"'
+NEEDS_PYTMX = 'tmx files need the `import` extra: pip install -e ".[import]"'
 
 MAX_TILES = 1_000_000
 """Tiles of all layers; they are read in a second."""

@@ -5,8 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from sandbox.levels.json_tileset import SUFFIXES as JSON_SUFFIXES
+from sandbox.levels.json_tileset import tileset_element
 from sandbox.levels.level_files import read_text
-from sandbox.levels.outlines import Affine, TileRectangle
+from sandbox.levels.merging import TileRectangle
+from sandbox.levels.outlines import Affine
+from sandbox.levels.safe_json import read_json
 from sandbox.levels.safe_xml import XmlNode, parse_xml
 from sandbox.levels.tiled_values import TiledError, integer_of, number_of, tile_size_of
 from sandbox.scene.description.base import Point
@@ -120,9 +124,10 @@ def _tileset_file(source: str, map_path: Path) -> tuple[str, XmlNode]:
     except (OSError, RuntimeError):  # the name is too long, or a loop of links
         raise TiledError("the file of the tileset cannot be read") from None
     file = str(map_path.parent / source)
-    node = parse_xml(read_text(path, file), file)
+    is_json = path.suffix.lower() in JSON_SUFFIXES
+    node = tileset_element(read_json(path, file)) if is_json else parse_xml(read_text(path, file), file)
     if node.tag != "tileset":
-        raise TiledError(f"the root element of its file is <{node.tag}>, not <tileset>; save it as .tsx")
+        raise TiledError(f"the root element of its file is <{node.tag}>, not <tileset>; save it as .tsx or .tsj")
     if "source" in node.attributes:
         raise TiledError("the file of a tileset must not name another file")
     return file, node

@@ -123,7 +123,7 @@ def plot_heat_map(
 
 
 def is_spaced_by_factors(values: FloatArray) -> bool:
-    """Tell whether positive values have even factors between them rather than even differences."""
+    """Return whether positive values have even factors between them rather than even differences."""
     if len(values) < 3 or values[0] <= 0.0 or values[-1] / values[0] < 8.0:
         return False
     steps, factors = np.diff(values), np.diff(np.log(values))

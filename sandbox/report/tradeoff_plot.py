@@ -20,8 +20,6 @@ TradeoffMapping = Mapping[str, Any]
 
 CHOICES = ("integrator", "detection", "response", "joints", "iterations", "broad_phase", "half_kick")
 """Settings by which methods differ; along the curve of a method dt and substeps change."""
-FLOOR_METRIC = "max_position"
-"""The metric whose error limits a document states."""
 SMALLEST = 1e-16
 """Smaller errors, such as 0, are drawn at this value of the logarithmic axis."""
 
@@ -129,13 +127,6 @@ def shown_error(error: float) -> float:
     return max(error, SMALLEST)
 
 
-def floors_of(document: TradeoffMapping) -> dict[str, float]:
-    """Return the error limit of each engine at any step, m; it is one of positions, so other metrics have none."""
-    if document["metric"] != FLOOR_METRIC:
-        return {}
-    return {engine: float(floor) for engine, floor in (document.get("floors") or {}).items() if floor is not None}
-
-
 def budget_of(document: TradeoffMapping) -> float | None:
     """Return the budget, ms per simulated second; a document states it per frame."""
     budget = document.get("budget")
@@ -181,7 +172,6 @@ FAILURE_DISTANCE = 2.2
 FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, "marker": "o", "ms": 11, "mfc": "none"}
 """A ring around each point, so that a front of one point is visible too."""
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
-FLOOR: dict[str, Any] = {"lw": 1.3, "ls": (0, (6, 4))}
 POINT = "point:"
 """Prefix of the gid of a point; its index follows."""
 
@@ -265,11 +255,8 @@ def _draw_methods(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, L
 
 
 def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line2D]]:
-    """Draw error limits, tolerance and budget; return the entries of the legend."""
+    """Draw tolerance and budget; return the entries of the legend."""
     entries = []
-    for engine, floor in floors_of(document).items():
-        panel.axhline(shown_error(floor), color=colour_of(engine), **FLOOR)
-        entries.append((f"{engine}: error limit at any step", Line2D([], [], color=colour_of(engine), **FLOOR)))
     tolerance, budget = document.get("tolerance"), budget_of(document)
     if tolerance:
         panel.axhline(tolerance, **BOUND)
@@ -289,7 +276,6 @@ def _draw_failures(
         return
     costs = [point.cost for point in points if point.cost is not None]
     errors = [point.position[1] for point in points if point.is_drawable]
-    errors += map(shown_error, floors_of(document).values())
     right = FAILURE_DISTANCE * (max((*costs, budget_of(document) or 0.0)) or 1.0)
     top = FAILURE_DISTANCE * (max((*errors, document.get("tolerance") or 0.0)) or 1.0)
     for point in failed:

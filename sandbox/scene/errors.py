@@ -54,6 +54,37 @@ class SceneError(Exception):
         return type(self), (self.faults,)
 
 
+class SettingsError(SceneError, ValueError):
+    """A setting is unknown or has an invalid value. Each fault has its path, such as `solver.dt`."""
+
+
+EXPECTED = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "string_type": "text in quotes",
+    "tuple_type": "an array, such as [0.0, 1.0]",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+    "too_short": "an array of {min_length} or more",
+    "too_long": "an array of {max_length} at most",
+    "string_too_short": "text of {min_length} or more characters",
+    "string_too_long": "text of {max_length} characters at most",
+    "literal_error": "one of {expected}",
+}
+"""What a value must be, by the type of pydantic's error"""
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message shows it, in the notation of JSON."""
+    if isinstance(value, float) and value.is_integer():
+        return f"{value:.15g}"
+    return shorten(json.dumps(value, ensure_ascii=False, default=str))
+
+
 def path_of(location: Location, document: Any) -> str:
     """Return the path of a location, such as `ball.cue.velocity[1]`; named elements appear by name."""
     parts: list[str] = []

@@ -23,8 +23,9 @@ from sandbox.window.display import close_screen, open_screen, ui_scale
 from sandbox.window.editor.edit_keys import HELP_GROUPS
 from sandbox.window.editor.edit_view import EditView
 from sandbox.window.input.bindings import KeyHandler
+from sandbox.window.input.clipboard import ClipboardError
 from sandbox.window.input.gamepad import Gamepads
-from sandbox.window.input.keymap import Command, Keyboard
+from sandbox.window.input.keymap import Command, Keyboard, bound_key, latin_key, pressed_key
 from sandbox.window.mouse import MouseController
 from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import ORANGE
@@ -114,7 +115,7 @@ class App:
         self.app_state = app_state
         self.context = WindowContext(surface, ui_scale(), app_state, folder or Path(), film, say)
         self._keyboard = Keyboard()
-        self._release_handlers: dict[int, KeyHandler] = {}  # of bound keys that are down
+        self._release_handlers: dict[tuple[bool, int], KeyHandler] = {}  # of bound keys that are down
         self._gamepads = Gamepads(self.context.notify)
         self._gamepads.start()
         self.mouse = MouseController(self.context)
@@ -130,6 +131,7 @@ class App:
         app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
         app_state.compute = self._worker.compute
+        app_state.on_part = self._show_part
         COMPILE_CLOCK.on_begin = self._note_compiling
         if app_state.view is not None:
             self.context.on_scene_changed(False)
@@ -159,10 +161,16 @@ class App:
             self._clock.tick()  # compile time does not advance the scene
         self.context.update_camera(elapsed)
         self.draw()
-        if COMPILE_CLOCK.seconds > compiled:
+        if COMPILE_CLOCK.seconds > compiled and not self._takes_text:
             pygame.event.get(tuple(INPUT_EVENTS))
         pygame.display.flip()
-        self.context.capture.update(self.context.surface, elapsed)
+        self.context.capture.update(self._film_picture, elapsed)
+
+    def _film_picture(self) -> pygame.Surface:
+        """Return the picture of a film: the scene alone; the whole window while a scene is edited or picked."""
+        context = self.context
+        picture = None if self.editing is not None else context.gui.film_picture(context.camera, self.app_state)
+        return context.surface if picture is None else picture
 
     def draw(self) -> None:
         """Draw the scene and the GUI."""
@@ -180,7 +188,8 @@ class App:
     def _wait(self, done: Callable[[float], bool]) -> None:
         """Show progress until a job of the worker is done; Esc and the close button still close the window.
 
-        After a compilation, which takes seconds, key and button presses are dropped. Other events are posted again.
+        After a compilation, which takes seconds, key and button presses are dropped, unless text is typed. Other events
+        are posted again.
         """
         wait, later = Wait(self._worker), []
         asks = not self.app_state.saves_at_end and self.app_state.count_unsaved() > 0
@@ -199,10 +208,19 @@ class App:
                 pygame.display.iconify()
         for event in later:
             escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
-            if escape or not (wait.compiled and event.type in INPUT_EVENTS):
+            if escape or self._takes_text or not (wait.compiled and event.type in INPUT_EVENTS):
                 pygame.event.post(event)
         if wait.compiled:
             self._clock.tick()
+
+    @property
+    def _takes_text(self) -> bool:
+        """Whether keys are text for the scene browser or the editor, not input of a scene that has not started yet."""
+        return self.editing is not None or self.context.gui.scene_browser is not None
+
+    def _show_part(self, part: str) -> None:
+        """Name the part of a warm-up in the progress notice; called by the job."""
+        self._worker.part = part
 
     def _note_compiling(self, what: str) -> None:
         """Show that a kernel is being compiled, if the main thread compiles it."""
@@ -214,6 +232,13 @@ class App:
         pygame.event.pump()  # keeps the window manager from marking the window as unresponsive
 
     def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event; a message says so if it needs the clipboard and the system gives no access to it."""
+        try:
+            self._dispatch(event)
+        except ClipboardError as error:
+            self.app_state.messages.add(str(error), "warning")
+
+    def _dispatch(self, event: pygame.event.Event) -> None:
         """Handle an event: window events, start of a game, gamepads, then keys and mouse, topmost part first."""
         app_state, gui = self.app_state, self.context.gui
         if self.context.exit_status is None:
@@ -305,7 +330,7 @@ class App:
 
     def _edit(self, editing: EditView, event: pygame.event.Event) -> None:
         """Pass an event to the editor; zoom, panning and Esc are those of the window."""
-        if event.type == pygame.KEYDOWN and event.key in NOT_REPEATED and self._keyboard.is_repeat:
+        if event.type == pygame.KEYDOWN and latin_key(event) in NOT_REPEATED and self._keyboard.is_repeat:
             return
         if editing.handle_event(event):
             return
@@ -333,11 +358,11 @@ class App:
         if self.app_state.waits_for_start or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
             return
         bindings = self.app_state.key_bindings
-        handler = bindings.pressed.get(event.key)
-        if handler is not None and (event.key in bindings.repeated or not self._keyboard.is_repeat):
-            self.app_state.run_handler(handler)
-            if event.key in bindings.released:
-                self._release_handlers[event.key] = bindings.released[event.key]
+        key = bound_key(event, bindings.pressed.keys())
+        if key is not None and (key in bindings.repeated or not self._keyboard.is_repeat):
+            self.app_state.run_handler(bindings.pressed[key])
+            if key in bindings.released:
+                self._release_handlers[pressed_key(event)] = bindings.released[key]
 
     def _cancel_confirmation(self, event: pygame.event.Event, command: Command | None) -> None:
         """Withdraw a question if the event is another key or a click on the scene; the panel may confirm it as well."""
@@ -366,7 +391,7 @@ class App:
         if event.type == pygame.WINDOWFOCUSLOST:
             keys = list(self._release_handlers)
         else:
-            keys = [event.key] if event.type == pygame.KEYUP else []
+            keys = [pressed_key(event)] if event.type == pygame.KEYUP else []
         for key in keys:
             handler = self._release_handlers.pop(key, None)
             if handler is not None:

@@ -26,12 +26,13 @@ from sandbox.window.camera import ViewBox
 from sandbox.window.game_host import GameHost, controls_of, host_of
 from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes
-from sandbox.window.playback.diagnostics import Diagnostics
+from sandbox.window.playback.diagnostics import GHOST_ENGINES, Diagnostics
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import ParameterValue, turned
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.session import Session
 from sandbox.window.view_bounds import predict_bounds
+from sandbox.window.warm_up import warm_up
 from sandbox.window.worker import Compute, compute_here
 
 P = ParamSpec("P")
@@ -152,9 +153,7 @@ def session_of_recording(recording: Recording) -> LiveView:
     except UnsuitableSceneError:  # the session was played without the rules, too
         rules = None
     game = None if rules is None else GameSession(rules, recording.presses)
-    session = Session(
-        recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
-    )
+    session = Session.of_recording(recording, game)
     session.mark_unsaved()
     live = LiveView(session)
     live.seek(round(recording.duration / session.settings.dt))
@@ -221,6 +220,8 @@ class AppState:
         """whether another window has the keyboard focus, which pauses the scene"""
         self.compute: Compute = compute_here
         """runner of jobs that may compile kernels; the window uses a worker thread"""
+        self.on_part: Callable[[str], None] = lambda _: None
+        """callback that receives the description of each part of a warm-up"""
         self.question: str | None = None
         """question asked before manual changes are lost"""
         self.has_unsaved_draft = False
@@ -230,6 +231,8 @@ class AppState:
         self._lost: Recording | None = None  # restored by Ctrl+Z
         self.opening: Scene | None = None
         """scene whose session is being started"""
+        self.opens_same = False
+        """whether it is the shown scene, restarted or edited"""
         self.body_tools = BodyTools()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
@@ -320,17 +323,34 @@ class AppState:
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
     ) -> bool:
-        self.opening = scene
-        try:
-            live = self.compute(lambda: create_session(scene, engine, settings, self.messages))
+        def job() -> LiveView | None:  # one job, so that there is one wait for all that must be compiled
+            self._warm_up(scene, engine, settings)
+            live = create_session(scene, engine, settings, self.messages)
             if live is not None and not same:
-                started = live
-                self.reach = self.compute(lambda: predict_bounds(started.scene, started.engine, settings))
+                self.reach = predict_bounds(live.scene, live.engine, settings)
+            return live
+
+        self.opening, self.opens_same = scene, same
+        try:
+            live = self.compute(job)
         finally:
             self.opening = None
         if live is not None:
             self.show(live, path, file, same)
         return live is not None
+
+    def _warm_up(self, scene: Scene, engine: str, settings: Settings | None, *, ghost: bool | None = None) -> None:
+        """Compile what playing a scene needs: the engine, and the one of its ghost if that is on."""
+        try:
+            scene = scene_in_window(scene)
+        except UnsuitableSceneError:
+            return
+        warm_up(scene, engine, settings, self.on_part)
+        if self._preferences.ghosted if ghost is None else ghost:
+            wanted = (scene.solver if settings is None else settings).common()
+            names = (name for name in GHOST_ENGINES if name != engine and not engine_named(name).missing(scene, wanted))
+            if (name := next(names, None)) is not None:
+                warm_up(scene, name, wanted, self.on_part)
 
     def play_draft(self, scene: Scene, path: Path | None) -> bool:
         """Start a scene that was edited; return whether an engine can run it. The camera stays."""
@@ -423,7 +443,14 @@ class AppState:
             self._warn_no_session("has no ghost; replay it with --engine NAME")
             return
         diagnostics = self.live.diagnostics
-        self.compute(lambda: self._preferences.toggle_ghost(diagnostics))
+        live = self.live
+
+        def job() -> None:
+            if not diagnostics.has_ghost:
+                self._warm_up(live.scene, live.engine, live.session.simulation.wanted, ghost=True)
+            self._preferences.toggle_ghost(diagnostics)
+
+        self.compute(job)
 
     def toggle_trust(self) -> None:
         """Start the divergence monitor at the present time, or stop it."""
@@ -449,8 +476,14 @@ class AppState:
         live = self.live
         if live is None or engine == live.engine:
             return False
+
+        def job() -> str | None:
+            if engine in ENGINES:
+                self._warm_up(live.scene, engine, live.session.simulation.wanted.common())
+            return live.switch_engine(engine)
+
         try:
-            note = self.compute(lambda: live.switch_engine(engine))
+            note = self.compute(job)
         except ActionError as error:
             self.messages.add(str(error), "warning")
             return False

@@ -107,7 +107,7 @@ class CommandDispatcher:
             count = app_state.count_unsaved(restart=command is Command.RESTART)
             if not count:
                 return False
-            question = describe_loss(count, CONFIRMATIONS[command])
+            question = describe_loss(count, CONFIRMATIONS[command], kept=app_state.count_unsaved() - count)
         self.pending, app_state.question = command, question
         return True
 
@@ -170,7 +170,7 @@ class CommandDispatcher:
         if capture.is_recording:
             capture.stop_recording()
         else:
-            capture.start_recording(self._context.surface.get_size(), self._context.name)
+            capture.start_recording(self._context.gui.area.size, self._context.name)
 
     def _add_body(self, *, box: bool) -> None:
         camera, app_state = self._context.camera, self._context.app_state

@@ -101,7 +101,7 @@ class WindowContext:
         camera = Camera.fitting(
             view_bounds(scene), size, inset=self.gui.panel.width, foot=self.gui.bottom_margin, turned=turned
         )
-        Renderer().draw(
+        Renderer(self.gui.accents if self.app_state.opens_same else None).draw(
             image, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), ui_scale=self.gui.ui_scale
         )
         self.gui.panel.draw(image)

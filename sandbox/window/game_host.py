@@ -27,6 +27,8 @@ class ScoreDisplay(NamedTuple):
     """(label, text) rows"""
     over: str | None
     """result; None during the game"""
+    can_restart: bool = True
+    """whether the key R starts a new game at present; not while it would be typed as an initial"""
 
 
 class GameDisplay(NamedTuple):

@@ -47,6 +47,8 @@ class Worker:
         self._done.set()
         self.kernels = 0
         """number of kernels whose compilation the present job has started"""
+        self.part = ""
+        """what the present job is doing, with the number of its parts; set by the job itself"""
         # A daemon, so that a second Ctrl+C ends the process without waiting for it.
         self._thread = threading.Thread(target=self._work, name="sandbox worker", daemon=True)
         self._thread.start()
@@ -57,7 +59,7 @@ class Worker:
             return job()
         self._woken.clear()
         self._done.clear()
-        self.kernels = 0
+        self.kernels, self.part = 0, ""
         found: Future[T] = Future()
 
         def run() -> None:
@@ -110,4 +112,5 @@ class Wait:
         seconds = f"{perf_counter() - self._began:.0f} s"
         if not self._worker.kernels:
             return f"computing … {seconds}"
-        return f"compiling, on first use only … function {self._worker.kernels}, {seconds}"
+        part = f"{self._worker.part}, " if self._worker.part else ""
+        return f"compiling, on first use only … {part}function {self._worker.kernels}, {seconds}"

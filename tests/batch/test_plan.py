@@ -124,7 +124,7 @@ def test_plan_key_depends_on_everything_that_determines_a_run(change, scene, mon
     if change == "text":
         Path(scene[1]).write_text(BALL.replace("radius = 1", "radius = 2"))
     if change == "versions":
-        monkeypatch.setattr(module, "versions", lambda: {"python": "4.0"})
+        monkeypatch.setattr(module, "versions", lambda engine: {"python": "4.0"})
     after = key(
         "exact" if change == "engine" else "pymunk",
         "2" if change == "value" else "1",

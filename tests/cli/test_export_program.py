@@ -9,6 +9,7 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.measure.run.runner import run
+from sandbox.pymunk_export import with_divided_walls
 from sandbox.scene.files.load import load
 from tests.cli.calling import DROP, json_of, lines_of, output_of, write_scene
 
@@ -38,6 +39,44 @@ def test_program_of_a_scene_ends_in_the_state_of_a_run(tmp_path: Path, capfd: py
     )
     state = [*trajectory.position[-1, 0].tolist(), *trajectory.velocity[-1, 0].tolist()]
     assert json.loads(child.stdout) == {"a": state}
+
+
+RAMP = """
+[[wall]]
+name = "ramp"
+points = [[-4, 2], [-1, 0.5], [4, 0]]
+[[box]]
+name = "crate"
+position = [-3.5, 2.5]
+size = [0.5, 0.5]
+"""
+
+
+def test_bent_wall_is_divided_and_the_program_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    name, target = write_scene(tmp_path, DROP + RAMP), tmp_path / "game.py"
+    written, note = output_of(capfd, "export", name, "--to", str(target))
+    assert written.startswith("written: ") and "'ramp'" in note and "divided" in note
+    comments = " ".join(line.removeprefix("# ") for line in target.read_text(encoding="utf-8").splitlines())
+    assert note.removeprefix("note: ") in comments
+    scene, _ = with_divided_walls(load(name))
+    trajectory = run(scene, "pymunk")
+    script = FINAL_STATE.format(steps=len(trajectory.time) - 1)
+    child = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
+    )
+    for body, state in json.loads(child.stdout).items():
+        k = scene.bodies.number_of[body]
+        assert state == [*trajectory.position[-1, k].tolist(), *trajectory.velocity[-1, k].tolist()]
+    status, document, _ = json_of(capfd, "export", name, "--to", str(target), "--force")
+    assert (status, document["files"][0]["divided_walls"]) == (0, ["ramp"])
+
+
+def test_refusal_names_walls_as_in_the_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    ramp = RAMP.replace('name = "ramp"', 'name = "ramp"\none_way = true')
+    name = write_scene(tmp_path, DROP + ramp)
+    status, out, err = lines_of(capfd, "export", name, "--to", str(tmp_path / "game.py"))
+    assert (status, out, len(err)) == (2, [], 1)
+    assert err[0].endswith("one-way walls need callbacks with a memory: 'ramp'")
 
 
 def test_warnings_of_check_are_comments(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

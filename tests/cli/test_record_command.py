@@ -73,6 +73,59 @@ def test_game_without_a_scene_writes_nothing(game, text, message, capfd):
     assert not Path("jump.json").exists()
 
 
+PLAY = GAME.replace("if k == 5:", "if k == 12:\n        CHANGE\n    if k == 5:")
+CHANGES = {
+    "static": "body.body_type = pymunk.Body.STATIC",
+    "static with a pivot": "body.body_type = pymunk.Body.STATIC",
+    "kinematic": "body.body_type = pymunk.Body.KINEMATIC",
+    "not a number": "body.velocity = (float('nan'), 0)",
+    "infinite": "body.position = (float('inf'), 0)",
+    "too fast": "body.velocity = (1e30, 0)",
+    "rotation": "body.angular_velocity = 1e30",
+    "huge gravity": "space.gravity = (1e300, 0)",
+    "joint": "space.add(pymunk.PivotJoint(space.static_body, body, (0, 90)))",
+    "body of no shape": "space.add(pymunk.Body(1, 1))",
+    "tiny disc": "new = pymunk.Body(1, 1); space.add(new, pymunk.Circle(new, 1e-30))",
+    "heavy body": "new = pymunk.Body(1e60, 1); space.add(new, pymunk.Circle(new, 1))",
+    "fast body": "new = pymunk.Body(1, 1); new.velocity = 1e30, 0; space.add(new, pymunk.Circle(new, 1))",
+    "body far away": "new = pymunk.Body(1, 1); new.position = 1e30, 0; space.add(new, pymunk.Circle(new, 1))",
+}
+
+
+@pytest.mark.fail_slow(60)  # each is run and replayed
+@pytest.mark.parametrize("name", CHANGES)
+def test_no_change_ends_the_game_and_each_is_remarked(name: str, game: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    text = PLAY.replace("CHANGE", CHANGES[name])
+    if name == "static with a pivot":  # pymunk then computes velocities that are not finite
+        other = "other = pymunk.Body(1, 10)\nother.position = (30, 100)\n"
+        joint = "space.add(other, pymunk.PivotJoint(body, other, (0, 100)))\n"
+        text = text.replace('print("playing"', other + joint + 'print("playing"')
+    game.write_text(text + 'print("the end")\n')
+    status, document, lines = json_of(capfd, "record", str(game))
+    assert (status, document["steps"], document["ended"]) == (0, 20, None)
+    assert "the end" in lines
+    assert not any("Traceback" in line for line in lines)
+    recording = Recording.load(Path("jump.json"))
+    assert recording.game is not None and recording.game.replay is not None
+    assert document["replay"]["is_equal"] == recording.game.replay.is_equal == (name == "body of no shape")
+    assert bool(document["remarks"]) == (name != "body of no shape")
+    for each in document["remarks"]:
+        assert f"{game}: {each}" in lines
+
+
+def test_replay_that_departs_is_said_with_step_distance_and_body(game, capfd):
+    game.write_text(PLAY.replace("CHANGE", CHANGES["joint"]))
+    assert call(["record", str(game)]) == 0
+    out, err = capfd.readouterr()
+    assert "written: jump.json" in out
+    assert "bit for bit" not in out
+    assert "the replay departs from the game at step 13 (body-1), " in err
+    assert " px at the end: body-1" in err
+    game.write_text(GAME)
+    assert call(["record", "--force", str(game)]) == 0
+    assert "the replay equals the game after each step, bit for bit" in capfd.readouterr().out
+
+
 def test_wrong_arguments(game: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["record", "none.py"]) == 2
     assert "does not exist" in capfd.readouterr().err

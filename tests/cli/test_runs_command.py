@@ -2,6 +2,10 @@
 
 import csv
 import json
+import re
+import shutil
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -130,3 +134,29 @@ def test_folder_without_runs_is_reported(tmp_path: Path, capfd: pytest.CaptureFi
     assert (status, err) == (2, [f"{tmp_path}: no stored runs; `sandbox run SCENE --out {tmp_path}` stores runs"])
     status, out, _ = lines_of(capfd, "runs", str(tmp_path), "--json")
     assert (status, json.loads(out[0])["faults"][0]["file"]) == (2, str(tmp_path))
+
+
+def test_runs_of_several_versions_are_told_apart(study: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As after an update between two commands that add to one store."""
+    folder = str(shutil.copytree(study, tmp_path / "mixed"))
+    with closing(sqlite3.connect(f"{folder}/runs.sqlite")) as database:
+        older = "UPDATE runs SET versions = replace(versions, '+src.', '+src.0') WHERE engine = 'pymunk' AND seed = 1"
+        database.execute(older)
+        database.commit()
+    _, document, err = json_of(capfd, "runs", folder, "--by", "engine")
+    assert [(group["keys"]["engine"], group["versions"]) for group in document["groups"]] == [
+        ("pymunk", 2),
+        ("reference", 1),
+    ]
+    (note,) = err
+    assert re.fullmatch(
+        r"note: runs of pymunk by several versions are taken together: \d of sandbox [^,]*\+src\.\w{8,9}, "
+        r"\d of sandbox [^,]*\+src\.\w{8,9}; --by versions separates them",
+        note,
+    )
+    for words in (("--by", "engine,versions"), ("--by", "engine", "--where", "seed <> 1")):
+        _, document, err = json_of(capfd, "runs", folder, *words)
+        assert ({group["versions"] for group in document["groups"]}, err) == ({1}, [])
+    _, out, _ = lines_of(capfd, "runs", folder, "--where", "engine = 'pymunk'")
+    assert out[0].split()[-1] == "versions"
+    assert "versions" not in lines_of(capfd, "runs", study)[1][0]

@@ -1,12 +1,18 @@
 """`sandbox schema`: the complete schema as JSON, the listing of one table, unknown tables."""
 
 import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from sandbox.cli.main import call
 from sandbox.scene.files.json_schema import dumps, schema
-from tests.cli.calling import json_of, lines_of, output_of
+from tests.cli.calling import DROP, json_of, lines_of, output_of, write_scene
+from tests.engines.builders import ROOT
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
@@ -50,3 +56,47 @@ def test_every_table_of_a_scene_can_be_listed(capfd: pytest.CaptureFixture[str])
         if node.get("type") != "string":
             status, out, err = lines_of(capfd, "schema", key)
             assert (status, err, len(out) > 2) == (0, [], True)
+
+
+@pytest.mark.parametrize("place", [".", "levels", "levels/one.toml", "one.toml"])
+def test_schema_is_installed_beside_scenes_without_a_checkout(tmp_path: Path, place: str) -> None:
+    """Runs a copy of what a wheel installs, away from the sources."""
+    site, folder = tmp_path / "site", tmp_path / "work"
+    shutil.copytree(ROOT / "sandbox", site / "sandbox", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "scenes", site / "sandbox" / "shipped")
+    (folder / "levels").mkdir(parents=True)
+    scenes = [write_scene(folder / name) for name in (".", "levels")]
+    for scene in scenes:
+        Path(scene).rename(Path(scene).with_name("one.toml"))
+    done = subprocess.run(
+        [sys.executable, "-m", "sandbox", "schema", "--install", place],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(site)},
+        timeout=60,
+        check=True,
+    )
+    written, line = done.stdout.splitlines()
+    target = folder / ("levels" if "levels" in place else ".") / "scene.schema.json"
+    assert written == f"written: {target.relative_to(folder)}"
+    address = line.rpartition("#:schema ")[2]
+    assert (target.parent / address).read_text(encoding="utf-8") == dumps()
+
+
+def test_scene_that_names_the_schema_already_is_recognised(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_scene(tmp_path, "#:schema scene.schema.json\n" + DROP)
+    for _ in range(2):  # an older schema is replaced
+        assert "already" in output_of(capfd, "schema", "--install", "drop.toml")[1]
+
+
+@pytest.mark.parametrize("arguments", [["missing"], ["missing/one.toml"], [".", "ball"], [".", "--json"]])
+def test_wrong_install_writes_nothing(
+    arguments: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = lines_of(capfd, "schema", "--install", *arguments)
+    assert (status, out, len(err), list(tmp_path.iterdir())) == (2, [], 1, [])

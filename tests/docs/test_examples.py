@@ -11,12 +11,12 @@ pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that
 MAX_PROCESSES = 1
 """Largest number of commands of a page in the fast tests; each takes a second or more."""
 
+SLOW = [pytest.mark.nightly, pytest.mark.fail_slow(300)]
+"""Marks of the other pages. The search in README takes a minute, and twice that if it compiles kernels."""
+
 
 def _parameters() -> list[object]:
-    return [
-        pytest.param(page, id=str(page.relative_to(ROOT)), marks=[pytest.mark.nightly] if _is_slow(page) else [])
-        for page in PAGES
-    ]
+    return [pytest.param(page, id=str(page.relative_to(ROOT)), marks=SLOW if _is_slow(page) else []) for page in PAGES]
 
 
 def _is_slow(page: Path) -> bool:

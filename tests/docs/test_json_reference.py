@@ -14,13 +14,13 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.cli.json_schemas import DOCUMENTS
 from sandbox.cli.main import COMMANDS, call
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording, ReplayCheck
 from tests.cli.json_validation import assert_valid_document
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
-NO_DOCUMENT = {"play", "replay", "schema"}
+NO_DOCUMENT = {"play", "replay", "schema", "warm"}
 """Commands without a JSON document."""
 
 BAD = "[world]\nduraton = 1\n"
@@ -33,27 +33,45 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "run 9-ball --engine exact --set world.duration=0.1",
         "run landing --seeds 2 --player none --set world.duration=0.2",
         "run session.json",
+        "run lacking.json",
     ),
     "sandbox run --dry-run": ("run tunnel.toml --sweep solver.dt=0.01,0.005 --dry-run",),
     "sandbox runs": ("runs store", "runs store --by engine --of contacts"),
     "sandbox import": ("import level.svg", "import level.svg --to level.toml"),
-    "sandbox check": ("check bounce", "check bullet", "check landing --no-trial", "check bad.toml"),
+    "sandbox check": (
+        "check bounce",
+        "check bullet",
+        "check landing --no-trial",
+        "check bad.toml",
+        "check lacking.json",
+    ),
     "sandbox compare": (
         "compare tunnel.toml --engines pymunk,exact --why",
         "compare tunnel.toml --engines pymunk,exact --minimise small.toml",
         "compare tunnel.toml --engine pymunk --sweep solver.dt=0.01,0.005",
+        "compare lacking.json --engine pymunk",
     ),
     "sandbox tradeoff": (
         "tradeoff pendulum_90 --effort 0.01 --tolerance 1 --set world.duration=0.2",
         "tradeoff tunnel.toml --effort 0.01 --tolerance 0.5",
+        "tradeoff lacking.json --effort 0.01 --tolerance 0.5",
     ),
-    "sandbox advise": ("advise tunnel.toml --effort 0.1 --repeats 1", "advise acted.json --effort 0.1 --repeats 1"),
+    "sandbox advise": (
+        "advise tunnel.toml --effort 0.1 --repeats 1",
+        "advise acted.json --effort 0.1 --repeats 1",
+        "advise lacking.json --effort 0.1 --repeats 1 --tolerance 0.5m",
+    ),
     "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),
     "sandbox report": ("report tunnel.toml --effort 0 --engines exact --out page.html",),
     "sandbox shots": ("shots 9-ball --count 20 --sensitivity --horizon --window '7:upper left pocket'",),
     "sandbox miss": ("miss duel",),
     "sandbox match": ("match straight-rail --players bot:0.5,bot:1 --turns 2",),
-    "sandbox export": ("export store --to run.csv", "export store --to run.png", "export tunnel.toml --to game.py"),
+    "sandbox export": (
+        "export store --to run.csv",
+        "export store --to run.png",
+        "export bent.toml --to game.py",
+        "export lacking.json --to level.toml",
+    ),
     "sandbox record": ("record --to recorded.json played.py",),
     "sandbox scenes": ("scenes",),
     "sandbox engines": ("engines",),
@@ -64,6 +82,14 @@ SLOW = [f"sandbox {name}" for name in ("compare", "tradeoff", "advise", "extreme
 """Sections of which all samples run in the nightly part, and the first one in CI."""
 UNSUCCESSFUL = ("extremes", "match")
 """Commands whose samples end with status 1: a limit is worse than the stored one, and a frame is abandoned."""
+
+BENT = """title = "bent"
+[[wall]]
+points = [[0, -9], [5, -9], [9, -8]]
+[[box]]
+position = [1, -8]
+size = [1, 1]
+"""
 
 PLAYED = """
 import pymunk
@@ -146,6 +172,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text(BAD)
     Path("tunnel.toml").write_text(TUNNEL)
+    Path("bent.toml").write_text(BENT)
     Path("played.py").write_text(PLAYED)
     Path("level.svg").write_text('<svg viewBox="0 0 9 9"><circle r="5"/><text>x</text></svg>')
     limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
@@ -154,6 +181,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Recording(scene, "pymunk", scene.solver, (), duration=0.1).save("session.json")
     push = Impulse(time=0.05, body="bullet", impulse=(1.0, 0.0))
     Recording(scene, "pymunk", scene.solver, (push,), duration=0.2).save("acted.json")
+    game = RecordedGame(omitted=("a joint",), replay=ReplayCheck(False, 1, "bullet", 0.5, "bullet", 0.25))
+    Recording(scene, "pymunk", scene.solver, (), duration=0.2, game=game).save("lacking.json")
     for store in ("store", "damaged"):
         call(["run", "tunnel.toml", "--out", store, "--quiet"])
     (stored,) = Path("damaged").glob("*.npz")

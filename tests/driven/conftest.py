@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,7 +20,7 @@ os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
     """Start an X server without a window manager, and return the name of its display."""
-    missing = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
+    missing = [name for name in ("Xvfb", "xdotool", "setxkbmap") if shutil.which(name) is None]
     missing += ["libX11"] if LIBRARY is None else []
     if missing:
         pytest.skip(f"driving a real window needs {' and '.join(missing)}")
@@ -45,3 +46,14 @@ def drive(display: str, tmp_path: Path) -> Iterator[OpenWindow]:
     finally:
         for window in windows:
             window.end()
+
+
+@pytest.fixture
+def russian_display(display: str) -> Iterator[str]:
+    """Give the keyboard of the X server a Russian layout during a test, and return the name of the display."""
+    words = ["setxkbmap", "-display", display]
+    subprocess.run([*words, "ru"], check=True)
+    try:
+        yield display
+    finally:
+        subprocess.run([*words, "us"], check=True)

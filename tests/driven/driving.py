@@ -162,6 +162,10 @@ class DrivenWindow:
         self.size = width, height
         self._do("windowsize", self.window, width, height)
 
+    def move(self, corner: tuple[int, int]) -> None:
+        """Move the window's upper left corner to a point of the screen, px."""
+        self._do("windowmove", self.window, *corner)
+
     # Output
 
     def shot(self) -> Shot:
@@ -180,10 +184,13 @@ class DrivenWindow:
         """Return standard error so far."""
         return self._err.read_text(encoding="utf-8")
 
-    def session(self) -> Recording:
-        """Save the session by Ctrl+S and return it; all earlier input has been handled by then."""
+    def session(self, keys: str = "ctrl+s") -> Recording:
+        """Save the session by Ctrl+S and return it; all earlier input has been handled by then.
+
+        On a layout without Latin letters, `keys` names the key by its number instead.
+        """
         before = len(self.stdout_lines())
-        self.key("ctrl+s")
+        self.key(keys)
         line = self.wait_for(
             lambda: next((x for x in self.stdout_lines()[before:] if x.startswith("session: ")), ""), "a file"
         )

@@ -13,11 +13,10 @@ from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
 from sandbox.measure.analytic.solve import closed_form, solution
 from sandbox.measure.metrics.contacts import max_penetration
-from sandbox.measure.metrics.invariants import energy_gain, momentum_drift
+from sandbox.measure.metrics.invariants import conserves_energy, energy_gain, momentum_drift
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.speed_bound import SpeedBounds
 from sandbox.measure.preflight.tunnelling import tunnelling_risks
-from sandbox.measure.tradeoff.objective import conserves_energy
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box

@@ -171,6 +171,50 @@ def test_pocketed_ball_collides_with_nothing_and_can_be_moved_back() -> None:
     assert simulation.frame().position[0].tolist() == [0.5, 0.0]
 
 
+def test_ball_that_a_zone_holds_stays_when_it_is_hit_and_leaves_when_it_is_pushed() -> None:
+    hole = {"position": [0.5, 0.0], "radius": 0.03, "holds": True}
+    balls = ball("cue", 0, 0, 1.5, 0.0), ball("next", -0.2, 0, 1.5, 0.0)
+    far = {**HOLE, "position": [5, 5]}  # of which zones are supported in a scene without a surface
+    simulation = start(table(*balls, zone=[hole], pocket=[far], surface=None, contact_models={}))
+    advance(simulation, 500)
+    frame = simulation.frame()
+    assert frame.position[0].tolist() == [0.5, 0.0]
+    assert frame.velocity[0].tolist() == [0.0, 0.0]
+    assert frame.position[1, 0] < 0.5 - 2 * RADIUS
+    assert frame.velocity[1, 0] < 0.0  # it has come back
+    simulation.apply(Impulse(time=0, body="cue", impulse=(0.0, MASS)))
+    assert advance(simulation, 100).frame().position[0, 1] > 0.05
+
+
+GROUNDS = [
+    ("plane", {"point": [0.0, 0.0], "normal": [0.0, 1.0]}, 0.0),
+    ("plane", {"point": [0.0, 0.0], "normal": [0.0, 1.0]}, 3e7),
+    ("wall", {"points": [[-1.0, 0.0], [1.0, 0.0]]}, 0.0),
+    ("post", {"position": [0.0, -0.05], "radius": 0.05}, 0.0),
+]
+
+
+@pytest.mark.parametrize(("kind", "ground", "along"), GROUNDS)
+@pytest.mark.parametrize(("collides", "speed"), [("all", 0.8), ("fixed", 0.8), ("none", -1.0)])
+def test_balls_bounce_off_static_objects_unless_they_collide_with_nothing(
+    kind: str, ground: dict[str, Any], along: float, collides: str, speed: float
+) -> None:
+    balls = [ball("far", along, 0.1, 0.0, -1.0, collides=collides), ball("near", 0, 5)]
+    bare = {"surface": {"gravity": G}, "contact_models": {"ball_ball": "frictional"}}
+    simulation = start(table(*balls, **{kind: [{**ground, "restitution": 0.8}]}, **bare))
+    velocity = advance(simulation, 200).frame().velocity[0, 1]
+    assert velocity == pytest.approx(speed, abs=1e-6)  # coordinates of 3e7 m are rounded to 4e-9 m
+
+
+def test_snapshot_continues_a_break() -> None:
+    """Pymunk has no part in the impulses on a surface, so that its state can be copied."""
+    simulation = start(rack(0.002))
+    simulation.contacts()
+    advance(simulation, 130)
+    resumed = simulation.snapshot().resumed()
+    assert advance(resumed, 200).state_hash() == advance(simulation, 200).state_hash()
+
+
 def test_strike_sets_the_motion_of_the_cue_model() -> None:
     simulation = start(table(ball("cue", 0, 0, -1.0, 0), ball("other", 1, 1)))
     strike = Strike(time=0, ball="cue", aim=0.3, speed=2.0, side=0.2, height=-0.3)

@@ -53,7 +53,7 @@ def started(scene: Scene) -> PymunkSimulation:
 
 def asleep(simulation: PymunkSimulation) -> set[str]:
     """Return the names of the bodies that are asleep."""
-    rows = simulation._population.space_bodies.asleep
+    rows = simulation._store.space_bodies.asleep
     assert rows is not None
     return {simulation.bodies.names[n] for n in np.flatnonzero(rows).tolist()}
 

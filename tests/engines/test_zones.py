@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Action, Force, Impulse, Move, Pull, Remove, SetParameter, Spawn
+from sandbox.engines.common.zoned_bodies import distance_to_outlines, is_inside, make_zone_shapes
 from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.compile.scene import Scene
@@ -39,6 +40,22 @@ SHAPES: dict[str, dict[str, Any]] = {
 }
 CROSSINGS = {"circle": (0.75, 1.25), "strip": (0.65, 0.85), "polygon": (0.6, 1.4)}
 """x at which a body that moves along the x axis enters and leaves each shape, m."""
+
+
+COORDINATE = st.floats(-2.0, 3.0)
+
+
+@given(COORDINATE, COORDINATE, st.floats(0.0, 2.0 * math.pi), st.floats(0.0, 0.999999))
+def test_no_outline_is_nearer_than_its_distance(x: float, y: float, heading: float, fraction: float) -> None:
+    """A point that moves by less than the distance to the nearest outline stays inside or outside of each zone."""
+    shapes = make_zone_shapes(scene_of(*SHAPES.values()).zones)
+    reach = fraction * distance_to_outlines(shapes, x, y)
+    moved = x + reach * math.cos(heading), y + reach * math.sin(heading)
+    inside = [
+        [is_inside(shapes.edge, shapes.first[z], shapes.first[z + 1], shapes.radius[z], *point) for z in range(3)]
+        for point in ((x, y), moved)
+    ]
+    assert inside[0] == inside[1]
 
 
 def run_on(engine: str, scene: Scene, **more: Any) -> Trajectory:

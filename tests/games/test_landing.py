@@ -6,7 +6,7 @@ import pytest
 
 from sandbox.engines.registry import able
 from sandbox.engines.switching import start
-from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import HasRanking, Press, StepInfo, UnsuitableSceneError
 from sandbox.games.landing.bot import LandingBot
 from sandbox.games.landing.rules import (
     DOWN,
@@ -197,3 +197,15 @@ def test_rules_state_the_ship_and_the_pad() -> None:
     assert rules.gravity == 1.62
     assert rules.pad == (20.0, pytest.approx(2.9 + 0.3))  # middle of the wall, at its upper side
     assert SCENE.bodies.names[rules.ship] == "ship"
+
+
+@pytest.mark.parametrize(("height", "angle", "is_ranked"), [(1.1, 0.0, True), (1.7, 0.4, False), (50.0, 0.0, False)])
+def test_only_a_landing_is_ranked_as_a_high_score(height: float, angle: float, is_ranked: bool) -> None:
+    scene = flat(height, angle)
+    rules, simulation = Landing(scene, scene.bodies), start(scene, "pymunk")
+    assert isinstance(rules, HasRanking)
+    assert not rules.is_ranked
+    while rules.game_over is None:
+        rules.on_step(StepInfo(simulation.time, simulation.frame(), simulation.contacts(), ()))
+        simulation.step()
+    assert rules.is_ranked is (rules.game_over == LANDED) is is_ranked

@@ -1,6 +1,5 @@
 """Statistics of scores, and high scores: ten per table; a damaged file is reported and renamed."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from sandbox.games.high_scores import BEST, FILE, HighScores, data_folder, initials_of, opened, table_of
+from sandbox.games.high_scores import BEST, FILE, HighScores, initials_of, opened, table_of
 from sandbox.games.scores import MAX_BINS, QUANTILES, Scores
 from sandbox.scene.files.load import loads
 
@@ -158,16 +157,12 @@ def test_unreadable_file_is_not_treated_as_damaged(tmp_path: Path) -> None:
         opened(tmp_path / FILE)
 
 
-def test_data_folder_is_the_configured_one_or_that_of_the_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("SANDBOX_DATA", str(tmp_path))
-    assert opened().path == tmp_path / FILE
-    monkeypatch.delenv("SANDBOX_DATA")
-    monkeypatch.setattr(os, "name", "posix")
-    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "xdg"))
-    assert data_folder() == tmp_path / "xdg" / "sandbox"
-    monkeypatch.setenv("XDG_DATA_HOME", "not/absolute")
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert data_folder() == tmp_path / ".local" / "share" / "sandbox"
+def test_high_scores_without_a_folder_name_the_variable_that_sets_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SANDBOX_DATA", raising=False)
+    monkeypatch.delenv("XDG_DATA_HOME", raising=False)
+    monkeypatch.setattr("sandbox.user_folders.home_folder", lambda: None)
+    with pytest.raises(OSError, match="SANDBOX_DATA"):
+        opened()
 
 
 def test_table_name_has_the_game_and_the_title() -> None:

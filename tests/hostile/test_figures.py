@@ -82,14 +82,14 @@ report([
 
 
 @INTERPRETER_FLAGS
-def test_invalid_setting_of_a_run_is_a_validation_error(flags: tuple[str, ...]) -> None:
+def test_invalid_setting_of_a_run_is_a_settings_error(flags: tuple[str, ...]) -> None:
     code = f"""
 scene = from_document(document())
 report({{
     key: {{name: outcome(run, scene, **{{key: value}}) for name, value in VALUES.items()}} for key in {SETTINGS}
 }})
 """
-    check_outcomes(run_isolated(SCENE + code, flags), "ValidationError")
+    check_outcomes(run_isolated(SCENE + code, flags), "SettingsError")
 
 
 @INTERPRETER_FLAGS

@@ -44,6 +44,8 @@ def values_for(parameter: click.Parameter) -> tuple[str, ...]:
         return NUMBERS
     if isinstance(parameter.type, click.Path) or parameter.name in ("targets", "minimise"):
         return PATHS
+    if parameter.name == "place":  # a file and a folder are places for the schema
+        return tuple(path for path in PATHS if path not in ("file", "folder"))
     if parameter.name == "table":  # each value builds the schema, which takes a second
         return TEXTS[::3]
     return TEXTS + PATHS if isinstance(parameter, click.Argument) else TEXTS

@@ -64,7 +64,7 @@ def test_invalid_session_is_reported_with_file_and_key(mutate, key, command, tmp
     assert len(err) < 1000
 
 
-@pytest.mark.parametrize("command", ["play", "compare", "check", "tradeoff", "match", "miss", "shots"])
+@pytest.mark.parametrize("command", ["play", "match", "miss", "shots"])
 def test_session_instead_of_a_scene_is_refused(command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.json"
     file.write_text(json.dumps(document()))

@@ -9,9 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import sandbox
+from sandbox.action import Spawn
 from sandbox.engines.pymunk_adapter.colliders import skip_numbers
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.bodies import Polygon
 from sandbox.scene.files.load import from_document
 from tests.laws.bare_libraries import displacements
 
@@ -140,3 +142,23 @@ def test_contacts_of_two_edges_have_different_names_after_the_numbers_skipped(
     first, second = sorted(data.draw(st.sets(st.integers(max(corners, others), 1000), min_size=2, max_size=2)))
     edge, opposite = data.draw(st.integers(0, corners - 1)), data.draw(st.integers(0, others - 1))
     assert len(set(names(first, second, edge, opposite))) == 2
+
+
+def test_polygons_that_join_later_have_names_of_their_own_too() -> None:
+    """Boxes that appear in a scene of a ball move by 2.3 mm; without the numbers that are skipped then, by 20 mm."""
+    corners = ((-0.25, -0.25), (0.25, -0.25), (0.25, 0.25), (-0.25, 0.25))
+    ground = {"name": "ground", "points": [[-5.0, 0.0], [5.0, 0.0]], "friction": 0.7}
+    alone = from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "duration": 10.0},
+            "solver": {"dt": 1 / 60, "substeps": 1},
+            "wall": [ground],
+            "ball": [{"name": "far", "position": [4.0, 0.1], "radius": 0.1}],
+        }
+    )
+    stack = [  # every second one upside down, so that corners 2 and 3 meet
+        Polygon(name=f"box {k}", position=(0.0, 0.25 + 0.5 * k), angle=np.pi * (k % 2), points=corners, friction=0.7)
+        for k in range(3)
+    ]
+    result = run(alone, "pymunk", actions=[Spawn(time=0.0, polygon=each) for each in stack], audit=False)
+    assert np.abs(result.position[-1, 1:] - [each.position for each in stack]).max() < 5e-3

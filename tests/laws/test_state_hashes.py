@@ -34,4 +34,4 @@ def test_state_is_that_of_the_table(name, engine):
 
 
 def test_table_has_each_sample_scene_with_each_engine_that_models_it():
-    assert list(recorded()["hashes"]) == [f"{name} {engine}" for name, engine in cells()]
+    assert set(recorded()["hashes"]) == {f"{name} {engine}" for name, engine in cells()}

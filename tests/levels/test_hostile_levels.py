@@ -2,6 +2,7 @@
 
 import base64
 import os
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -209,6 +210,35 @@ def test_damaged_or_recursive_tileset_is_refused(text: str, tmp_path: Path) -> N
     (tmp_path / "t.tsx").write_text(text)
     body = '<tileset firstgid="1" source="t.tsx"/>' + objects('<object id="1" x="0" y="0" width="4" height="4"/>')
     with pytest.raises(SceneError):
+        import_tmx(map_file(tmp_path, body))
+
+
+@pytest.mark.parametrize("suffix", [".tsj", ".json", ".TSJ"])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not well-formed JSON"),
+        ("[]", "must be an object"),
+        ("{}", "is no tileset"),
+        ('{"type": "map", "layers": []}', "is no tileset"),
+        ('{"type": "tileset"}', "tilewidth"),
+        ('{"type": "tileset", "tilewidth": NaN, "tileheight": 9}', "tilewidth"),
+        ('{"type": "tileset", "tilewidth": 1e99, "tileheight": 9}', "tilewidth"),
+        ('{"type": "tileset", "tilewidth": [9], "tileheight": 9}', "must be a string"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "source": "t.tsx"}', "must not name another file"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "tiles": {"0": {}}}', "before version 1.2"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "tiles": 3}', "must be an array"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "tiles": [{}]}', "has no id"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "tiles": [{"id": 0.5}]}', "must be a whole number"),
+        ("[" * 5000, "nest"),
+        ('{"type": "tileset", "tilewidth": 9, "tileheight": 9, "tiles": [{"id": 0, "objectgroup": {"objects": '
+         '[{"id": 1, "polygon": [{"x": 1}]}]}}]}', "tiles[0].objectgroup.objects[0].polygon[0].y"),
+    ],
+)  # fmt: skip
+def test_damaged_json_tileset_is_refused(text: str, message: str, suffix: str, tmp_path: Path) -> None:
+    (tmp_path / f"t{suffix}").write_text(text)
+    body = f'<tileset firstgid="1" source="t{suffix}"/>' + objects('<object id="1" x="0" y="0" width="4" height="4"/>')
+    with pytest.raises(SceneError, match=re.escape(message)):
         import_tmx(map_file(tmp_path, body))
 
 

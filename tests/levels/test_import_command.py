@@ -76,4 +76,4 @@ def test_other_files_are_refused(name: str, capfd: pytest.CaptureFixture[str]) -
 def test_missing_package_is_named_with_its_installation(package, level, monkeypatch, capfd):
     monkeypatch.setitem(sys.modules, package, None)
     assert call(["import", str(DATA / level)]) == 2
-    assert 'pip install "sandbox2d[import]"' in capfd.readouterr().err
+    assert 'pip install -e ".[import]"' in capfd.readouterr().err

@@ -6,17 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.levels.merging import TileRectangle, merge_rectangles
 from sandbox.levels.outlines import (
     Affine,
     CircleShape,
     PolygonShape,
     RectangleShape,
-    TileRectangle,
     bezier_points,
     centroid,
     contains_point,
     ellipse_shape,
-    merge_rectangles,
     outline_of,
     rectangle_shape,
     rotation,

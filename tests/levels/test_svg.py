@@ -324,3 +324,23 @@ def test_example_runs_and_its_text_loads_as_the_same_scene() -> None:
     assert heights["floor"] == starts["floor"] == pytest.approx(0.1)
     for name in ("ball", "ball copy", "crate", "hammer"):
         assert 0.2 < heights[name] < starts[name]  # it fell, and lies above the top of the floor
+
+
+def test_rectangles_that_share_a_side_become_one_box() -> None:
+    """Rows first, as tiles of a map; others keep their places, names and text."""
+    floor = "".join(f'<rect id="{name}" x="{x}" y="80" width="{w}" height="10"/>' for name, x, w in FLOOR)
+    level = imported(f'{floor}<rect id="step" x="40" y="70" width="10" height="10"/><circle r="5"/>')
+    assert [(box.name, box.position, box.size) for box in level.scene.boxes] == [
+        ("left", (0.5, 0.15), (1.0, 0.1)),
+        ("step", (0.45, 0.25), (0.1, 0.1)),
+    ]
+    assert "rect#left: is one box with 'middle', 'right', as bodies would stop at the seams" in messages(level)
+
+
+FLOOR = ("left", 0, 33.3), ("middle", 33.3, 33.4), ("right", 66.7, 33.3)
+
+
+@pytest.mark.parametrize("change", ['fill="red"', 'data-friction="1"', 'rx="1"', 'data-body="dynamic"'])
+def test_rectangles_that_differ_stay_apart(change: str) -> None:
+    rectangles = f'<rect x="0" y="80" width="50" height="10" {change}/><rect x="50" y="80" width="50" height="10"/>'
+    assert len(imported(rectangles).scene.boxes) == 2

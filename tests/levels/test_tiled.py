@@ -2,10 +2,13 @@
 
 import base64
 import gzip
+import json
 import math
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -181,6 +184,119 @@ def test_external_tileset_in_a_folder_below_is_read(tmp_path: Path) -> None:
     external = '<tileset firstgid="1" source="sets/t.tsx"/><layer'
     (box,) = import_tmx(map_file(tmp_path, external + body.partition("<layer")[2])).scene.boxes
     assert box.size == (0.2, 0.1)
+
+
+def _json_value(text: str) -> object:
+    return json.loads(text) if text in ("true", "false") or text[:1].isdigit() or text[:1] == "-" else text
+
+
+def _json_members(node: ElementTree.Element, *left_out: str) -> dict[str, Any]:
+    """Return attributes and properties of an element of a tileset as Tiled writes them in JSON."""
+    found: dict[str, Any] = {key: _json_value(text) for key, text in node.items() if key not in left_out}
+    if node.find("properties") is not None:
+        found["properties"] = [
+            {key: _json_value(text) if key == "value" else text for key, text in each.items()}
+            for each in node.iterfind("properties/property")
+        ]
+    return found
+
+
+def _json_object(node: ElementTree.Element) -> dict[str, Any]:
+    found = {"name": "", "type": "", "rotation": 0, "visible": True} | _json_members(node)
+    for child in node:
+        if child.tag in ("ellipse", "point", "capsule"):
+            found[child.tag] = True
+        elif child.tag in ("polygon", "polyline"):
+            pairs = [each.split(",") for each in child.attrib["points"].split()]
+            found[child.tag] = [{"x": float(x), "y": float(y)} for x, y in pairs]
+    return found
+
+
+def _json_tile(node: ElementTree.Element) -> dict[str, Any]:
+    found = _json_members(node)
+    if node.find("objectgroup") is not None:
+        shapes = [_json_object(each) for each in node.iterfind("objectgroup/object")]
+        found["objectgroup"] = {"type": "objectgroup", "objects": shapes}
+    return found
+
+
+def as_json(tsx: str) -> str:
+    """Return a tileset (.tsx) as the JSON (.tsj) that Tiled writes of it."""
+    root = ElementTree.fromstring(tsx)
+    document = {"type": "tileset", "columns": 2, "image": "t.png", "version": "1.10"} | _json_members(root)
+    document["tiles"] = [_json_tile(tile) for tile in root.iterfind("tile")]
+    return json.dumps(document)
+
+
+number = st.floats(0.5, 10.0).map(lambda value: round(value, 3))
+outline = st.lists(st.tuples(number, number), min_size=3, max_size=3, unique=True).filter(
+    lambda points: (
+        abs(
+            (points[1][0] - points[0][0]) * (points[2][1] - points[0][1])
+            - (points[1][1] - points[0][1]) * (points[2][0] - points[0][0])
+        )
+        > 0.5
+    )
+)
+collider = st.one_of(
+    st.builds(lambda w, h: f'width="{w}" height="{h}"', number, number),
+    st.builds(lambda w, h, a: f'width="{w}" height="{h}" rotation="{a}"', number, number, number),
+    st.builds(lambda w: f'width="{w}" height="{w}"><ellipse/>', number),
+    st.builds(lambda w, h: f'width="{w}" height="{h}"><capsule/>', number, number),
+    st.builds(lambda points: f'><polygon points="{" ".join(f"{x},{y}" for x, y in points)}"/>', outline),
+    st.builds(lambda points: f'><polyline points="{" ".join(f"{x},{y}" for x, y in points)}"/>', outline),
+).map(lambda text: f'<object id="1" x="1.5" y="2" {text}{"" if ">" in text else ">"}</object>')
+keys = st.sampled_from(
+    [
+        "",
+        '<property name="friction" type="float" value="0.25"/>',
+        '<property name="solid" type="bool" value="true"/>',
+        '<property name="restitution" type="float" value="1"/><property name="colour" type="color" value="#ff102030"/>',
+        '<property name="layer" value="upper"/><property name="unused" type="int" value="-3"/>',
+    ]
+)
+tile = st.builds(
+    lambda keys, colliders: (
+        (f"<properties>{keys}</properties>" if keys else "")
+        + (f"<objectgroup>{''.join(colliders)}</objectgroup>" if colliders else "")
+    ),
+    keys,
+    st.lists(collider, max_size=3),
+)
+
+
+@pytest.mark.fail_slow(60)  # hundreds of files
+@pytest.mark.parametrize("suffix", [".tsj", ".json"])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(tiles=st.lists(tile, min_size=1, max_size=3), align=st.sampled_from(["", 'objectalignment="center"']))
+def test_tileset_in_json_is_that_in_xml(tmp_path: Path, suffix: str, tiles: list[str], align: str) -> None:
+    own = "".join(f'<tile id="{k}">{text}</tile>' for k, text in enumerate(tiles))
+    tsx = f'<tileset name="t" tilewidth="10" tileheight="10" {align}>{own}</tileset>'
+    (tmp_path / "t.tsx").write_text(tsx)
+    (tmp_path / f"t{suffix}").write_text(as_json(tsx))
+    things = objects('<object id="5" gid="1" x="5" y="20" width="10" height="20"/>')
+    layer = '<layer name="ground" width="4" height="3"><data encoding="csv">1,2,3,0,0,1,1,1,0,3,2,1</data></layer>'
+    found = []
+    for name in ("t.tsx", f"t{suffix}"):
+        body = f'<tileset firstgid="1" source="{name}"/>{things}{layer}'
+        try:
+            level = import_tmx(map_file(tmp_path, body))
+        except SceneError as error:  # a property may not fit its shapes
+            found.append([(fault.path, fault.message) for fault in error.faults])
+        else:
+            warnings = [(each.path, each.message) for each in level.warnings]
+            found.append([(level.scene, warnings)])
+    assert found[0] == found[1]
+
+
+def test_fault_in_a_json_tileset_names_its_file_and_tile(tmp_path: Path) -> None:
+    tsx = f'<tileset tilewidth="10" tileheight="10"><tile id="3">{FULL.replace("10", "1e99")}</tile></tileset>'
+    (tmp_path / "t.tsj").write_text(as_json(tsx))
+    body = '<tileset firstgid="1" source="t.tsj"/>' + objects('<object id="1" gid="4" x="0" y="9"/>')
+    with pytest.raises(SceneError) as caught:
+        import_tmx(map_file(tmp_path, body))
+    (fault,) = caught.value.faults
+    assert "tile#3 object#1: width must be a number" in fault.message
 
 
 def test_fault_of_a_property_names_the_object_and_its_line(tmp_path: Path) -> None:

@@ -10,8 +10,9 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.advice import Advice, advise, scoring
+from sandbox.measure.advice import Advice, advise, replays, scoring
 from sandbox.measure.advice.game_code import game_code
+from sandbox.measure.advice.text import fallback_head
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.recording import Recording
@@ -242,6 +243,24 @@ def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() ->
     assert advice.present.missed_contacts == 0
     replays = {each.setting: each for each in advice.replays}
     assert (replays["present"].status, replays["present"].missed_contacts) == ("ok", 1)
+    # The cheapest setting without the actions lets the bullet pass with them.
+    assert (replays["rejected"].status, replays["rejected"].missed_contacts) == ("ok", 1)
+    assert (replays["recommended"].status, replays["recommended"].missed_contacts) == ("ok", 0)
+    again = sandbox.run(scene, "pymunk", actions=[push], **advice.recommended.asked.model_dump())
+    assert again.missed_contacts == 0
+
+
+def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bullet becomes so fast that no number of substeps that is tried stops it."""
+    monkeypatch.setattr(replays, "MAX_DOUBLINGS", 1)
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.1, 0.0]")
+    push = Impulse(time=0.05, body="bullet", impulse=(9e3, 0.0))  # of 1 kg
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2), **QUICK)
+    assert advice.recommended is None
+    assert not advice.is_met
+    assert {each.setting for each in advice.replays} == {"present", "rejected"}
+    assert (advice.fallback_kind, advice.is_within_tolerance(advice.fallback)) == ("actions", True)
+    assert "without the actions" in fallback_head(advice)
 
 
 @pytest.mark.parametrize("name", ["fps", "zoom", "tolerance", "budget", "effort", "time_limit"])

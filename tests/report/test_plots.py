@@ -1,5 +1,8 @@
 """Plots of runs: contents of the figure, and written files."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -245,3 +248,32 @@ def test_failed_write_leaves_existing_files(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"plot\.png"):
         plot_run(euler(scene), scene, target)
     assert [p.name for p in tmp_path.iterdir()] == ["plot.png"]
+
+
+@pytest.mark.parametrize(
+    "backend", ["nonsense", "module://no_such.backend", "module://matplotlib_inline.backend_inline", "tkagg", "svg"]
+)
+def test_plot_is_written_whatever_backend_the_environment_names(tmp_path: Path, backend: str) -> None:
+    """A terminal of a notebook passes on the notebook's backend, which another environment may lack."""
+    hidden = "import sys; sys.modules['matplotlib_inline'] = None; import importlib.metadata as m; "
+    hidden += "found = m.entry_points; m.entry_points = lambda **k: m.EntryPoints(e for e in found(**k) "
+    hidden += "if k.get('group') != 'matplotlib.backend'); from sandbox.cli.main import main; main()"
+    target = tmp_path / "plot.png"
+    done = subprocess.run(
+        [sys.executable, "-c", hidden, "run", "tutorial/ball", "--plot", str(target)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "MPLBACKEND": backend},
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    assert target.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("backend", ["svg", "pdf"])
+def test_valid_backend_stays_that_of_the_users_own_figures(backend: str) -> None:
+    code = "import sandbox.report, matplotlib, os; print(matplotlib.get_backend(), os.environ['MPLBACKEND'])"
+    environment = {**os.environ, "MPLBACKEND": backend}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert done.stdout.split() == [backend, backend]

@@ -83,8 +83,7 @@ def document() -> dict[str, Any]:
     points = [point("pymunk", 0.01, 0.1, 2.0), point("pymunk", 0.001, 0.01, 20.0), point("exact", 0.01, 0.0, 30.0)]
     failed = point("pymunk", 0.1, None, 0.5, "diverged")
     request = {"metric": "max_position", "unit": "m", "tolerance": 0.02, "budget": 0.5, "fps": 60.0}
-    lines = {"floors": {"pymunk": 0.005}, "pareto": points}
-    return {"title": "$x$ <b>", "points": [*points, failed], **lines, **request}
+    return {"title": "$x$ <b>", "points": [*points, failed], "pareto": points, **request}
 
 
 def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
@@ -94,7 +93,7 @@ def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
     assert [list(map(float, front.get_xdata())) for front in fronts] == [[2.0, 20.0, 30.0]]
     assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 1e-16]  # 0 is drawn at the smallest error
     horizontal = [float(line.get_ydata()[0]) for line in panel.lines if list(line.get_xdata()) == [0, 1]]
-    assert horizontal == [0.005, 0.02]
+    assert horizontal == [0.02]
     vertical = [float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]]
     assert vertical == [30.0]  # 0.5 ms per frame at 60 frames per second
 

@@ -190,7 +190,7 @@ def test_scene_with_restitution_falloff_has_no_closed_form() -> None:
 
 
 def test_energy_is_not_conserved_with_falloff_or_kicks() -> None:
-    from sandbox.measure.tradeoff.objective import conserves_energy
+    from sandbox.measure.metrics.invariants import conserves_energy
 
     elastic = {**BALL, "restitution": 1}
     assert conserves_energy(from_document({"ball": [elastic], "post": [POST]}))

@@ -20,7 +20,7 @@ from sandbox.scene.files.toml_changes import (
     with_changes,
     with_swapped_elements,
 )
-from sandbox.scene.files.toml_edit import statements
+from sandbox.scene.files.toml_index import statements
 from tests.samples import each_shipped_scene
 from tests.strategies import Rendered, documents, names, numbers, pairs, rendered, solids
 

@@ -7,8 +7,8 @@ def key(code: int, mod: int = 0, unicode: str = "", scancode: int = 0) -> pygame
     return pygame.event.Event(pygame.KEYDOWN, key=code, mod=mod, unicode=unicode, scancode=scancode)
 
 
-def key_up(code: int) -> pygame.event.Event:
-    return pygame.event.Event(pygame.KEYUP, key=code, mod=0)
+def key_up(code: int, scancode: int = 0) -> pygame.event.Event:
+    return pygame.event.Event(pygame.KEYUP, key=code, mod=0, scancode=scancode)
 
 
 def press(x: float, y: float, button: int = 1) -> pygame.event.Event:

@@ -464,6 +464,6 @@ def test_film_is_recorded_until_it_is_stopped_or_the_window_closes(
         film = tmp_path / f"sandbox-room-{number}.gif"
         assert printed[-1] == f"recorded: {film}"
         with Image.open(film) as image:
-            assert image.size == SIZE
+            assert image.size == window.context.gui.area.size
             assert getattr(image, "n_frames", 1) > 1
     assert not list(tmp_path.glob(".*.tmp"))

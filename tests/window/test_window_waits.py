@@ -179,3 +179,29 @@ def test_worker_reraises_exceptions_of_a_job_and_stays_usable() -> None:
         worker.compute(fail)
     assert worker.compute(lambda: worker.compute(threading.current_thread)) is not threading.current_thread()
     worker.close()
+
+
+@pytest.mark.parametrize("opens", ["picker", "editor"])
+def test_text_typed_while_compiling_is_kept(window: App, opens: str) -> None:
+    run_frame(window, key(pygame.K_o if opens == "picker" else pygame.K_e, pygame.KMOD_CTRL))
+    compile_for(window, key(pygame.K_b, unicode="b"), key(pygame.K_o, unicode="o"))
+    assert [event.unicode for event in pygame.event.get(pygame.KEYDOWN)] == ["b", "o"]
+
+
+def test_letters_typed_while_a_preview_compiles_filter_the_picker(window: App, monkeypatch: pytest.MonkeyPatch) -> None:
+    run_frame(window, key(pygame.K_o, pygame.KMOD_CTRL))
+    browser = window.context.gui.scene_browser
+    assert browser is not None
+    draw = browser.draw
+
+    def compile_and_draw(*args: object) -> None:
+        COMPILE_CLOCK.begin("sandbox.test")
+        COMPILE_CLOCK.end()
+        monkeypatch.setattr(COMPILE_CLOCK, "seconds", COMPILE_CLOCK.seconds + 1.0)
+        pygame.event.post(key(pygame.K_b, unicode="b"))
+        draw(*args)
+
+    monkeypatch.setattr(browser, "draw", compile_and_draw)
+    for _ in range(3):
+        window.run_frame(0.05)
+    assert browser.typed == "bb"  # of the two pictures before

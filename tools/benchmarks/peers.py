@@ -9,7 +9,7 @@ import pymunk
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.common.base import BIAS, SLOP_PER_RADIUS
+from sandbox.engines.common.solver_settings import BIAS, SLOP_PER_RADIUS
 from sandbox.engines.contract import Simulation
 from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
 from sandbox.engines.registry import start
@@ -230,7 +230,7 @@ def copied(count: int) -> Callable[[], float]:
 
 def give_moments(simulation: Simulation, scene: Scene) -> None:
     """Give every body of a pymunk simulation its moment, which the engine omits for bodies that cannot be turned."""
-    space_bodies = simulation._population.space_bodies  # type: ignore[attr-defined]
+    space_bodies = simulation._store.space_bodies  # type: ignore[attr-defined]
     for number, moment in enumerate(scene.bodies.moment.tolist()):
         space_bodies.give_moment(number, moment)
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, scale_for
-from sandbox.engines.box2d_adapter.materials import unmixable
-from sandbox.engines.box2d_adapter.requirements import shape_faults, surfaces_in_use
+from sandbox.engines.box2d_adapter.materials import mixing_faults
+from sandbox.engines.box2d_adapter.requirements import shape_faults
 from sandbox.engines.common.actions import derive_contacts
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.zoned_bodies import ZonedBodyStore
@@ -37,11 +37,11 @@ class Box2DBodies(BodyStore):
         Raises:
             ActionError: Box2D cannot mix the coefficients of pairs, or the scene has too many different surfaces.
         """
-        before, fixtures = (self.setup, self.bodies, self.contact_matrix), self.fixtures
+        before, static = (self.setup, self.bodies, self.contact_matrix), self.static_colliders
         super().change(setup, spawned)
-        reason = next(unmixable(self.contact_matrix, surfaces_in_use(self.bodies, self.contact_matrix)), None)
+        reason = next(mixing_faults(self.setup.scene, self.contact_matrix), None)
         if reason is not None:
-            self.fixtures = fixtures
+            self.static_colliders = static
             self._rebuild(*before)
             raise ActionError(f"box2d: {reason}")
 
@@ -55,7 +55,7 @@ class Box2DBodies(BodyStore):
         matrix = derive_contacts(self.setup, bodies)
         faults = [
             *shape_faults(bodies, self.scale, len(bodies) - 1),
-            *unmixable(matrix, surfaces_in_use(bodies, matrix)),
+            *mixing_faults(self.setup.scene, matrix),
         ]
         if faults:
             raise ActionError(f"box2d: {faults[0]}")

@@ -83,7 +83,7 @@ class TouchingPairs:
             self._ended.add(key)
 
     def batch(self) -> ContactBatch:
-        """Return the present contacts. Box2D does not tell their impulses, which are nan."""
+        """Return the present contacts. Box2D does not report their impulses, which are nan."""
         if self._batch is None:
             self._apply_changes()
             key, normal, point = self._arrays

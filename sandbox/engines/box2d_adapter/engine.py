@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS
-from sandbox.engines.box2d_adapter.materials import unmixable
-from sandbox.engines.box2d_adapter.requirements import joint_faults, size_faults, surfaces_in_use
-from sandbox.engines.common.base import slop_of
+from sandbox.engines.box2d_adapter.materials import FILTER_BITS, mixing_faults
+from sandbox.engines.box2d_adapter.requirements import joint_faults, size_faults
 from sandbox.engines.common.collision_bits import too_many_categories
+from sandbox.engines.common.solver_settings import setting_faults, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import BALLS, Demand, unmodelled
@@ -41,9 +41,6 @@ ABSENT = {
     "idle_speed": "bodies of Box2D are idle below 0.05 of its length units in a second",
 }
 """Settings that Box2D does not have, with the reason"""
-
-FILTER_BITS = 64
-"""Bits of Box2D's collision filters."""
 
 OWN = frozenset(
     {
@@ -107,17 +104,7 @@ class Box2DEngine:
         """Return each demand and setting that Box2D does not support."""
         setup = Setup.of(start)
         missing = [*unmodelled(setup, self.capabilities), *too_many_categories(setup.scene, FILTER_BITS)]
-        for key, method in FIXED_METHODS.items():
-            stated = getattr(settings, key)
-            if stated not in (None, method):
-                missing.append(f"{key} {stated!r} is not supported (only {method!r})")
-        missing += [
-            f"{key} {stated!r} is not supported ({reason})"
-            for key, reason in ABSENT.items()
-            if (stated := getattr(settings, key)) is not None
-        ]
-        if settings.half_kick:
-            missing.append("half_kick applies to pymunk only; remove it")
+        missing += setting_faults(settings, self.name, FIXED_METHODS, ABSENT)
         missing += [
             f"{name}: a drive by torque needs a hinge that contacts can turn back; strokes and plungers are supported"
             for drive, name in zip(setup.scene.drives, names_of(setup.scene), strict=True)
@@ -125,7 +112,7 @@ class Box2DEngine:
         ]
         missing += _first(joint_faults(setup.links))
         matrix = contact_matrix(setup)
-        missing += _first(unmixable(matrix, surfaces_in_use(setup.bodies, matrix)))
+        missing += _first(mixing_faults(setup.scene, matrix))
         missing += _first(size_faults(setup, self.resolve(setup, settings)))
         return (*missing, *overload(setup, settings))
 

@@ -3,9 +3,9 @@
 Box2D takes the square root of the product of two frictions, and the larger of two restitutions. So frictions of
 shapes are factors of the squared coefficients, and restitutions the smallest of those of a surface's pairs.
 
-Where no such values exist, as for balls that roll on a rough plane but slide on each other, moving bodies get two
-shapes of the same form: one that meets static objects only, and one that meets other moving bodies only. Where that
-does not give every pair its coefficients either, the scene is refused.
+Where no such values exist, as for balls that roll on a rough plane but slide on each other, a moving body has a shape
+of the same form for each surface that it can touch, which meets that surface only and has the coefficients of the
+pair; see `roles`.
 """
 
 from collections.abc import Iterator
@@ -13,105 +13,95 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.arrays import BoolArray, FloatArray
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.collision_bits import KINDS, repeated
 from sandbox.engines.common.pair_factors import factors
 from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.description.scene import SceneDescription
 
 TOLERANCE = 2.0**-20
 """relative, of a coefficient; eight roundings of 32-bit numbers"""
+FILTER_BITS = 64
+"""collision categories that Box2D has"""
 
 
-class Coefficients(NamedTuple):
-    """Friction and restitution of the shapes of S surfaces, (S,) each."""
+class ShapeRole(NamedTuple):
+    """Values of a shape, and the partners for which they hold."""
 
-    friction: FloatArray
-    restitution: FloatArray
+    column: int
+    """its values in `ShapeMaterials`"""
+    categories: int
+    """collision categories that it belongs to, as bits"""
+    mask: int
+    """collision categories of its partners"""
 
 
 class ShapeMaterials(NamedTuple):
-    """Values of the shapes of S surfaces."""
+    """Values of shapes with each of S surfaces."""
 
-    against_static: Coefficients
-    """of shapes of moving bodies that meet static objects"""
-    against_moving: Coefficients
-    """of shapes of moving bodies that meet moving bodies"""
-    static: Coefficients
-    """of static objects"""
-    is_split: bool
-    """whether moving bodies need a shape of each kind"""
+    friction: FloatArray
+    """(S, K): K = 1 if one shape serves all partners; else against static objects of each surface, moving bodies of
+    each surface, and of a static object against all"""
+    restitution: FloatArray
+    """(S, K), of the same"""
+
+    @property
+    def is_split(self) -> bool:
+        """Whether a moving body has a shape for each surface that it can touch."""
+        return bool(self.friction.shape[1] > 1)
 
 
-def shape_materials(matrix: ContactMatrix, is_moving: BoolArray) -> ShapeMaterials:
-    """Return the values of the shapes of each surface.
+def shape_materials(matrix: ContactMatrix) -> ShapeMaterials:
+    """Return the values of shapes with the S surfaces of a contact matrix."""
+    friction, restitution, touching = matrix.surfaces.friction, matrix.surfaces.restitution, matrix.touching
+    factor = np.asarray(factors(friction**2, touching, [None] * len(touching)))
+    smallest = np.where(touching, restitution, np.inf).min(axis=1, initial=np.inf)
+    smallest = np.where(np.isfinite(smallest), smallest, 0.0)
+    mixed = (np.sqrt(np.outer(factor, factor)), friction), (np.maximum.outer(smallest, smallest), restitution)
+    if not any(((np.abs(found - wanted) > TOLERANCE * wanted) & touching).any() for found, wanted in mixed):
+        return ShapeMaterials(factor[:, None], smallest[:, None])
+    # A static object has friction 1 and restitution 0, which leaves a square root and the other's restitution.
+    one = np.ones((len(touching), 1))
+    return ShapeMaterials(np.hstack((friction**2, friction, one)), np.hstack((restitution, restitution, 0.0 * one)))
+
+
+def roles(
+    materials: ShapeMaterials, matrix: ContactMatrix, surface: int, bits: tuple[int, int], static: int | None
+) -> Iterator[ShapeRole]:
+    """Yield the role of each shape that an object needs for a part with a surface.
+
+    If it is more than one, each collision category of the scene becomes one for each surface. The shape of surface i
+    that meets surface j belongs to categories of i and has a mask of those of j, so that of two bodies only the two
+    shapes meet which were made for each other.
 
     Args:
-        matrix: contact matrix with S surfaces.
-        is_moving: (S, 2) whether moving bodies, and whether static objects, have each surface.
+        materials: values of the shapes.
+        matrix: contact matrix of the scene.
+        surface: index of the surface.
+        bits: categories and mask of the object in the scene.
+        static: categories of static objects in the scene, for a moving body; None for a static object.
     """
-    surfaces, touching = matrix.surfaces, matrix.touching
-    tables = surfaces.friction, surfaces.restitution
-    plain = _solve(*tables, touching)
-    if not _wrong(plain, *tables, touching).any():
-        return ShapeMaterials(plain, plain, plain, is_split=False)
-    mutual, with_static = _kinds_of_pairs(touching, is_moving)
-    # Of moving and of static objects as if they were 2·S surfaces, of which only pairs across the halves touch.
-    size, none = len(touching), np.zeros_like(touching)
-    across = np.block([[none, with_static], [with_static.T, none]])
-    both = _solve(np.tile(surfaces.friction, (2, 2)), np.tile(surfaces.restitution, (2, 2)), across)
-    moving = Coefficients(both.friction[:size], both.restitution[:size])
-    static = Coefficients(both.friction[size:], both.restitution[size:])
-    return ShapeMaterials(moving, _solve(*tables, mutual), static, is_split=True)
-
-
-def unmixable(matrix: ContactMatrix, is_moving: BoolArray) -> Iterator[str]:
-    """Yield which coefficients of pairs Box2D's mixing cannot give; arguments as for `shape_materials`."""
-    touching = matrix.touching
-    if not touching.any():
+    categories, mask = bits
+    if not materials.is_split:
+        yield ShapeRole(0, categories, mask)
         return
-    found, tables = shape_materials(matrix, is_moving), (matrix.surfaces.friction, matrix.surfaces.restitution)
-    if not found.is_split:
+    size = len(matrix.touching)
+    own = repeated(categories, size, 1 << surface)
+    if static is None:
+        yield ShapeRole(2 * size, own, repeated(mask, size, (1 << size) - 1))
         return
-    mutual, with_static = _kinds_of_pairs(touching, is_moving)
-    wrong = _wrong(found.against_moving, *tables, mutual)
-    wrong |= _wrong(found.against_static, *tables, with_static, found.static)
-    for which, (name, rule) in enumerate(
-        (("friction", "the square root of the product of two values"), ("restitution", "the larger of two values"))
-    ):
-        rows, columns = np.nonzero(wrong[which])
-        if len(rows):
-            value = float(tables[which][rows[0], columns[0]])
-            yield f"a {name} of {value:g} beside those of other pairs is not supported: Box2D mixes {name} as {rule}"
+    for k, partners in enumerate((mask & static, mask & ~static)):
+        for partner in np.flatnonzero(matrix.touching[surface]).tolist() if partners else ():
+            yield ShapeRole(k * size + partner, own, repeated(partners, size, 1 << partner))
 
 
-def _kinds_of_pairs(touching: BoolArray, is_moving: BoolArray) -> tuple[BoolArray, BoolArray]:
-    """Return which surfaces (S, S) of two moving bodies touch, and which of a moving body and a static object."""
-    moving, static = is_moving.T
-    return touching & np.outer(moving, moving), touching & np.outer(moving, static)
-
-
-def _solve(friction: FloatArray, restitution: FloatArray, touching: BoolArray) -> Coefficients:
-    """Return the values that best match coefficients (S, S) of the pairs that can touch."""
-    values = factors(friction**2, touching, [None] * len(touching))
-    smallest = np.where(touching, restitution, np.inf).min(axis=1, initial=np.inf)
-    return Coefficients(np.asarray(values), np.where(np.isfinite(smallest), smallest, 0.0))
-
-
-def _wrong(
-    found: Coefficients,
-    friction: FloatArray,
-    restitution: FloatArray,
-    pairs: BoolArray,
-    others: Coefficients | None = None,
-) -> BoolArray:
-    """Return which pairs have another friction, and another restitution, (2, S, S).
-
-    `others` are the values of the surfaces in the columns, if they are not those in the rows.
-    """
-    partner = found if others is None else others
-    mixed_friction = np.sqrt(np.outer(found.friction, partner.friction))
-    mixed_restitution = np.maximum.outer(found.restitution, partner.restitution)
-    differences = (
-        np.abs(mixed - wanted) > TOLERANCE * wanted
-        for mixed, wanted in ((mixed_friction, friction), (mixed_restitution, restitution))
-    )
-    return np.asarray([each & pairs for each in differences])
+def mixing_faults(scene: SceneDescription, matrix: ContactMatrix) -> Iterator[str]:
+    """Yield why Box2D cannot give each pair of surfaces its coefficients."""
+    size, bits = len(matrix.touching), KINDS * len(scene.layers) * max(len(scene.categories), 1)
+    if size * bits > FILTER_BITS and shape_materials(matrix).is_split:
+        yield (
+            f"{size} materials whose pairs have coefficients of their own, which need as many shapes of each body; its "
+            f"collision filters have bits for {FILTER_BITS // bits}. Box2D takes the square root of the product of two "
+            "frictions and the larger of two restitutions: give more pairs such values, or more bodies the same "
+            "material"
+        )

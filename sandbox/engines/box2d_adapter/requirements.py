@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.box2d_adapter.limits import (
     FARTHEST_LENGTHS,
     FASTEST_LENGTHS,
@@ -17,7 +17,6 @@ from sandbox.engines.box2d_adapter.limits import (
     scale_for,
 )
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -25,16 +24,6 @@ from sandbox.scene.geometry.shapes import UNTURNABLE
 
 MERGED = {LinkKind.MOTOR: "motor", LinkKind.ROTARY_LIMIT: "rotary limit"}
 """Joints that Box2D has as part of a pivot only"""
-
-
-def surfaces_in_use(bodies: Bodies, matrix: ContactMatrix) -> BoolArray:
-    """Return whether moving bodies, and whether static objects, have each surface, (S, 2)."""
-    surfaces = matrix.surfaces
-    used = np.zeros((len(matrix.touching), 2), np.bool_)
-    owner = np.arange(len(bodies)) if bodies.round.all() else bodies.shapes.body
-    fixed = bodies.fixed[owner]
-    used[surfaces.of_shape[~fixed], 0] = used[surfaces.of_shape[fixed], 1] = used[surfaces.of_fixed, 1] = True
-    return used
 
 
 @cache

@@ -390,7 +390,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call, and entries of zones.
 
-        The impulses of contacts are nan, as Box2D does not tell them; those of entries are 0.
+        The impulses of contacts are nan, as Box2D does not report them; those of entries are 0.
         """
         if self._log is None:
             self._log = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=False)
@@ -413,7 +413,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         """
         raise Refusal(
             "box2d",
-            ("energy accounting: Box2D does not tell the impulses of contacts",),
+            ("energy accounting: Box2D does not report the impulses of contacts",),
             ("pymunk", "reference", "exact"),
         )
 

@@ -20,6 +20,7 @@ import numpy.typing as npt
 import pyb2d3 as box2d
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.box2d_adapter.chains import DEPTH_LENGTHS, chain_loops
 from sandbox.engines.box2d_adapter.contacts import TouchingPairs
 from sandbox.engines.box2d_adapter.limits import (
     CLAMPED_LENGTHS,
@@ -28,8 +29,7 @@ from sandbox.engines.box2d_adapter.limits import (
     MAX_WORLDS,
     scale_for,
 )
-from sandbox.engines.box2d_adapter.materials import ShapeMaterials, shape_materials
-from sandbox.engines.box2d_adapter.requirements import surfaces_in_use
+from sandbox.engines.box2d_adapter.materials import ShapeRole, roles, shape_materials
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.common.collision_bits import bits_of_body, bits_of_static, static_categories
@@ -84,17 +84,6 @@ class StateRows(NamedTuple):
     """(B, M) rad/s"""
 
 
-class ShapeRole(NamedTuple):
-    """Partners of a shape."""
-
-    categories: int
-    """collision categories that it belongs to, as bits"""
-    mask: int
-    """collision categories of its partners"""
-    coefficients: str
-    """its values in `ShapeMaterials`: against_static, against_moving or static"""
-
-
 class TooManyWorldsError(RuntimeError):
     """Box2D has no room for another world."""
 
@@ -121,7 +110,8 @@ class Box2DWorld:
         self.ground = self._world.create_static_body(position=(0.0, 0.0))
         """static body at the origin, for joints to the world"""
         self._set_reach(plane_reach)
-        self._materials = self._shape_materials()
+        self._materials = shape_materials(store.contact_matrix)
+        self._known_roles: dict[tuple[int, tuple[int, int], bool], list[ShapeRole]] = {}
         for k in range(self._first):
             self._add_static(k)
         for index in np.flatnonzero(store.present).tolist():
@@ -171,34 +161,46 @@ class Box2DWorld:
             return None
         return float(self._middle[0]), float(self._middle[1]), self._reach
 
-    def _shape_materials(self) -> ShapeMaterials:
-        matrix = self._store.contact_matrix
-        return shape_materials(matrix, surfaces_in_use(self._store.bodies, matrix))
-
     def _shape_def(self, index: int, surface: int, role: ShapeRole, group: int = 0) -> Any:
         """Return the definition of a shape of a body or, with −1 − k, of a static collider."""
         shape_def = box2d.shape_def(density=1.0, enable_contact_events=True, update_body_mass=False)
-        material = shape_def.material
-        coefficients = getattr(self._materials, role.coefficients)
-        material.friction = float(coefficients.friction[surface])
-        material.restitution = float(coefficients.restitution[surface])
-        speed = self._store.contact_matrix.surfaces.surfaces[surface].speed
-        if speed:
-            material.tangent_speed = speed * self.scale
-            self._speeds.setdefault(index, []).append(speed)
-        shape_def.material = material
-        shape_filter = box2d.Filter()
-        shape_filter.category_bits, shape_filter.mask_bits = role.categories, role.mask
-        shape_filter.group_index = -group  # shapes of a negative group do not collide with each other
-        shape_def.filter = shape_filter
+        shape_def.material = self._material(surface, role)
+        shape_def.filter = _filter(role, group)
         shape_def.user_data = index + self._first
+        self._note_speed(index, surface)
         return shape_def
 
-    def _surfaces_of(self, index: int) -> list[int]:
-        """Return the surfaces of the shapes of a body or, with −1 − k, of a static collider, in their order."""
+    def _material(self, surface: int, role: ShapeRole) -> Any:
+        """Return the material of a shape."""
+        return box2d.surface_material(
+            friction=float(self._materials.friction[surface, role.column]),
+            restitution=float(self._materials.restitution[surface, role.column]),
+            tangent_speed=self._store.contact_matrix.surfaces.surfaces[surface].speed * self.scale,
+        )
+
+    def _note_speed(self, index: int, surface: int) -> None:
+        """Note the speed of the surface of a new shape, if it has one."""
+        speed = self._store.contact_matrix.surfaces.surfaces[surface].speed
+        if speed:
+            self._speeds.setdefault(index, []).append(speed)
+
+    def _surfaces_of_parts(self, index: int) -> list[int]:
+        """Return the surface of each part of a body."""
+        bodies, surfaces = self._store.bodies, self._store.contact_matrix.surfaces
+        if bodies.round.all():
+            return [int(surfaces.of_body[index])]
+        first, last = np.searchsorted(bodies.shapes.body, (index, index + 1)).tolist()
+        return [int(surface) for surface in surfaces.of_shape[first:last]]
+
+    def _parts_of(self, index: int) -> list[tuple[int, ShapeRole]]:
+        """Return surface and role of each shape that a body or, with −1 − k, a static collider should have."""
+        shapes = self._shapes[index]
         if index < 0:
-            return [int(self._store.contact_matrix.surfaces.of_fixed[-1 - index])] * len(self._shapes[index])
-        return [surface for _ in self._roles(index) for surface, _ in self._geometries(index)]
+            surface = int(self._store.contact_matrix.surfaces.of_fixed[-1 - index])
+            return [(surface, self._role_of_static(-1 - index, surface))] * len(shapes)
+        if not self._has_contacts(index) and (self._materials.is_split or not shapes):
+            return []
+        return [(part, role) for part in self._surfaces_of_parts(index) for role in self._roles(index, part)]
 
     def _with_new_speed(self) -> set[int]:
         """Return the bodies and static colliders whose surfaces have another speed than their shapes."""
@@ -206,7 +208,7 @@ class Box2DWorld:
         speeds = [surface.speed for surface in surfaces]
         if not (self._speeds or any(speeds)):
             return set()
-        wanted = {index: [speeds[k] for k in self._surfaces_of(index) if speeds[k]] for index in self._shapes}
+        wanted = {index: [speeds[k] for k, _ in self._parts_of(index) if speeds[k]] for index in self._shapes}
         return {index for index in self._shapes if self._shapes[index] and wanted[index] != self._speeds.get(index, [])}
 
     def add(self, index: int) -> None:
@@ -223,9 +225,9 @@ class Box2DWorld:
         body = create(position=self._vector(store.position[index]), rotation=box2d.make_rot(float(store.angle[index])))
         self._bodies[index] = body
         self._shapes[index] = []
-        if store.contact_matrix.touches[index] or fixed:
-            for role in self._roles(index):
-                for surface, geometry in self._geometries(index):
+        if self._has_contacts(index):
+            for surface, geometry in zip(self._surfaces_of_parts(index), self._geometries(index), strict=True):
+                for role in self._roles(index, surface):
                     definition = self._shape_def(index, surface, role, int(bodies.group[index]))
                     self._shapes[index].append((role, body.create_shape(definition, geometry)))
         if not fixed:
@@ -234,20 +236,24 @@ class Box2DWorld:
         if not (fixed or kinematic):
             self.set_mass(index)
 
-    def _roles(self, index: int) -> list[ShapeRole]:
-        """Return the role of each kind of shape that a body has: one, or one for each kind of partner."""
+    def _has_contacts(self, index: int) -> bool:
+        """Return whether a body can touch something, or is fixed, so that others may touch it."""
+        return bool(self._store.contact_matrix.touches[index] or self._store.bodies.fixed[index])
+
+    def _roles(self, index: int, surface: int) -> list[ShapeRole]:
+        """Return the role of each shape that a body has for a part with a surface."""
         store = self._store
-        categories, mask = bits_of_body(store.scene, store.bodies, index, int(store.layer[index]))
-        if store.bodies.fixed[index]:
-            return [ShapeRole(categories, mask, "static")]
-        if not self._materials.is_split:
-            return [ShapeRole(categories, mask, "against_moving")]
-        static = static_categories(store.scene)
-        roles = (
-            ShapeRole(categories, mask & static, "against_static"),
-            ShapeRole(categories, mask & ~static, "against_moving"),
-        )
-        return [role for role in roles if role.mask]
+        bits = bits_of_body(store.scene, store.bodies, index, int(store.layer[index]))
+        key = surface, bits, bool(store.bodies.fixed[index])
+        if key not in self._known_roles:
+            static = None if store.bodies.fixed[index] else static_categories(store.scene)
+            self._known_roles[key] = list(roles(self._materials, store.contact_matrix, surface, bits, static))
+        return self._known_roles[key]
+
+    def _role_of_static(self, k: int, surface: int) -> ShapeRole:
+        """Return the role of the shapes of the k-th static collider."""
+        bits = bits_of_static(self._store.scene, self._store.scene.fixed[k])
+        return next(roles(self._materials, self._store.contact_matrix, surface, bits, None))
 
     def set_mass(self, index: int) -> None:
         """Set mass and moment of inertia of a body.
@@ -277,21 +283,18 @@ class Box2DWorld:
         position = self._vector(self._store.position[index])
         self._bodies[index].set_transform(position, box2d.make_rot(float(self._store.angle[index])))
 
-    def _geometries(self, index: int) -> Iterator[tuple[int, Any]]:
-        """Yield surface and geometry of the shapes of a body."""
-        bodies, surfaces, scale = self._store.bodies, self._store.contact_matrix.surfaces, self.scale
+    def _geometries(self, index: int) -> Iterator[Any]:
+        """Yield the geometry of each part of a body."""
+        bodies, scale = self._store.bodies, self.scale
         if bodies.round.all():
-            yield (
-                int(surfaces.of_body[index]),
-                box2d.circle(radius=float(bodies.radius[index]) * scale, center=(0.0, 0.0)),
-            )
+            yield box2d.circle(radius=float(bodies.radius[index]) * scale, center=(0.0, 0.0))
             return
         shapes = bodies.shapes
         first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
         for piece in range(first, last):
             corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]] * scale
             radius = float(shapes.radius[piece]) * scale
-            yield int(surfaces.of_shape[piece]), _geometry(corners, radius)
+            yield _geometry(corners, radius)
 
     def _add_static(self, k: int) -> None:
         """Add the k-th static collider, if it is solid."""
@@ -301,10 +304,24 @@ class Box2DWorld:
         self._shapes[index] = []
         if isinstance(collider, Plane) or collider.solid:
             surface = int(self._store.contact_matrix.surfaces.of_fixed[k])
-            role = ShapeRole(*bits_of_static(scene, collider), "static")
+            role = self._role_of_static(k, surface)
+            depth = DEPTH_LENGTHS / self.scale
+            loops = chain_loops(scene, self._store.bodies, self._store.position, k, depth)
+            if loops is not None:
+                self._add_loops(index, loops, surface, role)
+                return
             for geometry in self._static_geometries(collider):
                 shape = body.create_shape(self._shape_def(index, surface, role), geometry)
                 self._shapes[index].append((role, shape))
+
+    def _add_loops(self, index: int, loops: list[FloatArray], surface: int, role: ShapeRole) -> None:
+        for points in loops:
+            definition = box2d.chain_def(points * self.scale, material=self._material(surface, role), is_loop=True)
+            definition.filter = _filter(role)
+            for shape in self._bodies[index].create_chain(definition).get_segments():
+                shape.user_data = index + self._first
+                self._shapes[index].append((role, shape))
+                self._note_speed(index, surface)
 
     def _origin_of(self, collider: Plane | Wall | Post) -> tuple[float, float]:
         """Return the position of the body of a static collider; of a plane, the point nearest to the middle."""
@@ -355,26 +372,22 @@ class Box2DWorld:
         Return the indices of bodies that had to be replaced, which end their joints.
         """
         replaced: set[int] = set()
-        store, was_split = self._store, self._materials.is_split
-        self._materials = self._shape_materials()
+        store, materials = self._store, shape_materials(self._store.contact_matrix)
+        self._materials, self._known_roles = materials, {}
         with_new_speed = self._with_new_speed()
-        for index in list(self._shapes):
-            if index < 0:
-                if index in with_new_speed:
-                    self._replace_static(-1 - index)
-                continue
-            is_new = index in with_new_speed or (not self._shapes[index] and store.contact_matrix.touches[index])
-            if is_new or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
+        for index, shapes in list(self._shapes.items()):
+            parts = self._parts_of(index)
+            if index not in with_new_speed and [role for _, role in parts] == [role for role, _ in shapes]:
+                for (surface, role), (_, shape) in zip(parts, shapes, strict=True):
+                    shape.friction = float(materials.friction[surface, role.column])
+                    shape.restitution = float(materials.restitution[surface, role.column])
+                if index >= 0 and not (store.bodies.fixed[index] or store.kinematic[index]):
+                    self.set_mass(index)
+            elif index < 0:
+                self._replace_static(-1 - index)
+            else:
                 self._replace(index)
                 replaced.add(index)
-        for index, shapes in self._shapes.items():
-            # A body without contacts has no shapes.
-            for surface, (role, shape) in zip(self._surfaces_of(index), shapes, strict=False):
-                coefficients = getattr(self._materials, role.coefficients)
-                shape.friction = float(coefficients.friction[surface])
-                shape.restitution = float(coefficients.restitution[surface])
-            if index >= 0 and not (store.bodies.fixed[index] or store.kinematic[index]):
-                self.set_mass(index)
         self._collect()
         return replaced
 
@@ -512,7 +525,7 @@ class Box2DWorld:
         return states
 
     def contact_batch(self) -> ContactBatch:
-        """Return the present contacts. Box2D does not tell their impulses, which are nan."""
+        """Return the present contacts. Box2D does not report their impulses, which are nan."""
         return self._pairs.batch()
 
     def close(self) -> None:
@@ -522,6 +535,13 @@ class Box2DWorld:
             self._bodies.clear()
             self._shapes.clear()
             self._world.destroy()
+
+
+def _filter(role: ShapeRole, group: int = 0) -> Any:
+    shape_filter = box2d.Filter()
+    shape_filter.category_bits, shape_filter.mask_bits = role.categories, role.mask
+    shape_filter.group_index = -group  # shapes of a negative group do not collide with each other
+    return shape_filter
 
 
 def _geometry(corners: FloatArray, radius: float) -> Any:

@@ -16,7 +16,7 @@ from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
-from sandbox.scene.description.world import MAX_SLOP, Settings
+from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Frame
 
 
@@ -270,41 +270,3 @@ FASTEST = 1e13
 """m/s, largest speed; ten times the largest start speed of a scene"""
 
 BEYOND = "is not finite, or is out of range"
-
-
-SLOP_PER_RADIUS = 0.01
-"""Default slop as a fraction of the smallest radius or half width. pymunk's default of 0.1 m would let a ball of 5 cm
-rest 10 cm deep."""
-
-BIAS = (1.0 - 0.1) ** 60
-"""pymunk's default: a tenth of an overlap is corrected in 1/60 s."""
-
-
-LIBRARY_SETTINGS = {
-    "continuous": ("box2d",),
-    "workers": ("box2d",),
-    "sleeping": ("pymunk", "box2d"),
-    "sleep_time": ("pymunk",),
-    "idle_speed": ("pymunk",),
-}
-"""Settings of libraries, and the engines that have them"""
-
-
-def library_settings_in(settings: Settings, engine: str) -> list[str]:
-    """Return why settings of libraries that are stated are not supported by an engine, given by its name."""
-    return [
-        f"{key} applies to {' and '.join(engines)} only; remove it"
-        for key, engines in LIBRARY_SETTINGS.items()
-        if engine not in engines and getattr(settings, key) is not None
-    ]
-
-
-def slop_of(start: Scene | Setup) -> float:
-    """Return the default slop, m: the overlap that is not corrected.
-
-    It follows from the thinnest body that can collide.
-    """
-    bodies = Setup.of(start).bodies
-    can_collide = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
-    min_thickness = float(bodies.thin[can_collide].min()) if can_collide.any() else 1.0
-    return min(SLOP_PER_RADIUS * min_thickness, MAX_SLOP)

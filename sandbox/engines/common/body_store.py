@@ -1,6 +1,5 @@
 """State of all bodies of a running simulation as arrays, and their collision masks."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -9,9 +8,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import derive_contacts, has_same_bodies
-from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
-from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.common.motors import rate_after_level_change
 from sandbox.scene.compile.bodies import Bodies
@@ -36,7 +33,7 @@ class BodyStore:
     def __init__(self, setup: Setup, h: float) -> None:
         self.setup, self.h = setup, h
         scene, bodies = setup.scene, setup.bodies
-        self.fixtures: StaticColliders = static_colliders(scene)
+        self.static_colliders: StaticColliders = static_colliders(setup)
         self.position: FloatArray = bodies.position.copy()
         self.velocity: FloatArray = bodies.velocity.copy()
         self.angle: FloatArray = bodies.angle.copy()
@@ -71,9 +68,13 @@ class BodyStore:
         return self.setup.scene
 
     def _rebuild(self, setup: Setup, bodies: Bodies, matrix: ContactMatrix) -> None:
-        """Derive the arrays that depend on the set of bodies and their materials."""
+        """Use another setup, other bodies or other materials."""
         self.setup, self.bodies, self.contact_matrix = setup, bodies, matrix
-        surfaces = matrix.surfaces
+        self._derive_solver_arrays()
+
+    def _derive_solver_arrays(self) -> None:
+        """Derive the arrays of a solver, which depend on the bodies that are present and on their materials."""
+        bodies, matrix, surfaces = self.bodies, self.contact_matrix, self.contact_matrix.surfaces
         self.radius: FloatArray = bodies.radius
         self.surface: IntArray = surfaces.of_body
         self.fixed_surface: IntArray = surfaces.of_fixed
@@ -216,7 +217,7 @@ class BodyStore:
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
         matrix = derive_contacts(setup, bodies)
         if scene.fixed != self.scene.fixed:
-            self.fixtures = static_colliders(scene)
+            self.static_colliders = static_colliders(setup)
         self._rebuild(setup, bodies, matrix)
 
     def add(self, single: BodySpec, name: str) -> int:
@@ -265,6 +266,8 @@ class BodyStore:
 
     def beyond(self) -> int | None:
         """Return the index of a body that is not finite or out of bounds; None if there is none."""
+        from sandbox.engines.common.state_bounds import first_beyond  # a kernel: not every engine needs a compiler
+
         index = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity, self.roll)
         return None if index < 0 else index
 
@@ -293,25 +296,3 @@ class HasBodyStore:
     def broken(self) -> Mapping[int, float]:
         """Time in s, by index in `setup.links`, at which joints broke."""
         return self._store.broken
-
-
-@kernel
-def first_beyond(
-    position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, roll: FloatArray
-) -> int:
-    """Return the index of the first of N bodies that is not finite or out of bounds; −1 if there is none.
-
-    Args:
-        position: (N, 2) m, at most `FARTHEST` from the origin.
-        velocity: (N, 2) m/s, at most `FASTEST`.
-        angle: (N,) rad.
-        spin: (N,) rad/s.
-        roll: (N, 2) rad/s, about x and y.
-    """
-    for i in range(len(position)):
-        # Comparisons with nan are false, so a nan anywhere makes `is_valid` false.
-        is_valid = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
-        is_valid = is_valid and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
-        if not (is_valid and abs(spin[i]) + abs(angle[i]) + abs(roll[i, 0]) + abs(roll[i, 1]) < math.inf):
-            return i
-    return -1

@@ -13,6 +13,7 @@ import numpy as np
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Wall
 
@@ -22,10 +23,6 @@ line: two roundings of each coordinate."""
 
 LEAN = 1e-9
 """Sine of the angle up to which a contact normal does not lean over a joint of a wall: smaller angles are rounding."""
-
-SIDEWAYS = 0.1
-"""A normal whose angle to a segment's direction has a smaller sine does not show on which side of the segment a body
-is."""
 
 
 class StaticColliders(NamedTuple):
@@ -94,12 +91,13 @@ def _in_line(a: Point, b: Point, c: Point) -> bool:
     return distance <= IN_LINE * max(map(abs, (*a, *b, *c)))
 
 
-def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
+def static_colliders(start: Scene | Setup, everything: bool = False) -> StaticColliders:
     """Return a scene's static colliders as arrays: the solid ones, or all with `everything`.
 
-    They are derived once a scene and shared, so that their arrays must not be changed.
+    They are derived once for each scene or setup and shared, so that their arrays must not be changed. A scene is
+    compiled for that; a setup is compiled already.
     """
-    return _all_colliders(scene) if everything else _solid_colliders(scene)
+    return _all_colliders(start) if everything else _solid_colliders(start)
 
 
 def _collect(scene: Scene, everything: bool) -> StaticColliders:

@@ -61,6 +61,11 @@ def _repeated(kinds: int, layers: int, categories: int, count: int) -> int:
     return sum(kinds << KINDS * (max(count, 1) * layer + k) for layer in _ones(layers) for k in _ones(categories))
 
 
+def repeated(bits: int, count: int, which: int) -> int:
+    """Return bits of which each is replaced by `count` ones, of which those in `which` are set."""
+    return sum(which << count * k for k in _ones(bits))
+
+
 def _ones(bits: int) -> Iterator[int]:
     """Yield the positions of the bits that are set."""
     return (k for k in range(bits.bit_length()) if bits >> k & 1)

@@ -6,6 +6,7 @@ from sandbox.engines.common.kernel import bare_kernel
 from sandbox.scene.geometry import vectors
 
 nearest_fraction, rotate = bare_kernel(vectors.nearest_fraction), bare_kernel(vectors.rotate)
+is_left_of_bend = bare_kernel(vectors.is_left_of_bend)
 
 
 @bare_kernel

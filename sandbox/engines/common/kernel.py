@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK, say
+from sandbox.user_folders import cache_folders
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -132,8 +133,7 @@ def cache_folder() -> Path | None:
     for file in sorted((*_sources(engines), *_sources(geometry))):
         status = file.stat()
         stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())
-    user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for parent in (engines / "__pycache__", user / "sandbox2d"):
+    for parent in (engines / "__pycache__", *cache_folders()):
         folder = parent / f"kernels-{installation}-{stamp.hexdigest()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)

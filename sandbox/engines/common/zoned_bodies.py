@@ -52,6 +52,16 @@ def make_zone_shapes(zones: Sequence[Zone]) -> ZoneShapes:
     return ZoneShapes(np.asarray(edges), np.asarray(first), np.asarray(radius), np.asarray(box))
 
 
+def distance_to_outlines(shapes: ZoneShapes, x: float, y: float) -> float:
+    """Return the distance, m, from a point to the nearest outline of a zone; less inside of strips with corners."""
+    start, along = shapes.edge[:, :2], shapes.edge[:, 2:] - shapes.edge[:, :2]
+    offset, squared = (x, y) - start, np.einsum("ek,ek->e", along, along)
+    fraction = np.einsum("ek,ek->e", offset, along) / np.where(squared, squared, 1.0)
+    gap = offset - np.clip(fraction, 0.0, 1.0)[:, None] * along
+    radius = np.repeat(shapes.radius, np.diff(shapes.first))
+    return float(np.abs(np.hypot(gap[:, 0], gap[:, 1]) - radius).min())
+
+
 @kernel
 def is_inside(edge: FloatArray, first: int, end: int, radius: float, x: float, y: float) -> bool:
     """Return whether a point, m, is inside the zone with the edges first…end."""
@@ -109,10 +119,6 @@ def update_inside(
     return count
 
 
-NO_OFFSET = np.zeros(2)
-"""m/s, offset of velocities in time: 0 in this engine"""
-
-
 class ZonedBodyStore(BodyStore):
     """Body store of a scene with zones: the host that `ZoneTracker` acts on."""
 
@@ -127,15 +133,19 @@ class ZonedBodyStore(BodyStore):
         self._changed = False
         self.tracker = ZoneTracker(scene, self)
         self._rebuild_zones()
-        self.tracker.begin(np.flatnonzero(self.contact_matrix.can_enter_zone).tolist(), entering=setup.time == 0.0)
+        self.tracker.begin(np.flatnonzero(self._can_enter_zone).tolist(), entering=setup.time == 0.0)
 
     def _rebuild_zones(self) -> None:
         more = np.zeros((len(self.visits) - len(self._inside), self.visits.shape[1]), np.bool_)
         self._inside = np.vstack((self._inside, more))
         self._changed_bodies: BoolArray = np.zeros(len(self.visits), np.bool_)
-        self._can_enter_zone: BoolArray = self.contact_matrix.can_enter_zone & self.present
+        self._can_enter_zone: BoolArray = self._sensed()
         self.tracker.rebuild_arrays(self.position, self.velocity, self.angular_velocity, self.layer, self.visits)
         self.tracker.rebuild(self.contact_matrix)
+
+    def _sensed(self) -> BoolArray:
+        """Return which bodies (N,) zones detect."""
+        return self.contact_matrix.can_enter_zone & self.present
 
     def detect(self, position: FloatArray) -> bool:
         """Find the zones of (N, ≥ 2) centres, m, at the end of a substep; return whether effects have to be applied."""
@@ -143,10 +153,15 @@ class ZonedBodyStore(BodyStore):
             self.pending.update(np.flatnonzero(self._changed_bodies).tolist())
         return bool(self.pending)
 
+    @property
+    def ahead(self) -> FloatArray:
+        """Velocity, (2,) m/s, by which velocities are ahead of time: 0 unless an engine kicks by half a step."""
+        return np.zeros(2)
+
     def apply_zones(self) -> bool:
         """Apply the effects of zones; return whether that changed more than the visits."""
         self._changed = False
-        self.tracker.apply_effects(NO_OFFSET)
+        self.tracker.apply_effects(self.ahead)
         return self._changed
 
     def at(self, position: FloatArray) -> list[int]:

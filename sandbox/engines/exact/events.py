@@ -9,10 +9,10 @@ import math
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
-from sandbox.engines.common.body_store import first_beyond
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.kernel import inline_kernel
+from sandbox.engines.common.state_bounds import first_beyond
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
 from sandbox.engines.exact.common.requirements import TOUCH_OVERLAP

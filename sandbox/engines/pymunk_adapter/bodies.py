@@ -5,91 +5,20 @@ the same scheme. A body joins the space when something that it can touch appears
 """
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.actions import derive_contacts, has_same_bodies
-from sandbox.engines.common.lifetimes import NO_BODIES
-from sandbox.engines.common.zones import ZoneTracker
+from sandbox.engines.common.actions import has_same_bodies
+from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.requirements import combination_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
-from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, BodySpec, Collides, Point
+from sandbox.scene.description.base import BodySource, BodySpec, Collides
 from sandbox.scene.description.world import Settings
-
-if TYPE_CHECKING:
-    from sandbox.engines.tabletop.stepper import TabletopStepper
-
-
-class PymunkZoneHost:
-    """`ZoneHost` of the bodies in a pymunk space."""
-
-    def __init__(self, space_bodies: SpaceBodies) -> None:
-        self._space_bodies = space_bodies
-
-    def rebuild(self, scene: Scene, bodies: Bodies) -> None:
-        """Update after a change of the scene's gravity, or of the set of bodies."""
-        self._gravity, self._bodies = np.asarray(scene.world.gravity), bodies
-
-    @property
-    def pending(self) -> set[int]:
-        """Bodies that have entered or left a zone, or are to be checked."""
-        return self._space_bodies.zone_sensors.pending
-
-    @pending.setter
-    def pending(self, pending: set[int]) -> None:
-        self._space_bodies.zone_sensors.pending = pending
-
-    def at(self, position: FloatArray) -> list[int]:
-        """Return the zones that contain a position, m, in ascending order."""
-        return self._space_bodies.zone_sensors.at(position)
-
-    def inside(self, index: int) -> list[int]:
-        """Return the zones that contained a body's centre at the end of the last substep, in ascending order."""
-        return self._space_bodies.zone_sensors.inside(index)
-
-    def is_sensed(self, index: int) -> bool:
-        """Return whether a body is in the space and zones sense it."""
-        return self._space_bodies.is_sensed(index)
-
-    @property
-    def with_own_gravity(self) -> list[int]:
-        """Bodies on which a zone's gravity acts."""
-        return self._space_bodies.constant_forces.with_zone_force
-
-    def set_layer(self, index: int) -> None:
-        """Apply a body's changed collision layer from now on. Its contacts on the old layer end."""
-        self._space_bodies.set_layer(index, self._bodies)
-
-    def set_position(self, index: int, position: FloatArray) -> None:
-        """Set the position of a body, m."""
-        self._space_bodies.set_position(index, position)
-
-    def hold(self, index: int) -> None:
-        """Hold a body in place, whatever it collides with, until `release`."""
-        self._space_bodies.hold(index)
-
-    def release(self, index: int) -> None:
-        """Release a body that was held."""
-        self._space_bodies.release(index)
-
-    def set_gravity(self, index: int, gravity: Point | None) -> None:
-        """Replace the world's gravity on a body by another, m/s², by a force that makes up the difference."""
-        force = None if gravity is None else (np.asarray(gravity) - self._gravity) * self._bodies.mass[index]
-        self._space_bodies.constant_forces.set_zone_force(index, force)
-
-
-UNCORRECTED = 1e9
-"""m of overlap that pymunk leaves uncorrected on a surface, where the tabletop stepper corrects it."""
 
 MAX_OVERLAPPED_BODIES = 100
 """Number of bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
@@ -124,112 +53,31 @@ def check_overlaps(
         raise ActionError(f"it would overlap {candidates} bodies; the limit is {MAX_CANDIDATES}")
 
 
-def _solvers(setup: Setup, settings: Settings) -> "tuple[TabletopStepper | None, SpaceBodies]":
-    """Return the stepper of balls on a surface, None without a surface, and the bodies in the pymunk space."""
-    if not on_floor(setup):
-        return None, SpaceBodies(setup, settings)
-    from sandbox.engines.tabletop.contacts import SKIN  # only scenes with a surface load kernels and their compiler
-    from sandbox.engines.tabletop.stepper import TabletopStepper
+class PymunkBodies(BodyStore):
+    """State of all bodies of a running scene as arrays in scene order, and the space and particles that advance it.
 
-    return TabletopStepper(setup.scene, settings), SpaceBodies(setup, settings.replace(slop=UNCORRECTED), SKIN)
-
-
-class PymunkBodies:
-    """State of all bodies of a running scene as arrays in scene order, and the space and particles that advance it."""
+    The arrays are read from the space when they are asked for; see `refresh`. With `half_kick` the velocities are half
+    a kick ahead of time.
+    """
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
-        self.setup, scene = setup, setup.scene
-        self.bodies: Bodies = setup.bodies
-        self.position, self.velocity = self.bodies.position.copy(), self.bodies.velocity.copy()
-        self.angle, self.angular_velocity = self.bodies.angle.copy(), self.bodies.angular_velocity.copy()
-        self.present: BoolArray = np.ones(len(self.bodies), dtype=np.bool_)
-        self.ended = False
-        self._fresh = True
-        self.h, self._settings = settings.h, settings
+        self._settings, self.ended, self._is_fresh = settings, False, True
         self._half_kick = 0.5 * settings.h if settings.half_kick else 0.0
+        self.space_bodies = SpaceBodies(setup, settings)
+        self.particles = Particles(setup.scene.world, settings.h, self.space_bodies.field)
+        super().__init__(setup, settings.h)
         self.velocity[~self.bodies.fixed] += self.ahead
-        self.roll = self.bodies.roll.copy()
-        self.layer, self.visits = self.bodies.layer.copy(), self.bodies.visits.copy()
-        self.tabletop, self.space_bodies = _solvers(setup, settings)
-        self.particles = Particles(scene.world, settings.h, self.space_bodies.field)
-        self._zone_host = PymunkZoneHost(self.space_bodies)
-        self.zone_tracker = ZoneTracker(scene, self._zone_host) if scene.zones else None
-        """state of bodies with regard to zones; None without zones"""
-        self._rebuild(scene, contact_matrix(setup))
-        self._set_arrays()
-        self.distribute(np.arange(len(self.bodies)))
-        self.capture()
-        if self.zone_tracker is not None:
-            sensed = filter(
-                self.space_bodies.is_sensed, np.flatnonzero(self._contact_matrix.can_enter_zone).tolist()
-            )  # others may lie in pockets
-            self.zone_tracker.begin(sensed, entering=setup.time == 0.0)
-
-    @property
-    def scene(self) -> Scene:
-        """The scene, with all changes that actions have made."""
-        return self.setup.scene
-
-    def _rebuild(self, scene: Scene, matrix: ContactMatrix, same_bodies: bool = False) -> None:
-        """Update after a change of the scene or contact matrix. With `same_bodies`, only the world has changed."""
-        self._contact_matrix = matrix
-        if self.tabletop is not None:  # the tabletop stepper resolves collisions, not pymunk
-            self.tabletop.rebuild(scene, matrix)
-            zero = np.zeros_like(matrix.surfaces.restitution)
-            matrix = replace(matrix, surfaces=replace(matrix.surfaces, restitution=zero, friction=zero))
-        if same_bodies:
-            self.space_bodies.rebuild_world(scene)
-        else:
-            self.space_bodies.rebuild(scene, matrix)
-        if self.zone_tracker is not None:
-            self._zone_host.rebuild(scene, self.bodies)
-            self.zone_tracker.rebuild(matrix)
-
-    def _set_arrays(self) -> None:
-        """Pass the present arrays to the space, the zones and the tabletop stepper."""
         self.space_bodies.layer = self.layer
-        if self.zone_tracker is not None:
-            self.zone_tracker.rebuild_arrays(
-                self.position, self.velocity, self.angular_velocity, self.layer, self.visits
-            )
-        if self.tabletop is not None:
-            from sandbox.engines.tabletop.stepper import BallArrays
+        self.space_bodies.rebuild(self.scene, self.contact_matrix)
+        self.distribute(np.arange(len(self.bodies)))
 
-            state = BallArrays(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
-            self.tabletop.rebuild_arrays(state, self.bodies, self.present)
-
-    def capture(self) -> bool:
-        """Capture balls in pockets. Return whether there were any."""
-        captured = self.tabletop.capture() if self.tabletop is not None else NO_BODIES
-        if len(captured):
-            self.space_bodies.leave(captured)
-        return len(captured) > 0
-
-    @property
-    def has_pending_zones(self) -> bool:
-        """Whether a body has entered or left a zone."""
-        return self.zone_tracker is not None and bool(self.space_bodies.zone_sensors.pending)
-
-    def update_zones(self) -> None:
-        """Apply the effects of zones."""
-        if self.zone_tracker is not None:
-            self.refresh()
-            self.zone_tracker.apply_effects(self.ahead)
-
-    @property
-    def free_to_move(self) -> BoolArray:
-        """(N,) whether each body is present, not fixed, and not held by a zone."""
-        return self.moving if self.zone_tracker is None else self.moving & ~self.zone_tracker.held
+    def _derive_solver_arrays(self) -> None:
+        """Derive none: pymunk has its own, and to derive them takes longer than to remove a body."""
 
     @property
     def ahead(self) -> FloatArray:
         """Velocity, (2,) m/s, by which velocities are ahead of time: half a kick, or 0."""
         return np.asarray(self.scene.world.gravity) * self._half_kick
-
-    @property
-    def moving(self) -> BoolArray:
-        """(N,) whether each body is present and not fixed."""
-        return self.present & ~self.bodies.fixed
 
     @property
     def can_turn(self) -> bool:
@@ -238,7 +86,7 @@ class PymunkBodies:
 
     def invalidate(self) -> None:
         """Record that the space and particles have advanced beyond the arrays."""
-        self._fresh = self.ended or self.tabletop is not None
+        self._is_fresh = self.ended
 
     def end(self) -> None:
         """Keep the arrays as they are from now on."""
@@ -247,10 +95,9 @@ class PymunkBodies:
 
     def refresh(self) -> None:
         """Update the arrays in scene order."""
-        if self._fresh:
-            return
-        self._fresh = True
-        self.space_bodies.write(self.position, self.velocity, self.angle, self.angular_velocity)
+        if not self._is_fresh:
+            self._is_fresh = True
+            self.space_bodies.write(self.position, self.velocity, self.angle, self.angular_velocity)
 
     def break_joints(self) -> IntArray:
         """Remove joints whose load exceeded their strength in the last substep; return their indices."""
@@ -261,8 +108,8 @@ class PymunkBodies:
 
     def distribute(self, indices: IntArray) -> None:
         """Add each of some bodies to the space or to the particles."""
-        matrix, bodies = self._contact_matrix, self.bodies
-        is_particle = matrix.free[indices] & ~self._driven[indices]
+        matrix, bodies = self.contact_matrix, self.bodies
+        is_particle = matrix.free[indices] & ~self._needs_space[indices]
         state = self.position, self.velocity, self.angle, self.angular_velocity
         self.particles.rebuild_arrays(*state, bodies)
         self.particles.join(indices[is_particle & ~bodies.fixed[indices]])
@@ -275,13 +122,13 @@ class PymunkBodies:
         self.space_bodies.link(self.setup.links)
 
     @property
-    def _driven(self) -> BoolArray:
+    def _needs_space(self) -> BoolArray:
         """(N,) bodies that only the space can move: kinematic ones, and those with thrusts or drives.
 
-        All bodies if they attract each other or can fall asleep, or on a surface.
+        All bodies if they attract each other or can fall asleep.
         """
         space_bodies, scene = self.space_bodies, self.scene
-        if space_bodies.field.between_bodies or self.tabletop is not None or self._settings.sleeping:
+        if space_bodies.field.between_bodies or self._settings.sleeping:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not (scene.thrusts or scene.drives):
             return self.bodies.kinematic
@@ -290,74 +137,48 @@ class PymunkBodies:
         return self.bodies.kinematic | np.asarray(driven, np.bool_)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
-        """Continue with a changed scene. Only air, gravity, coefficients, points of walls and solid flags may differ.
+        """Continue with a changed scene, as `BodyStore.change`.
 
         Raises:
-            ActionError: the settings or the engine do not support the change.
+            ActionError: as `BodyStore.change`, or the settings or pymunk do not support the change.
         """
-        scene = setup.scene
-        if faults := combination_faults(scene, self._settings, bool(self.bodies.kinematic.any())):
+        if faults := combination_faults(setup.scene, self._settings, bool(self.bodies.kinematic.any())):
             raise ActionError(faults[0])
-        bodies, matrix = self.bodies, self._contact_matrix
-        same_bodies = spawned is None and has_same_bodies(scene, self.scene)
-        is_checked = same_bodies and scene.world is self.scene.world
-        if self.tabletop is not None and not is_checked and (reason := next(unsupported_by_steppers(setup), None)):
-            raise ActionError(reason)
-        if not same_bodies:
-            spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
-            bodies = replace(bodies, elements=(*scene.elements, *spawned))
-            matrix = derive_contacts(setup, bodies)
+        has_new_bodies = spawned is not None or not has_same_bodies(setup.scene, self.scene)
         self.refresh()
-        self.velocity[self.moving] -= self.ahead
-        self.setup, self.bodies = setup, bodies
-        self.velocity[self.moving] += self.ahead
+        present_velocity = self.velocity[self.mobile] - self.ahead
+        super().change(setup, spawned)
+        self.velocity[self.mobile] = present_velocity + self.ahead
         if self._half_kick:
             for index in self.space_bodies.movable_indices():
                 self.space_bodies.set_velocity(index, self.velocity[index])
-        self.particles.world = scene.world
+        self.particles.world = setup.scene.world
         self.particles.rebuild()
-        self._rebuild(scene, matrix, same_bodies)
+        if has_new_bodies:
+            self.space_bodies.rebuild(setup.scene, self.contact_matrix)
+        else:
+            self.space_bodies.rebuild_world(setup.scene)
         self.space_bodies.joints.update(setup.links)
-        self._set_arrays()
-
-    def is_in_pocket(self, index: int) -> bool:
-        """Return whether a body lies in a pocket."""
-        return self.tabletop is not None and bool(self.tabletop.pocket[index] >= 0)
 
     def add(self, single: BodySpec, name: str) -> int:
-        """Add a body and return its index.
+        """Add a body and return its index, as `BodyStore.add`.
 
         Raises:
-            ActionError: the scene would have too many different surfaces, or the body is not supported on a surface.
+            ActionError: as `BodyStore.add`, or pymunk does not support the body in the scene.
         """
-        scene = self.scene
-        bodies = self.bodies.joined_by(single, name)
-        if self.tabletop is not None and (reason := next(unsupported_by_steppers(self.setup, bodies), None)):
-            raise ActionError(reason)
-        if faults := combination_faults(scene, self._settings, bool(bodies.kinematic.any())):
+        has_kinematic = bool(self.bodies.kinematic.any()) or single.kinematic
+        if faults := combination_faults(self.scene, self._settings, has_kinematic):
             raise ActionError(f"pymunk: {faults[0]}")
-        matrix = derive_contacts(self.setup, bodies)
         self.refresh()
-        index = len(self.bodies)
-        self.bodies = bodies
-        ahead = np.zeros(2) if single.fixed else self.ahead
-        self.position = np.vstack((self.position, self.bodies.position[-1:]))
-        self.velocity = np.vstack((self.velocity, self.bodies.velocity[-1:] + ahead))
-        self.angle = np.append(self.angle, self.bodies.angle[-1])
-        self.angular_velocity = np.append(self.angular_velocity, self.bodies.angular_velocity[-1])
-        self.roll = np.vstack((self.roll, self.bodies.roll[-1:]))
-        self.present = np.append(self.present, True)
-        self.layer = np.append(self.layer, self.bodies.layer[-1])
-        self.visits = np.vstack((self.visits, self.bodies.visits[-1:]))
-
-        self._rebuild(scene, matrix)
-        self._set_arrays()
-        self.space_bodies.add_missing_shapes(bodies)
-        outside = [n for n in np.flatnonzero(self.present & ~matrix.free).tolist() if not self.space_bodies.holds(n)]
-        self._move_to_space(np.asarray([n for n in outside if n != index and not self.is_in_pocket(n)], np.int64))
+        index = super().add(single, name)
+        self.velocity[index] += np.zeros(2) if single.fixed else self.ahead
+        self.space_bodies.layer = self.layer
+        self.space_bodies.rebuild(self.scene, self.contact_matrix)
+        self.space_bodies.add_missing_shapes(self.bodies)
+        touching = np.flatnonzero(self.present & ~self.contact_matrix.free).tolist()
+        outside = [n for n in touching if n != index and not self.space_bodies.holds(n)]
+        self._move_to_space(np.asarray(outside, np.int64))
         self.distribute(np.asarray([index]))
-        if self.zone_tracker is not None:
-            self.zone_tracker.update_position(index)
         return index
 
     def _move_to_space(self, indices: IntArray) -> None:
@@ -374,17 +195,12 @@ class PymunkBodies:
             if force.any() or torque:
                 self.space_bodies.set_constant_force(index, force, torque)
 
-    def remove_bodies(self, indices: IntArray) -> None:
-        """Remove bodies. Their rows stay in the arrays, with zero velocity."""
+    def remove_bodies(self, indices: IntArray, time: float) -> None:
+        """Remove bodies at a time, s. Their rows stay in the arrays, with zero velocity."""
         self.refresh()
         self.particles.leave(indices)
         self.space_bodies.leave(np.asarray([n for n in indices.tolist() if self.space_bodies.holds(n)], np.int64))
-        self.present[indices] = False
-        self.velocity[indices], self.angular_velocity[indices], self.roll[indices] = 0.0, 0.0, 0.0
-        if self.tabletop is not None:
-            self.tabletop.remove(indices)
-        if self.zone_tracker is not None:
-            self.zone_tracker.forget(indices)
+        super().remove_bodies(indices, time)
 
     def motion(self, index: int) -> tuple[FloatArray, float]:
         """Return the velocity (2,), m/s, and the angular velocity, rad/s, of a body."""
@@ -392,62 +208,18 @@ class PymunkBodies:
         return self.velocity[index] - self.ahead, float(self.angular_velocity[index])
 
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
-        """Set the velocity of a body, m/s.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._is_in_play(index):
-            self.velocity[index] = velocity
-        else:
-            self._release(index)
-            self._owner(index).set_velocity(index, velocity + self.ahead)
+        """Set the velocity of a body, m/s."""
+        super().set_velocity(index, velocity + self.ahead)
+        self._owner(index).set_velocity(index, velocity + self.ahead)
 
     def set_spin(self, index: int, spin: float) -> None:
-        """Set the angular velocity of a body, rad/s.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._is_in_play(index):
-            self.angular_velocity[index] = spin
-        else:
-            self._owner(index).set_spin(index, spin)
-
-    def set_roll(self, index: int, roll: tuple[float, float]) -> None:
-        """Set the angular velocity of a ball on a surface about x and y, rad/s; without a surface do nothing.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self._is_in_play(index):
-            self.roll[index] = roll
-
-    def _release(self, index: int) -> None:
-        """Release a body that a zone holds."""
-        if self.zone_tracker is not None:
-            self.zone_tracker.release_body(index)
-
-    def _is_in_play(self, index: int) -> bool:
-        """Return whether a body is a ball on a surface.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self.tabletop is None:
-            return False
-        self.tabletop.check_in_play(index, self.bodies.names[index])
-        return True
+        """Set the angular velocity of a body, rad/s."""
+        super().set_spin(index, spin)
+        self._owner(index).set_spin(index, spin)
 
     def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
-        """Apply a constant force (N) and torque (N·m) to a body from now on.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        self._is_in_play(index)
-        if force.any() or torque:
-            self._release(index)
+        """Apply a constant force (N) and torque (N·m) to a body from now on."""
+        super().set_constant_force(index, force, torque)
         owner = self._owner(index)
         if torque and owner is self.space_bodies and not math.isfinite(owner.moment(index)):
             owner.give_moment(index, float(self.bodies.moment[index]))
@@ -456,22 +228,15 @@ class PymunkBodies:
     def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
         self.refresh()
-        self.position[index] = position
-        if self.tabletop is not None and self.is_in_pocket(index):
-            self.tabletop.return_to_play(index)
-            self.distribute(np.asarray([index]))
-            return
-        self._release(index)
+        super().move_body(index, position)
         owner = self._holder(index)
         if owner is not None:
             owner.set_position(index, position)
-        if self.zone_tracker is not None:
-            self.zone_tracker.update_position(index)
 
     def turn_body(self, index: int, angle: float) -> None:
         """Set the angle of a body, rad."""
         self.refresh()
-        self.angle[index] = angle
+        super().turn_body(index, angle)
         owner = self._holder(index)
         if owner is not None:
             owner.set_angle(index, angle)

@@ -43,6 +43,11 @@ class SpaceBodyTable:
         """Return the indices of the bodies that are not fixed."""
         return [index for index, member in self._members.items() if member.moves]
 
+    def position_of(self, index: int) -> tuple[float, float]:
+        """Return the position of a body, m."""
+        vector = lib.cpBodyGetPosition(self._members[index].body._body)
+        return vector.x, vector.y
+
     def moment(self, index: int) -> float:
         """Return a body's moment of inertia, kg·m²; infinite if nothing in the scene can turn it."""
         return self._resting[index][1] if index in self._resting else self._members[index].body.moment

@@ -30,11 +30,12 @@ import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.engines.common.colliders import LEAN, SIDEWAYS, WallSegment
+from sandbox.engines.common.colliders import LEAN, WallSegment
 from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, rebound
 from sandbox.engines.pymunk_adapter.reader import address_of
 from sandbox.scene.compile.contacts import PairTable
 from sandbox.scene.description.world import Kick
+from sandbox.scene.geometry.vectors import is_left_of_bend
 
 
 def closing_speed(arbiter: pymunk.Arbiter) -> float:
@@ -95,14 +96,14 @@ def _corrected_normal(normal: pymunk.Vec2d, segment: WallSegment, shape: pymunk.
     neighbour_end, sign = (segment.after, 1.0) if lean > 0.0 else (segment.before, -1.0)
     if neighbour_end is None:
         return None
-    next_direction = (pymunk.Vec2d(*neighbour_end) - (b if lean > 0.0 else a)).normalized()
+    joint = b if lean > 0.0 else a
+    next_direction = (pymunk.Vec2d(*neighbour_end) - joint).normalized()
     if normal.dot(next_direction) <= LEAN:
         return None
     left = along.perpendicular()
-    side = normal.dot(left)
-    if abs(side) < SIDEWAYS:
-        side = (shape.bb.center() - a).dot(left)
-    side = 1.0 if side >= 0.0 else -1.0
+    first, second = (along, next_direction) if lean > 0.0 else (-next_direction, along)
+    # The normal does not show on which side of the wall the body is: it may be that of one of the body's faces.
+    side = 1.0 if is_left_of_bend(*(shape.bb.center() - joint), *first, *second) else -1.0
     own_normal, next_normal = side * left, side * sign * next_direction.perpendicular()
     return own_normal if normal.dot(own_normal) >= normal.dot(next_normal) else next_normal
 

@@ -101,10 +101,10 @@ def fixed_shapes(
         yield pymunk.Circle(body, collider.radius, collider.position)
 
 
-def body_shapes(body: pymunk.Body, bodies: Bodies, index: int, skin: float = 0.0) -> Iterator[tuple[int, pymunk.Shape]]:
-    """Yield the shapes of a body, each with its index among all shapes; single discs are enlarged by `skin`."""
+def body_shapes(body: pymunk.Body, bodies: Bodies, index: int) -> Iterator[tuple[int, pymunk.Shape]]:
+    """Yield the shapes of a body, each with its index among all shapes."""
     if bodies.all_round:
-        yield index, pymunk.Circle(body, float(bodies.radius[index]) * (1.0 + skin))
+        yield index, pymunk.Circle(body, float(bodies.radius[index]))
         return
     shapes, element = bodies.shapes, bodies.elements[bodies.element[index]]
     is_kept = is_captured(element)

@@ -51,30 +51,28 @@ class AppliedImpulses(NamedTuple):
 
 
 def applied_impulses(
-    population: PymunkBodies, before: EnergyState, included: BoolArray, springs: FloatArray | None, h: float
+    store: PymunkBodies, before: EnergyState, included: BoolArray, springs: FloatArray | None, h: float
 ) -> AppliedImpulses:
     """Return the impulses applied in the last substep.
 
     Args:
-        population: as it is after the substep.
+        store: as it is after the substep.
         before: state at its start.
         included: (N,) bodies to include; others get 0.
         springs: (N, 2) N, forces of springs, which drag reduces; None: none.
         h: duration of the accounted part of the substep, s.
     """
-    bodies, world = population.bodies, population.scene.world
+    bodies, world = store.bodies, store.scene.world
     mass = np.where(included, bodies.mass, 0.0)[:, None]
-    constant, torque = _constant_forces(population)
-    attraction, (thrust, thrust_torque) = _attraction(population), _thrusts(population)
+    constant, torque = _constant_forces(store)
+    attraction, (thrust, thrust_torque) = _attraction(store), _thrusts(store)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
     if world.has_drag:
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
-        drag_acceleration = (
-            acceleration(world, before.velocity, applied, population.h) - np.asarray(world.gravity) - applied
-        )
+        drag_acceleration = acceleration(world, before.velocity, applied, store.h) - np.asarray(world.gravity) - applied
         drag = mass * drag_acceleration * h
     if world.has_damping:
-        lost = (damping_factor(world.damping, population.h) - 1.0) * (h / population.h)
+        lost = (damping_factor(world.damping, store.h) - 1.0) * (h / store.h)
         drag = lost * mass * before.velocity
         angular_drag = lost * np.where(included, bodies.moment, 0.0) * before.spin
     driven = np.where(included[:, None], constant + thrust, 0.0)
@@ -83,31 +81,31 @@ def applied_impulses(
     return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag)
 
 
-def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
+def _constant_forces(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     """Return the constant forces (N, 2), N, and torques (N,), N·m."""
-    force, torque = np.zeros_like(population.position), np.zeros(len(population.position))
-    for forces in (population.particles.forces, population.space_bodies.constant_forces):
+    force, torque = np.zeros_like(store.position), np.zeros(len(store.position))
+    for forces in (store.particles.forces, store.space_bodies.constant_forces):
         for index, constant in forces.items():
             force[index], torque[index] = constant
     return force, torque
 
 
-def _attraction(population: PymunkBodies) -> FloatArray:
+def _attraction(store: PymunkBodies) -> FloatArray:
     """Return the attraction on all bodies, (N, 2) m/s²."""
-    field, particles = population.space_bodies.field, population.particles.indices
-    attraction = np.zeros_like(population.position)
+    field, particles = store.space_bodies.field, store.particles.indices
+    attraction = np.zeros_like(store.position)
     if field.attracts:
-        attraction[particles] = field.at(population.position[particles])
+        attraction[particles] = field.at(store.position[particles])
     if field.applied:
-        number_of = population.bodies.number_of
+        number_of = store.bodies.number_of
         attraction[[number_of[name] for name in field.applied]] = np.asarray(list(field.applied.values()))
     return attraction
 
 
-def _thrusts(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
+def _thrusts(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     """Return the thrusts (N, 2), N, and their torques (N,), N·m, in the last substep."""
-    force, torque = np.zeros_like(population.position), np.zeros(len(population.position))
-    for index, (x, y, turning) in population.space_bodies.thrusts.loads.items():
+    force, torque = np.zeros_like(store.position), np.zeros(len(store.position))
+    for index, (x, y, turning) in store.space_bodies.thrusts.loads.items():
         force[index], torque[index] = (x, y), turning
     return force, torque
 
@@ -240,36 +238,36 @@ class PymunkEnergyLedger:
     2,000 times as large. In scenes with motion it was below 1e-13.
     """
 
-    def __init__(self, population: PymunkBodies) -> None:
-        """Start the accounting of a population."""
+    def __init__(self, store: PymunkBodies) -> None:
+        """Start the accounting of a store."""
         self.account = EnergyLedger()
-        self._population = population
-        self._breaks = np.full(len(population.setup.links), np.inf)
+        self._store = store
+        self._breaks = np.full(len(store.setup.links), np.inf)
         self._potential: tuple[tuple[Scene, Bodies], Potential] | None = None
         self._was_asleep: BoolArray | None = None  # at the start of the substep
-        population.space_bodies.field.applied = {}
-        population.space_bodies.contact_reader.points()  # from now on warm-start impulses are recorded
+        store.space_bodies.field.applied = {}
+        store.space_bodies.contact_reader.points()  # from now on warm-start impulses are recorded
 
     def opening(self) -> EnergyState | None:
         """Return the state at the start of a substep; None if only gravity acts on all moving bodies."""
-        p = self._population
+        p = self._store
         self._was_asleep = p.space_bodies.asleep
         return None if p.particles.has_only_gravity and not len(p.space_bodies) else self._state()
 
     def _state(self) -> EnergyState:
-        p = self._population
+        p = self._store
         p.refresh()
         return EnergyState(p.position.copy(), p.angle.copy(), p.velocity.copy(), p.angular_velocity.copy())
 
     @np.errstate(over="ignore", invalid="ignore")  # in a diverged state, which the simulation detects next
     def substep(self, before: EnergyState | None) -> None:
         """Account the last substep."""
-        p, account = self._population, self.account
+        p, account = self._store, self.account
         if p.particles.has_only_gravity:
             account.add(Cause.INTEGRATOR, self._free_fall_error())
         if before is None:
             return
-        included = p.free_to_move
+        included = p.moving
         if p.particles.has_only_gravity:
             included[p.particles.indices] = False
         driven_bodies = p.space_bodies.drives.driven_bodies
@@ -337,7 +335,7 @@ class PymunkEnergyLedger:
 
     def _free_fall_error(self) -> float:
         """Return the energy error of explicit Euler on bodies under gravity alone: ½ m (g h)² in each substep."""
-        p = self._population
+        p = self._store
         kick = p.h * np.asarray(p.scene.world.gravity)
         if p.ahead.any():  # exact with half a kick
             return 0.0
@@ -346,7 +344,7 @@ class PymunkEnergyLedger:
 
     def _mean(self, before: EnergyState, now: EnergyState, included: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return mean reported velocities (N + 1, 2) and spins (N + 1,); 0 for other bodies and the world."""
-        velocity = 0.5 * (before.velocity + now.velocity) - self._population.ahead
+        velocity = 0.5 * (before.velocity + now.velocity) - self._store.ahead
         spin = 0.5 * (before.spin + now.spin)
         velocity[~included], spin[~included] = 0.0, 0.0
         return np.vstack((velocity, np.zeros((1, 2)))), np.append(spin, 0.0)
@@ -363,7 +361,7 @@ class PymunkEnergyLedger:
 
         The drift is the displacement by the old velocities; displacements beyond it are corrections of overlaps.
         """
-        p = self._population
+        p = self._store
         h = p.h
         drift = np.where(drifts[:, None], before.position + before.velocity * h, now.position)
         drift_angle = np.where(drifts, before.angle + before.spin * h, now.angle)
@@ -377,7 +375,7 @@ class PymunkEnergyLedger:
 
     def _stored_energy(self, *states: EnergyState) -> FloatArray:
         """Return the energy stored in springs and attraction in some states, (S,) J."""
-        p = self._population
+        p = self._store
         key = p.scene, p.bodies
         if self._potential is None or any(a is not b for a, b in zip(key, self._potential[0], strict=True)):
             self._potential = key, Potential(p.setup, p.bodies, breaks=self._breaks)
@@ -390,7 +388,7 @@ class PymunkEnergyLedger:
 
     def _can_turn(self) -> BoolArray:
         """Return which bodies a torque turns, (N,): in the space, those with a finite moment."""
-        p = self._population
+        p = self._store
         turnable = np.ones(len(p.position), np.bool_)
         for index in p.space_bodies.constant_forces:
             turnable[index] = np.isfinite(p.space_bodies.moment(index))
@@ -400,7 +398,7 @@ class PymunkEnergyLedger:
         self, before: EnergyState, now: EnergyState, included: BoolArray, applied: AppliedImpulses
     ) -> ImpulseSums:
         """Return the impulses on bodies, without those of `applied`."""
-        p = self._population
+        p = self._store
         mass, moment = np.where(included, p.bodies.mass, 0.0), np.where(included, p.bodies.moment, 0.0)
         linear = mass[:, None] * (now.velocity - before.velocity) - applied.weight - applied.driven - applied.drag
         angular = moment * (now.spin - before.spin) - applied.angular - applied.angular_drag
@@ -416,7 +414,7 @@ class PymunkEnergyLedger:
         asleep: BoolArray | None,
     ) -> None:
         """Account the work of joints, with motors as drives."""
-        by_motors: JointImpulses = motors(self._population.space_bodies.joints, now.position, now.angle, joint_sums)
+        by_motors: JointImpulses = motors(self._store.space_bodies.joints, now.position, now.angle, joint_sums)
         if asleep is not None:
             by_motors = by_motors.without(asleep)
         joint_sums.subtract(by_motors)

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sandbox.engines.common.base import BIAS, library_settings_in, slop_of
 from sandbox.engines.common.collision_bits import too_many_categories
+from sandbox.engines.common.solver_settings import BIAS, setting_faults, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.pymunk_adapter.requirements import combination_faults, size_faults
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
@@ -16,10 +16,19 @@ from sandbox.scene.description.world import Settings
 
 if TYPE_CHECKING:
     from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
+    from sandbox.engines.tabletop.simulation import SteppedTabletopSimulation
 
 
 FIXED_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
 """Settings that describe pymunk's methods, each with its only supported value"""
+
+ABSENT = {
+    "stiffness": "it has no penalty springs",
+    "damping": "it has no penalty springs",
+    "broad_phase": "it always uses its own tree",
+    "stretch": "it has no joints = 'relaxation'",
+}
+"""Settings that pymunk does not have, with the reason"""
 
 OWN = frozenset(
     {
@@ -73,8 +82,8 @@ def space_attributes(settings: Settings) -> dict[str, float]:
     return {name: value for name, value in values.items() if value is not None}
 
 
-FILTER_BITS = 30
-"""Bits of pymunk's collision filters that bodies and static colliders may use; zones use the other two."""
+FILTER_BITS = 32
+"""Bits of pymunk's collision filters"""
 
 SLEEP_TIME = 0.5
 """s, default of `sleep_time`, as in Box2D; pymunk's own default is that no body falls asleep"""
@@ -104,22 +113,7 @@ class PymunkEngine:
         setup = Setup.of(start)
         scene = setup.scene
         missing = [*unmodelled(setup, self.capabilities), *too_many_categories(scene, FILTER_BITS)]
-        for key, method in FIXED_METHODS.items():
-            stated = getattr(settings, key)
-            if stated not in (None, method):
-                missing.append(f"{key} {stated!r} is not supported (only {method!r})")
-        missing += [
-            f"{key} applies to penalty springs, which it does not have"
-            for key in ("stiffness", "damping")
-            if getattr(settings, key) is not None
-        ]
-        missing += library_settings_in(settings, self.name)
-        if settings.broad_phase is not None:
-            missing.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
-        if settings.joints not in (None, "impulses"):
-            missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
-        if settings.stretch is not None:
-            missing.append("stretch applies to joints = 'relaxation', which it does not have")
+        missing += setting_faults(settings, self.name, {**FIXED_METHODS, "joints": "impulses"}, ABSENT)
         if not settings.sleeping:
             missing += [
                 f"{key} applies to sleeping = true only"
@@ -146,18 +140,27 @@ class PymunkEngine:
             defaults |= {"sleep_time": SLEEP_TIME, "idle_speed": 0.0}
         return settings.replace(**{k: v for k, v in defaults.items() if getattr(settings, k) is None})
 
-    def start(self, start: Scene | Setup, settings: Settings | None = None) -> "PymunkSimulation":
+    def start(
+        self, start: Scene | Setup, settings: Settings | None = None
+    ) -> "PymunkSimulation | SteppedTabletopSimulation":
         """Create a pymunk space with the bodies of a scene.
 
         Raises:
             Refusal: pymunk does not support something that the scene or a setting needs.
         """
         from sandbox.engines.contract import Refusal
-        from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
 
         setup = Setup.of(start)
         settings = setup.scene.solver if settings is None else settings
         missing = self.missing(setup, settings)
         if missing:
             raise Refusal(self.name, missing, ())
-        return PymunkSimulation(setup, self.resolve(setup, settings))
+        resolved = self.resolve(setup, settings)
+        if on_floor(setup):
+            from sandbox.engines.pymunk_adapter.table_pairs import SpacePairFinder
+            from sandbox.engines.tabletop.simulation import SteppedTabletopSimulation
+
+            return SteppedTabletopSimulation(setup, resolved, SpacePairFinder)
+        from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
+
+        return PymunkSimulation(setup, resolved)

@@ -1,8 +1,7 @@
 """Simulation on a pymunk space, and the recording of its contacts and zone entries."""
 
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -10,21 +9,23 @@ from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BaseSimulation, observe_path
+from sandbox.engines.common.body_store import HasBodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.energy_balance import record_energy_change
-from sandbox.engines.common.lifetimes import Lifetimes
-from sandbox.engines.contract import Divergence, Exhaustion, Observer, PairRuns
+from sandbox.engines.contract import Divergence, Observer, PairRuns
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactLists
 from sandbox.engines.pymunk_adapter.energy import PymunkEnergyLedger
 from sandbox.frame_table import FrameTable
-from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
+
+if TYPE_CHECKING:
+    from sandbox.engines.pymunk_adapter.zoned_bodies import ZonedPymunkBodies
 
 NO_POSITIONS: FloatArray = np.empty((0, 2))
 
@@ -32,22 +33,20 @@ NO_POSITIONS: FloatArray = np.empty((0, 2))
 class EventRecorder:
     """Records contacts and zone entries, until they are taken."""
 
-    def __init__(self, population: PymunkBodies, time: float) -> None:
+    def __init__(self, store: PymunkBodies, zoned: "ZonedPymunkBodies | None", time: float) -> None:
         """Start with the contacts at a time, s. Zone entries so far are recorded now and at the end of the substep."""
-        self._population = population
-        self._log = ContactLog(len(population.scene.fixed_names), population.space_bodies.can_repeat_pairs)
+        self._store, self._zoned = store, zoned
+        self._log = ContactLog(len(store.scene.fixed_names), store.space_bodies.can_repeat_pairs)
         self.contacts = 0
         """number of contacts found so far; a lasting contact counts at every substep"""
         self.record(time, opening=True)
 
     def record(self, time: float, opening: bool = False) -> None:
         """Record contacts and zone entries at a time, s; at the opening, zone entries stay for the next call."""
-        tabletop, zone_tracker, log = self._population.tabletop, self._population.zone_tracker, self._log
-        entries = None if zone_tracker is None else zone_tracker.drain_entries(repeat=opening)
+        log = self._log
+        entries = None if self._zoned is None else self._zoned.tracker.drain_entries(repeat=opening)
         impulses_suffice = log.has_distinct_rows and entries is None
-        contacts = (
-            self._population.space_bodies.touching(impulses_suffice) if tabletop is None else tabletop.drain_contacts()
-        )
+        contacts = self._store.space_bodies.touching(impulses_suffice)
         if isinstance(contacts, ContactBatch):
             log.record(time, contacts if entries is None else join_batches(contacts, entries))
             self.contacts += len(contacts.a)
@@ -69,7 +68,7 @@ class EventRecorder:
             The pairs of the substeps; none unless they are wanted.
         """
         pairs = []
-        for end, count in self._population.space_bodies.read_batch(lists, self._log, times):
+        for end, count in self._store.space_bodies.read_batch(lists, self._log, times):
             self.contacts += count
             if wants_pairs:
                 pairs.append((end, self._log.pairs()))
@@ -77,7 +76,7 @@ class EventRecorder:
 
     def has_new(self, lists: ContactLists) -> bool:
         """Return whether there is something to record: contacts in the lists of a batch, or before it."""
-        return bool(lists.count) or self._population.space_bodies.contact_reader.is_listed or self.is_open
+        return bool(lists.count) or self._store.space_bodies.contact_reader.is_listed or self.is_open
 
     @property
     def is_open(self) -> bool:
@@ -87,11 +86,11 @@ class EventRecorder:
     @property
     def can_batch(self) -> bool:
         """Whether a batch of substeps can be recorded: contacts have been read before, and there is space for more."""
-        return self._population.space_bodies.contact_reader.is_started and self._log.can_hold(MAX_CONTACTS)
+        return self._store.space_bodies.contact_reader.is_started and self._log.can_hold(MAX_CONTACTS)
 
     def rebuild(self) -> None:
         """Update after an action: a spawned body may have several shapes."""
-        self._log.can_repeat_pairs = self._population.space_bodies.can_repeat_pairs
+        self._log.can_repeat_pairs = self._store.space_bodies.can_repeat_pairs
 
     def pairs(self) -> IntArray:
         """Return the pairs (K, 2) of the last record."""
@@ -102,7 +101,7 @@ class EventRecorder:
         return self._log.take()
 
 
-class PymunkSimulation(BaseSimulation):
+class PymunkSimulation(HasBodyStore, BaseSimulation):
     """Running scene.
 
     Scheme: drift–kick, explicit Euler for free motion (position error +g·h·T/2, velocity exact). With `half_kick`
@@ -111,10 +110,10 @@ class PymunkSimulation(BaseSimulation):
 
     Contacts are found at the end of a substep, without a time of impact: a body that passes a thin collider within a
     substep is not found in contact with it.
-
-    On a surface, balls slide and roll as in `tabletop/stepper.py`: exactly without contacts, and collisions are
-    resolved at the time of impact.
     """
+
+    _store: PymunkBodies
+    _zoned: "ZonedPymunkBodies | None"
 
     uncopied: ClassVar[str | None] = (
         "pymunk keeps the impulses of contacts and the order of its collision tree inside its space; a copied space "
@@ -123,40 +122,22 @@ class PymunkSimulation(BaseSimulation):
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
         super().__init__(settings)
-        self._population = PymunkBodies(setup, settings)
+        self._zoned = None
+        if setup.scene.zones:
+            from sandbox.engines.pymunk_adapter.zoned_bodies import ZonedPymunkBodies  # with a compiler
+
+            self._zoned = ZonedPymunkBodies(setup, settings)
+        self._store = self._zoned or PymunkBodies(setup, settings)
         self._h = settings.h
         self._recorder: EventRecorder | None = None
         self._ledger: PymunkEnergyLedger | None = None
-        self._retired: dict[int, float] = {}
-        self._broken: dict[int, float] = {}
         self._joint_iterations = 0
-        self._lifetimes = Lifetimes(setup.bodies, setup.time, settings.h)
         self._shared_angles: tuple[FloatArray, FloatArray] | None = None  # angles and spins, shared by frames
-
-    @property
-    def setup(self) -> Setup:
-        """State from which the simulation started, with the changes that actions have made to its scene."""
-        return self._population.setup
-
-    @property
-    def bodies(self) -> Bodies:
-        """Bodies at their start as arrays; spawned bodies are appended."""
-        return self._population.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return MappingProxyType(self._retired)
-
-    @property
-    def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
-        return MappingProxyType(self._broken)
 
     @property
     def plane_reach(self) -> PlaneReach | None:
         """Present extent of pymunk's half-planes; None while there are none."""
-        return self._population.space_bodies.plane_reach
+        return self._store.space_bodies.plane_reach
 
     @property
     def work(self) -> Mapping[str, int]:
@@ -176,14 +157,13 @@ class PymunkSimulation(BaseSimulation):
     @property
     def flying(self) -> int:
         """Number of bodies that are advanced as arrays, outside of pymunk."""
-        return len(self._population.particles)
+        return len(self._store.particles)
 
     def step(self) -> None:
         """Advance by one time step dt.
 
         Raises:
             Divergence: a body is not finite, or out of bounds. The state can still be read.
-            Exhaustion: so many balls on a surface touch at once that resolving their collisions would take too long.
         """
         with self._lock:
             self._check_running()
@@ -216,20 +196,19 @@ class PymunkSimulation(BaseSimulation):
     @property
     def _can_batch(self) -> bool:
         """Whether a batch of substeps gives the same results as one substep after the other."""
-        population = self._population
+        store = self._store
         return (
-            population.space_bodies.can_batch
-            and population.tabletop is None
-            and not len(population.particles)
+            store.space_bodies.can_batch
+            and not len(store.particles)
             and self._ledger is None
-            and not self._lifetimes.any_left
+            and not store.has_lifetimes
             and (self._recorder is None or self._recorder.can_batch)
         )
 
     def _advance_batch(self, steps: int, frames: FrameTable, until_contact: bool) -> None:
         """Make at most so many steps in one batch, which ends when a body leaves or, if wanted, has a contact."""
-        population, observed = self._population, self._observer is not None
-        space_bodies, substeps, h = population.space_bodies, self._settings.substeps, self._h
+        store, observed = self._store, self._observer is not None
+        space_bodies, substeps, h = store.space_bodies, self._settings.substeps, self._h
         steps = min(steps, space_bodies.batch_steps(substeps, observed))
         start = self._state()[0].copy() if observed else NO_POSITIONS
         batch = space_bodies.step_batch(
@@ -257,7 +236,7 @@ class PymunkSimulation(BaseSimulation):
         states = batch.states[substeps - 1 :: substeps] if observed else batch.states
         self._record_states(states[:-1] if batch.needs_check else states, frames)
         self._steps += batch.steps
-        population.invalidate()
+        store.invalidate()
         self._shared_angles = None
         if batch.needs_check:
             self._check_state()
@@ -268,7 +247,7 @@ class PymunkSimulation(BaseSimulation):
 
     def _record_states(self, states: FloatArray, frames: FrameTable) -> None:
         """Count steps, and record the frames that are due, by the states (S, R, 6) after each step."""
-        population, every, first_due = self._population, frames.every, frames.every - frames.steps % frames.every
+        store, every, first_due = self._store, frames.every, frames.every - frames.steps % frames.every
         frames.steps += len(states)
         states = states[first_due - 1 :: every]
         if not len(states):
@@ -279,54 +258,39 @@ class PymunkSimulation(BaseSimulation):
         columns = [
             array[rows, :n] for array in (frames.position, frames.velocity, frames.angle, frames.angular_velocity)
         ]
-        fixed = (population.position, population.velocity, population.angle, population.angular_velocity)
-        if len(population.space_bodies) < n:  # without those in the space that move
+        fixed = (store.position, store.velocity, store.angle, store.angular_velocity)
+        if len(store.space_bodies) < n:  # without those in the space that move
             for column, values in zip(columns, fixed, strict=True):
                 column[:] = values
-        population.space_bodies.write_states(states, *columns)
+        store.space_bodies.write_states(states, *columns)
         if self._settings.half_kick:
-            columns[1][:, population.moving] -= population.ahead
-        if len(population.scene.layers) > 1:
-            frames.layer_rows()[rows, :n] = population.layer
+            columns[1][:, store.mobile] -= store.ahead
+        if len(store.scene.layers) > 1:
+            frames.layer_rows()[rows, :n] = store.layer
         frames.finish_rows(len(states), n)
 
     @property
     def makes_whole_steps(self) -> bool:
-        """Whether no step is shorter than dt: not on a surface, whose stepper does not use Munk2D's solver.
+        """Whether no step is shorter than dt.
 
         Munk2D applies the impulses that it keeps in proportion to the length of a step, but accumulates them in full.
         In a step shorter than the last one a contact that has just bounced pulls, and a motor brakes.
         """
-        return self._population.tabletop is None
+        return True
 
     def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt. No step can follow.
-
-        On a surface, whole substeps come first, and then a shorter one; elsewhere the step is whole.
+        """Advance by a last, whole step. No step can follow.
 
         Args:
-            part: fraction of dt, 0 < part < 1.
+            part: the fraction of dt that remains of the run, 0 < part < 1.
 
         Raises:
             Divergence: as `step`.
-            Exhaustion: as `step`.
             ValueError: `part` is out of range.
         """
         self._check_part(part)
-        if self.makes_whole_steps:
-            self.step()
-            self._population.end()
-            return
-        with self._lock:
-            self._check_running()
-            substeps, fraction = divmod(part * self._settings.substeps, 1.0)
-            self._advance(int(substeps))
-            if fraction:
-                self._substep(int(substeps), self.time, fraction=fraction)
-            self._part = part
-            self._check_state()
-            self._retire()
-            self._population.end()
+        self.step()
+        self._store.end()
 
     def apply(self, action: Action) -> None:
         """Apply an action at once.
@@ -337,15 +301,14 @@ class PymunkSimulation(BaseSimulation):
         with self._lock:
             self._check_running()
             if sets_level(action):
-                apply_action(action, self._population)
+                apply_action(action, self._store)
                 return
             self._shared_angles = None
             with record_energy_change(self._action_ledger, Cause.ACTIONS, self):
-                leaving = apply_action(action, self._population)
-                self._population.invalidate()
+                leaving = apply_action(action, self._store)
+                self._store.invalidate()
                 self._shared_angles = None
-            self._population.space_bodies.extend_planes()
-            self._population.capture()
+            self._store.space_bodies.extend_planes()
             if self._recorder is not None:
                 self._recorder.rebuild()
             if leaving is not None:
@@ -353,45 +316,37 @@ class PymunkSimulation(BaseSimulation):
 
     def frame(self) -> Frame:
         """Return the present state."""
-        population = self._population
+        store = self._store
         position, velocity, angle, angular_velocity = self._state()
         position, velocity = position.copy(), velocity.copy()
         if self._settings.half_kick:
-            velocity[population.moving] -= population.ahead
-        if population.can_turn or population.tabletop is not None or self._shared_angles is None:
+            velocity[store.mobile] -= store.ahead
+        if store.can_turn or self._shared_angles is None:
             self._shared_angles = angle.copy(), angular_velocity.copy()
         angle, angular_velocity = self._shared_angles
-        roll = None if population.tabletop is None else population.roll.copy()
-        scene, present = population.scene, population.present.copy()
-        layer = population.layer.copy() if len(scene.layers) > 1 else None
-        visits = population.visits.copy() if scene.zones else None
-        drives = population.space_bodies.drives.current_state() if scene.drives else None
-        passing = population.space_bodies.passing()
+        scene, present = store.scene, store.present.copy()
+        layer = store.layer.copy() if len(scene.layers) > 1 else None
+        visits = store.visits.copy() if scene.zones else None
+        drives = store.space_bodies.drives.current_state() if scene.drives else None
+        passing = store.space_bodies.passing()
         return Frame(
-            self.time, position, velocity, angle, angular_velocity, present, roll, layer, visits, drives, passing
+            self.time, position, velocity, angle, angular_velocity, present, None, layer, visits, drives, passing
         )
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._recorder is None:
-            self._recorder = EventRecorder(self._population, self.time)
+            self._recorder = EventRecorder(self._store, self._zoned, self.time)
         return self._recorder.take()
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call, which switches accounting on."""
-        tabletop = self._population.tabletop
-        if tabletop is not None:  # it keeps its own ledger
-            tabletop.account = tabletop.account or EnergyLedger()
-            return tabletop.account.entries()
         if self._ledger is None:
-            self._ledger = PymunkEnergyLedger(self._population)
+            self._ledger = PymunkEnergyLedger(self._store)
         return self._ledger.account.entries()
 
     @property
     def _action_ledger(self) -> EnergyLedger | None:
-        tabletop = self._population.tabletop
-        if tabletop is not None:
-            return tabletop.account
         return None if self._ledger is None else self._ledger.account
 
     def watch(self, observer: Observer) -> None:
@@ -402,11 +357,11 @@ class PymunkSimulation(BaseSimulation):
 
     def close(self) -> None:
         """End the simulation and release what it holds."""
-        self._population.end()
+        self._store.end()
         super().close()
 
     def _check_running(self) -> None:
-        if self._population.ended:
+        if self._store.ended:
             raise RuntimeError("the simulation has ended; its state can be read, but it cannot continue")
 
     def _advance(self, substeps: int) -> None:
@@ -414,113 +369,93 @@ class PymunkSimulation(BaseSimulation):
         # An observer gets all bodies after each substep, and the ledger needs them all too.
         with_particles = self._observer is not None or self._ledger is not None
         if not with_particles:
-            self._population.particles.step(substeps)
-        if with_particles or self._recorder is not None or len(self._population.space_bodies):
+            self._store.particles.step(substeps)
+        if with_particles or self._recorder is not None or len(self._store.space_bodies):
             time = self.time
             for k in range(substeps):
                 self._substep(k, time, with_particles=with_particles)
 
-    def _substep(self, k: int, time: float, with_particles: bool = True, fraction: float = 1.0) -> None:
+    def _substep(self, k: int, time: float, with_particles: bool) -> None:
         """Advance by one substep as `_integrate`, and process its events: broken joints, zone entries, contacts."""
         observer, start = self._observer, time + k * self._h
         before = self._observed_positions() if observer is not None else None
-        self._integrate(k, time, with_particles, fraction)
-        population = self._population
-        if population.space_bodies.joints.has_breakable:
-            self._record_broken(population.break_joints(), self._after(k + fraction))
-        if population.has_pending_zones:
-            self._update_zones()
+        self._integrate(k, time, with_particles)
+        store = self._store
+        if store.space_bodies.joints.has_breakable:
+            self._record_broken(store.break_joints(), self._after(k + 1))
+        if self._zoned is not None:
+            self._visit_zones(self._zoned)
         if self._recorder is not None:
-            self._recorder.record(start + self._h * fraction)
+            self._recorder.record(start + self._h)
             if observer is not None and before is not None:
                 observer(start, before, self._observed_positions(), self._recorder.pairs())
 
-    def _integrate(self, k: int, time: float, with_particles: bool = True, fraction: float = 1.0) -> None:
+    def _integrate(self, k: int, time: float, with_particles: bool) -> None:
         """Advance by h, the k-th substep of the step that began at a time, s.
 
         Args:
             k: index of the substep.
             time: start of the step, s.
             with_particles: whether to advance the particles; False if they have been advanced already.
-            fraction: length of a shorter substep as a fraction of h.
         """
-        population, ledger = self._population, self._ledger
-        space_bodies, tabletop, start = population.space_bodies, population.tabletop, time + k * self._h
+        store, ledger = self._store, self._ledger
+        space_bodies = store.space_bodies
         opening_state = ledger.opening() if ledger is not None else None
         if with_particles:
-            population.particles.step()
-        if tabletop is None:
-            space_bodies.step(start)
-        else:
-            if self._recorder is None:
-                tabletop.drain_contacts()  # captures before recording started are dropped
-            try:
-                tabletop.step(space_bodies, space_bodies.constant_forces.items(), fraction)
-            except Exhaustion:
-                population.end()
-                raise
-            population.capture()
+            store.particles.step()
+        space_bodies.step(time + k * self._h)
         if space_bodies.joints.count:
             self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations
-        population.invalidate()
+        store.invalidate()
         if ledger is not None:
             ledger.substep(opening_state)
 
-    def _update_zones(self) -> None:
-        """Apply the effects of zones that bodies have entered."""
-        with record_energy_change(self._action_ledger, Cause.DRIVES, self):
-            self._population.update_zones()
-        zone_tracker = self._population.zone_tracker
-        if self._recorder is None and zone_tracker is not None:
-            zone_tracker.drain_entries()  # entries before recording started are dropped
+    def _visit_zones(self, store: "ZonedPymunkBodies") -> None:
+        """Apply zones to the bodies that have entered or left one."""
+        if store.find_zones():
+            store.refresh()
+            with record_energy_change(self._action_ledger, Cause.DRIVES, self):
+                store.apply_zones()
+            if self._recorder is None:
+                store.tracker.drain_entries()  # entries before recording started are dropped
 
     def _observed_positions(self) -> FloatArray:
-        """Return the centres, (N, 2) m, for an observer; nan for balls that lie in pockets."""
-        position, tabletop = self._state()[0].copy(), self._population.tabletop
-        if tabletop is not None:
-            position[tabletop.pocket >= 0] = np.nan
-        return position
+        """Return the centres, (N, 2) m, for an observer."""
+        return self._state()[0].copy()
 
     def _record_broken(self, indices: IntArray, time: float) -> None:
         """Record that joints, by their indices, have broken."""
-        self._broken |= dict.fromkeys(indices.tolist(), time)
+        self._store.mark_broken(indices, time)
         if self._ledger is not None and len(indices):
             self._ledger.joints_broken(indices)
 
     def _state(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return the present arrays in scene order; they belong to the population."""
-        population = self._population
-        population.refresh()
-        return population.position, population.velocity, population.angle, population.angular_velocity
+        """Return the present arrays in scene order; they belong to the store."""
+        store = self._store
+        store.refresh()
+        return store.position, store.velocity, store.angle, store.angular_velocity
 
     def _check_state(self) -> None:
         """Check the state, and end the simulation if a body is not finite, out of bounds, or beyond the half-planes."""
-        population = self._population
-        for owner in (
-            population.particles,
-            population.space_bodies,
-            *(() if population.tabletop is None else (population.tabletop,)),
-        ):
+        store = self._store
+        for owner in (store.particles, store.space_bodies):
             diverged = owner.beyond()
             if diverged is not None:
-                self._population.end()
+                self._store.end()
                 index, description = diverged
                 raise Divergence(self.time, self.bodies.names[index], description)
 
     def _retire(self) -> None:
         """Remove bodies whose lifetime has ended or that are outside of world.bounds."""
-        population, bounds = self._population, self._population.scene.world.bounds
-        if bounds is not None:
-            population.refresh()
-        removed = self._lifetimes.expired(
-            self.time, population.position, population.present, population.bodies.fixed, bounds
-        )
+        store = self._store
+        if store.scene.world.bounds is not None:
+            store.refresh()
+        removed = store.expired(self.time)
         if len(removed):
             self._remove_bodies(removed)
 
     def _remove_bodies(self, indices: IntArray) -> None:
         with record_energy_change(self._action_ledger, Cause.RETIRED, self):
             self._shared_angles = None
-            self._population.remove_bodies(indices)
+            self._store.remove_bodies(indices, self.time)
         self._shared_angles = None
-        self._retired |= dict.fromkeys(indices.tolist(), self.time)

@@ -29,7 +29,6 @@ from sandbox.engines.pymunk_adapter.drives import SpaceDrives
 from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
-from sandbox.engines.pymunk_adapter.zones import ZoneSensors
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
@@ -42,16 +41,10 @@ from sandbox.scene.description.world import Settings
 class SpaceBodies(SpaceBodyTable):
     """Bodies in a space, addressed by their indices. Static shapes are added when the first body joins."""
 
-    def __init__(self, setup: Setup, settings: Settings, skin: float = 0.0) -> None:
-        """Create an empty space.
-
-        Args:
-            setup: the scene.
-            settings: resolved.
-            skin: fraction of its radius by which the shape of each single disc is larger than the disc.
-        """
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        """Create an empty space; the settings are resolved."""
         scene = setup.scene
-        self._setup, self._scene, self._settings, self._skin = setup, scene, settings, skin
+        self._setup, self._scene, self._settings = setup, scene, settings
         self._h, self._dragged = settings.h, scene.world.has_drag
         super().__init__(new_space(scene, settings))
         self._reader = SpaceReader(self._space, bool(settings.sleeping))
@@ -61,13 +54,11 @@ class SpaceBodies(SpaceBodyTable):
         self._surface_of: IntArray = np.empty(0, np.int64)
         self._moments: FloatArray = np.empty(0)
         self._can_touch: BoolArray = np.empty(0, np.bool_)
-        self._sensed: BoolArray = np.empty(0, np.bool_)
         self.layer: IntArray = setup.bodies.layer
         """(N,) collision layer of each body"""
-        self.zone_sensors = ZoneSensors(self._space, scene.zones)
         self.joints = SpaceJoints(self._space)
         self._polygons, self._skipped_numbers = False, 0
-        self._has_single_contacts = False  # two bodies have at most one contact, and no sensors are listed
+        self._has_single_contacts = False  # two bodies have at most one contact
         self._by_name: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
         self.contact_reader = ContactReader(
@@ -111,7 +102,7 @@ class SpaceBodies(SpaceBodyTable):
             self._add(index, bodies, state)
         self._register()
         self._has_single_contacts = not (
-            self._polygons or self.can_repeat_pairs or self._scene.zones or self._surface_setter.one_way_walls.walls
+            self._polygons or self.can_repeat_pairs or self._surface_setter.one_way_walls.walls
         )
         self.drives.add_callbacks(self._collision_types)
         if self._setup.time and self._surface_setter.one_way_walls.walls:
@@ -157,8 +148,6 @@ class SpaceBodies(SpaceBodyTable):
         # Each shape gets a number, which the order of contacts depends on: a body without any in a game has none here.
         if self._can_touch[index] or (fixed and bodies.elements[bodies.element[index]].collides != "none"):
             self._add_shapes(index, bodies)
-        if self._sensed[index]:
-            self.zone_sensors.add(index, body)
         self._by_name[name], self._name_of[index] = body, name
         if driven:
             self.drives.join(name, index, body, state)
@@ -171,7 +160,7 @@ class SpaceBodies(SpaceBodyTable):
     def _add_shapes(self, index: int, bodies: Bodies) -> None:
         """Add the shapes of a body in the space."""
         body = self._members[index].body
-        shapes = tuple(body_shapes(body, bodies, index, self._skin))
+        shapes = tuple(body_shapes(body, bodies, index))
         shape_filter = self._filter(index, bodies)
         for piece, shape in shapes:
             shape.filter = shape_filter
@@ -188,10 +177,6 @@ class SpaceBodies(SpaceBodyTable):
         shape_filter = self._filter(index, bodies)
         for _, shape in self._members[index].shapes:
             shape.filter = shape_filter
-
-    def is_sensed(self, index: int) -> bool:
-        """Return whether a body is in the space and zones sense it."""
-        return index in self._members and bool(self._sensed[index])
 
     def add_missing_shapes(self, bodies: Bodies) -> None:
         """Add shapes to bodies that so far were only joined or driven, and can now touch something."""
@@ -213,7 +198,6 @@ class SpaceBodies(SpaceBodyTable):
             return
         for index in indices.tolist():
             self.joints.remove(index)
-            self.zone_sensors.drop(index)
             self._resting.pop(index, None)
             self.drives.leave(index)
             member = self._members.pop(index)
@@ -258,7 +242,7 @@ class SpaceBodies(SpaceBodyTable):
             self._has_single_contacts = False  # contacts with the removed shapes vanish without being listed as ended
         self.rebuild_world(scene)
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
-        self._can_touch, self._sensed = matrix.touches, matrix.can_enter_zone
+        self._can_touch = matrix.touches
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
         for index, (_, shapes) in self._members.items():
             for piece, shape in shapes:
@@ -478,17 +462,6 @@ class SpaceBodies(SpaceBodyTable):
             body = self._members[index].body
             position[index], angle[index] = body.position, body.angle
         return spring_forces(links, position, angle)[indices]
-
-    def find_pairs(self, velocity: FloatArray) -> IntArray:
-        """Move all bodies by a substep with velocities (N, 2), m/s; return pairs in contact, (K, 2).
-
-        Static body k has the index −1 − k. A pair may be listed twice.
-        """
-        if not self._moving:
-            return np.empty((0, 2), np.int64)
-        self._reader.set_velocities(velocity)
-        self.step(0.0)  # on a surface no force depends on time
-        return self._reader.pairs()
 
     def _read(self) -> tuple[IntArray, FloatArray]:
         if self._state is None:

@@ -298,9 +298,9 @@ class CandidatePairs(NamedTuple):
 class SegmentBoxes:
     """Axis-aligned boxes of G segments, sorted from left to right."""
 
-    def __init__(self, fixtures: StaticColliders) -> None:
-        ends = fixtures.segments[:, :4].reshape(-1, 2, 2)
-        half = fixtures.segments[:, 4:5]
+    def __init__(self, static: StaticColliders) -> None:
+        ends = static.segments[:, :4].reshape(-1, 2, 2)
+        half = static.segments[:, 4:5]
         low, high = ends.min(axis=1) - half, ends.max(axis=1) + half
         self.index: IntArray = np.argsort(low[:, 0], kind="stable")
         self.box: FloatArray = np.hstack((low, high))[self.index]

@@ -82,8 +82,8 @@ class CollisionPipeline(ABC):
         self.can_touch: BoolArray = store.moving & (store.collision_mask > NOTHING)
         self._moves: BoolArray = store.mobile
         self._order: IntArray | None = None
-        self._boxes = SegmentBoxes(store.fixtures)
-        self._plane_count = len(store.fixtures.planes) if self.can_touch.any() else 0
+        self._boxes = SegmentBoxes(store.static_colliders)
+        self._plane_count = len(store.static_colliders.planes) if self.can_touch.any() else 0
         self._plane_tests = self._plane_count * int(np.count_nonzero(self.can_touch))
         touching = store.radius[self.can_touch]
         self.max_radius = float(store.radius[store.collision_mask > NOTHING].max(initial=0.0))
@@ -312,7 +312,7 @@ class CirclePipeline(CollisionPipeline):
     @property
     def can_repeat_pairs(self) -> bool:
         """Whether a ball can have several contacts at once with one collider: a wall of several segments."""
-        colliders = self._store.fixtures.segment_collider
+        colliders = self._store.static_colliders.segment_collider
         return len(np.unique(colliders)) < len(colliders)
 
     def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
@@ -335,19 +335,19 @@ class CirclePipeline(CollisionPipeline):
 
     def _write_manifolds(self, position: FloatArray, pairs: CandidatePairs, max_separation: float) -> int:
         """Write contacts up to the capacity of the buffer; return their number."""
-        store, fixtures, size = self._store, self._store.fixtures, 0
+        store, static, size = self._store, self._store.static_colliders, 0
         radius, surface, other = store.radius, store.surface, store.fixed_surface
         if len(pairs.balls):
             size = find_ball_contacts(
                 pairs.balls, position, radius, surface, store.tangential, max_separation, self._out, size
             )
         if self._plane_count:
-            planes = fixtures.planes, fixtures.plane_collider, other
+            planes = static.planes, static.plane_collider, other
             size = find_plane_contacts(
                 position, radius, self.can_touch, surface, *planes, store.tangential, max_separation, self._out, size
             )
         if len(pairs.segments):
-            walls = fixtures.segments, fixtures.joints, fixtures.segment_collider, other
+            walls = static.segments, static.joints, static.segment_collider, other
             size = find_segment_contacts(
                 pairs.segments, position, radius, surface, *walls, store.tangential, max_separation, self._out, size
             )
@@ -379,10 +379,10 @@ class CirclePipeline(CollisionPipeline):
             resting = self.filter.with_filtered_planes(resting, self.can_touch)
         pairs = self.candidates(start, 2.0 * self.max_displacement(start, end))
         self.work["pair_tests"] += len(pairs.balls) + len(pairs.segments) + self._plane_tests
-        fixtures = store.fixtures
-        walls = pairs.segments, fixtures.segments, fixtures.joints
+        static = store.static_colliders
+        walls = pairs.segments, static.segments, static.joints
         fraction, key = first_touch(
-            start, end, store.radius, self.can_touch, pairs.balls, fixtures.planes, *walls, resting
+            start, end, store.radius, self.can_touch, pairs.balls, static.planes, *walls, resting
         )
         return float(fraction), int(key)
 
@@ -466,16 +466,16 @@ class ConvexPipeline(CollisionPipeline):
     def _write_manifolds(self, position: FloatArray, pairs: CandidatePairs, max_separation: float) -> int:
         """Write contacts up to the capacity of the buffer; return their number."""
         self._update_pieces(position)
-        store, fixtures, pieces, size = self._store, self._store.fixtures, self._pieces, 0
+        store, static, pieces, size = self._store, self._store.static_colliders, self._pieces, 0
         hulls = pieces.hulls
         query = NarrowPhaseInput(store.tangential, max_separation, self._scratch)
         if len(pairs.balls):
             size = find_body_contacts(pairs.balls, hulls, position, query, self._out, size)
         if self._plane_count:
-            planes = fixtures.planes, fixtures.plane_collider, store.fixed_surface
+            planes = static.planes, static.plane_collider, store.fixed_surface
             size = find_half_plane_contacts(hulls, pieces.can_touch, position, *planes, query, self._out, size)
         if len(pairs.segments):
-            walls = fixtures.joints, fixtures.segment_collider, store.fixed_surface
+            walls = static.joints, static.segment_collider, store.fixed_surface
             size = find_fixed_segment_contacts(pairs.segments, hulls, position, *walls, query, self._out, size)
         return size
 

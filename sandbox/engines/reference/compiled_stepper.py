@@ -13,6 +13,7 @@ from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog
 from sandbox.engines.common.frame_rows import FrameRows, no_rows
 from sandbox.engines.common.kernel import OptionalKernel
+from sandbox.engines.common.workload import CONTACTS_PER_BODY, DETECTION_COST
 from sandbox.engines.contract import PairRuns
 from sandbox.engines.reference.ball_kernels import BALL_KERNEL, BallColumns, advance_balls
 from sandbox.engines.reference.broad_phase import SegmentBoxes
@@ -52,6 +53,10 @@ CAPACITY = 1 << 15
 
 MAX_SUBSTEPS = 1 << 14
 """Substeps of a call"""
+
+MAX_WORK = 10_000_000
+"""Contacts and joints × (iterations + `DETECTION_COST`) × substeps of a call: at 10 to 20 ns each, Ctrl-C and limits of
+time act within some 0.2 s, but for a single step that takes longer"""
 
 MAX_PATH = 1 << 17
 """Centres in the path of a call, for an observer"""
@@ -177,7 +182,12 @@ class CompiledStepper:
 
     def max_steps(self, *, observed: bool) -> int:
         """Return the largest number of steps of a call, at least 1."""
-        substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._bodies.mobile)) if observed else MAX_SUBSTEPS
+        bodies, joints = len(self._bodies.mobile), self._world.joints
+        rows = max(CONTACTS_PER_BODY * bodies, len(self._world.memory.key))
+        rows += 0 if joints is None else len(joints.rows.kind)
+        substeps = min(MAX_SUBSTEPS, MAX_WORK // (rows * (self._numbers.iterations + DETECTION_COST)))
+        if observed:
+            substeps = min(substeps, MAX_PATH // bodies)
         return max(substeps // self._substeps, 1)
 
     def advance(
@@ -296,14 +306,14 @@ def _body_columns(world: WorldState, store: BodyStore) -> BodyColumns:
 
 
 def _wall_columns(store: BodyStore, boxes: SegmentBoxes) -> WallColumns:
-    fixtures = store.fixtures
+    static = store.static_colliders
     return WallColumns(
-        planes=_own(fixtures.planes),
-        plane_collider=_own(fixtures.plane_collider),
+        planes=_own(static.planes),
+        plane_collider=_own(static.plane_collider),
         collider_surface=_own(store.fixed_surface),
-        segments=_own(fixtures.segments),
-        segment_joints=_own(fixtures.joints),
-        segment_collider=_own(fixtures.segment_collider),
+        segments=_own(static.segments),
+        segment_joints=_own(static.joints),
+        segment_collider=_own(static.segment_collider),
         segment_box=_own(boxes.box),
         segment_index=_own(boxes.index),
     )
@@ -410,11 +420,18 @@ class MemberStepper:
         self._frames = no_rows()
 
     def run(
-        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray, *, steps: int
+        self,
+        position: FloatArray,
+        velocity: FloatArray,
+        angle: FloatArray,
+        angular_velocity: FloatArray,
+        *,
+        steps: int,
+        is_stopped: Callable[[], bool],
     ) -> bool:
         """Run the world from a start, (N, …) each, and write the end state in its place.
 
-        Return false without writing if the compiled steps cannot make the run.
+        Return false without writing if the compiled steps cannot make the run, or if it is to be stopped.
         """
         store = self._store
         state = store.position, store.velocity, store.angle, store.angular_velocity
@@ -426,6 +443,8 @@ class MemberStepper:
             self._stepper = CompiledStepper(self._world, store, self._settings)
         stepper, made = self._stepper, 0
         while made < steps:
+            if is_stopped():
+                return False
             count = min(steps - made, stepper.max_steps(observed=False))
             result = stepper.advance(made, count, self._frames, records=False, observed=False)
             made += result.steps

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sandbox.engines.common.base import BIAS, library_settings_in, slop_of
+from sandbox.engines.common.solver_settings import BIAS, setting_faults, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
@@ -18,7 +18,7 @@ from sandbox.scene.description.world import Settings
 
 if TYPE_CHECKING:
     from sandbox.engines.reference.simulation import ReferenceSimulation
-    from sandbox.engines.reference.tabletop import ReferenceTabletopSimulation
+    from sandbox.engines.tabletop.simulation import SteppedTabletopSimulation
 
 
 def _drive_faults(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
@@ -68,6 +68,12 @@ TABLETOP = BALLS | FLOOR | SURFACES | {Demand.DAMPING, Demand.CURL}
 
 TABLETOP_METHODS = {**DEFAULT_METHODS, "impact": "newton", "persistence": 1}
 """Settings of scenes with a surface, each with its only supported value"""
+
+ABSENT = {"half_kick": "only pymunk has it; integrator 'velocity_verlet' is as accurate"}
+"""Settings that the engine does not have, with the reason"""
+
+ABSENT_ON_TABLETOP = dict.fromkeys(("joints", "stretch", "stiffness", "damping"), "a [surface] has nothing of the kind")
+"""The same in scenes with a surface"""
 
 JOINT_INTEGRATORS = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """Default integrators of position-based joint methods: they change velocities before positions are corrected."""
@@ -119,7 +125,7 @@ class ReferenceEngine:
         wanted = demands(setup)
         if on_floor(setup):
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
-        missing = unmodelled(setup, self.capabilities) + library_settings_in(settings, "reference")
+        missing = unmodelled(setup, self.capabilities) + setting_faults(settings, self.name, {"persistence": 1}, ABSENT)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
         rods = setup.links.of(LinkKind.ROD)
@@ -134,8 +140,6 @@ class ReferenceEngine:
             missing.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
         if settings.stretch is not None and settings.joints != "relaxation":
             missing.append("stretch applies to joints = 'relaxation' only")
-        if settings.half_kick:
-            missing.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
         if settings.impact == "dissipative" and wanted & (CONSTRAINTS | {Demand.DRIVES, Demand.KINEMATIC}):
             missing.append("impact 'dissipative' does not support joints, drives and kinematic bodies; use 'newton'")
         if settings.impact == "dissipative":
@@ -144,8 +148,6 @@ class ReferenceEngine:
                 for demand in (Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY)
                 if demand in wanted
             ]
-        if settings.persistence not in (None, 1):
-            missing.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
         if settings.response == "penalty":
             missing += self._penalty_faults(setup, settings)
             if settings.impact is not None:
@@ -207,7 +209,7 @@ class ReferenceEngine:
 
     def start(
         self, start: Scene | Setup, settings: Settings | None = None
-    ) -> "ReferenceSimulation | ReferenceTabletopSimulation":
+    ) -> "ReferenceSimulation | SteppedTabletopSimulation":
         """Start a scene, or continue from a setup.
 
         Raises:
@@ -224,9 +226,10 @@ class ReferenceEngine:
         resolved = self.resolve(setup, settings)
         try:
             if on_floor(setup):
-                from sandbox.engines.reference.tabletop import ReferenceTabletopSimulation
+                from sandbox.engines.reference.table_pairs import CirclePairFinder
+                from sandbox.engines.tabletop.simulation import SteppedTabletopSimulation
 
-                return ReferenceTabletopSimulation(setup, resolved)
+                return SteppedTabletopSimulation(setup, resolved, CirclePairFinder)
             return ReferenceSimulation(setup, resolved)
         except Exhaustion as exhaustion:
             raise Refusal(self.name, (str(exhaustion),), ()) from None
@@ -234,16 +237,10 @@ class ReferenceEngine:
 
 def _tabletop_faults(setup: Setup, settings: Settings) -> list[str]:
     """Return the demands and settings of a scene with a surface that are not supported."""
-    missing = unmodelled(setup, TABLETOP) + library_settings_in(settings, "reference")
+    missing = unmodelled(setup, TABLETOP) + setting_faults(
+        settings, "reference", TABLETOP_METHODS, ABSENT_ON_TABLETOP, " on a [surface]"
+    )
     missing += unsupported_by_steppers(setup)
-    for key, method in TABLETOP_METHODS.items():
-        if getattr(settings, key) not in (None, method):
-            missing.append(f"{key} {getattr(settings, key)!r} is not supported on a [surface] (only {method!r})")
-    for key in ("joints", "stretch", "stiffness", "damping"):
-        if getattr(settings, key) is not None:
-            missing.append(f"{key} does not apply to a [surface]; remove it")
-    if settings.half_kick:
-        missing.append("half_kick applies to pymunk only; remove it")
     if settings.broad_phase == "oriented":
         missing.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
     return missing

@@ -42,12 +42,12 @@ class OneWayWalls:
 
     def rebuild(self, start: FloatArray) -> None:
         """Update after a change of the walls; `start` are the centres (N, ≥ 2), m."""
-        fixtures, self._start = self._store.fixtures, start
-        order = np.argsort(fixtures.segment_collider, kind="stable")
+        static, self._start = self._store.static_colliders, start
+        order = np.argsort(static.segment_collider, kind="stable")
         colliders = np.flatnonzero(self.is_one_way)
-        begin, end = (np.searchsorted(fixtures.segment_collider[order], colliders, side) for side in ("left", "right"))
+        begin, end = (np.searchsorted(static.segment_collider[order], colliders, side) for side in ("left", "right"))
         self._segments = {
-            collider: fixtures.segments[order[first:last], :4]
+            collider: static.segments[order[first:last], :4]
             for collider, first, last in zip(colliders.tolist(), begin.tolist(), end.tolist(), strict=True)
         }
 
@@ -131,7 +131,7 @@ class CollisionFilter:
         self._bits: IntArray = 1 << self._store.layer
         self._filters = filter_table(self._store.scene, self._store.bodies)
         self._is_movable: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
-        self._segment_collider = self._store.fixtures.segment_collider
+        self._segment_collider = self._store.static_colliders.segment_collider
         if self.walls is not None:
             self.walls.rebuild(position)
 
@@ -174,7 +174,7 @@ class CollisionFilter:
         if not self._filters_planes:
             return keys
         body = np.arange(len(self._bits))[:, None]
-        filtered = can_touch[:, None] & ~self._meets(body, self._store.fixtures.plane_collider)
+        filtered = can_touch[:, None] & ~self._meets(body, self._store.static_colliders.plane_collider)
         ball, plane = np.nonzero(filtered)
         return np.union1d(keys, (1 << KIND) + (ball << FIRST) + plane)
 

@@ -11,7 +11,8 @@ Compare Bullet's `btInternalEdgeUtility` and the ghost vertices of Box2D's chain
 import math
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.common.colliders import LEAN, SIDEWAYS
+from sandbox.engines.common.colliders import LEAN
+from sandbox.engines.common.geometry import is_left_of_bend
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.reference.polygon import DEGENERATE, clip, face_at, write_point
 
@@ -60,15 +61,14 @@ def correct_internal_edge(
     beyond = math.sqrt(jx * jx + jy * jy)
     if ux * jx + uy * jy <= LEAN * beyond:  # also at the end of a wall, where it is 0
         return count
-    # The side of the wall on which the piece is
-    side = uy * tx - ux * ty
-    if abs(side) < SIDEWAYS:
-        low, high = math.inf, -math.inf
-        for k in range(start, end):
-            height = (corner[k, 1] - corner[a, 1]) * tx - (corner[k, 0] - corner[a, 0]) * ty
-            low, high = min(low, height), max(high, height)
-        side = low + high
-    side = 1.0 if side >= 0.0 else -1.0
+    # The normal does not show on which side of the wall the piece is: it may be that of one of the piece's faces.
+    x, y = 0.0, 0.0
+    for k in range(start, end):
+        x, y = x + corner[k, 0], y + corner[k, 1]
+    joint = a + 1 if lean > 0.0 else a
+    x, y = x / (end - start) - corner[joint, 0], y / (end - start) - corner[joint, 1]
+    is_left = is_left_of_bend(x, y, tx, ty, jx, jy) if lean > 0.0 else is_left_of_bend(x, y, -jx, -jy, tx, ty)
+    side = 1.0 if is_left else -1.0
     own = side * (uy * tx - ux * ty)
     its = side * sign * (uy * jx - ux * jy) / beyond
     deepest = out[0, 2] if count == 1 else min(out[0, 2], out[1, 2])

@@ -46,7 +46,7 @@ class WorldPieces:
     """S pieces of bodies and G segments of static colliders, which are pieces of two corners."""
 
     def __init__(self, store: BodyStore) -> None:
-        shapes, segments = store.bodies.shapes, store.fixtures.segments
+        shapes, segments = store.bodies.shapes, store.static_colliders.segments
         self.count = len(shapes)
         self.body: IntArray = shapes.body
         self.surface: IntArray = store.contact_matrix.surfaces.of_shape

@@ -126,7 +126,8 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         for m in range(len(is_done)):
             if is_stopped():
                 break
-            is_done[m] = stepper.run(*(array[m] for array in members), steps=int(steps))
+            start = (array[m] for array in members)
+            is_done[m] = stepper.run(*start, steps=int(steps), is_stopped=is_stopped)
         return is_done
 
     def world_batch(self, count: int) -> ConvexWorldBatch | None:

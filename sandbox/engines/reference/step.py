@@ -135,7 +135,7 @@ class WorldState:
         self.walls: OneWayWalls | None = None if self.filter is None else self.filter.walls
         self.pipeline = self._new_pipeline(self.work)
         self._penalty = self._new_penalty(self.pipeline)
-        self._fixtures = store.fixtures
+        self._fixtures = store.static_colliders
         self.drives: Drives | None = None
         self.records_joint_load = self.records_work = False
         """whether step records contain `joint_load`, and `work`"""
@@ -178,8 +178,8 @@ class WorldState:
             self.pipeline = self._new_pipeline(self.work)
             self._penalty = self._new_penalty(self.pipeline)
             self.memory.forget(self._settings.h)
-        if store.fixtures is not self._fixtures:  # keys may mean other segments now
-            self._fixtures = store.fixtures
+        if store.static_colliders is not self._fixtures:  # keys may mean other segments now
+            self._fixtures = store.static_colliders
             self.memory.forget(self._settings.h)
         if not is_start:  # a new pipeline is up to date
             self.pipeline.rebuild()

@@ -6,9 +6,10 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND
-from sandbox.engines.common.body_store import BodyStore, first_beyond
+from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.frame_rows import FrameRows, no_rows
 from sandbox.engines.common.kernel import bare_kernel
+from sandbox.engines.common.state_bounds import first_beyond
 from sandbox.engines.contract import Divergence, Members, WorldStates
 from sandbox.engines.reference.collision import ConvexPipeline
 from sandbox.engines.reference.compiled_stepper import CompiledStepper, step_scratch

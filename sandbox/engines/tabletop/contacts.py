@@ -44,13 +44,13 @@ class Cushions(NamedTuple):
 
 def cushions_of(scene: Scene, surface: IntArray) -> Cushions:
     """Return the cushions of a scene; `surface` (F,) are the surfaces of its static colliders."""
-    fixtures = static_colliders(scene)
-    collider = np.concatenate((fixtures.plane_collider, fixtures.segment_collider))
+    static = static_colliders(scene)
+    collider = np.concatenate((static.plane_collider, static.segment_collider))
     height = [collider.height or 0.0 if isinstance(collider, Wall | Post) else 0.0 for collider in scene.fixed]
     return Cushions(
-        fixtures.planes,
-        fixtures.segments,
-        fixtures.joints,
+        static.planes,
+        static.segments,
+        static.joints,
         collider,
         np.asarray(height, dtype=np.float64)[collider],
         surface[collider],

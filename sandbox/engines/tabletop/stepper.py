@@ -17,8 +17,9 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND
-from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING, first_beyond
+from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, join_batches
+from sandbox.engines.common.state_bounds import first_beyond
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.tabletop.collisions import BALL_BALL, CUSHION
@@ -113,8 +114,15 @@ class TabletopStepper:
         self._cushions: Cushions = cushions_of(scene, surfaces.of_fixed)
         self._surface: IntArray = surfaces.of_body
 
-    def rebuild_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray) -> None:
-        """Use these arrays from now on. Pockets of bodies that were there before are kept."""
+    def rebuild_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray, held: BoolArray) -> None:
+        """Use these arrays from now on. Pockets of bodies that were there before are kept.
+
+        Args:
+            state: arrays of N bodies.
+            bodies: their start.
+            present: (N,) whether each is in the scene.
+            held: (N,) whether a zone holds each.
+        """
         count = len(bodies)
         pocket = np.full(count, -1, np.int64)
         pocket[: len(self.pocket)] = self.pocket
@@ -128,10 +136,10 @@ class TabletopStepper:
             anchor=np.zeros((count, 8)),
             age=np.zeros(count),
             moved=np.zeros(count, np.bool_),
-            in_play=present & ~bodies.fixed & (pocket < 0),
+            in_play=present & ~bodies.fixed & ~held & (pocket < 0),
             collision_mask=np.where(present & (pocket < 0), self._masks, NOTHING),
             radius=bodies.radius,
-            inverse_mass=np.where(bodies.fixed, 0.0, 1.0 / bodies.mass),
+            inverse_mass=np.where(bodies.fixed | held, 0.0, 1.0 / bodies.mass),
             surface=self._surface,
             floor=self._floor,
         )

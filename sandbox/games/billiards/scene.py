@@ -101,10 +101,10 @@ def expanded(scene: Scene) -> Scene:
     if billiards.table is not None:
         table = TABLES[billiards.table]
         nose = next(each for each in (billiards.nose, balls.nose, 2.0 * NOSE * radius) if each is not None)
-        fixtures = static_colliders(table, nose)
-        changes["walls"] = added(scene.walls, fixtures.walls)
-        changes["posts"] = added(scene.posts, fixtures.posts)
-        changes["pockets"] = added(scene.pockets, fixtures.pockets)
+        static = static_colliders(table, nose)
+        changes["walls"] = added(scene.walls, static.walls)
+        changes["posts"] = added(scene.posts, static.posts)
+        changes["pockets"] = added(scene.pockets, static.pockets)
         play["area"] = ((0.0, 0.0), (table.width, table.length))
     named = tuple(Spot(name=name, position=at) for name, at in spots.items())
     changes["play"] = stated(scene.play, play).model_copy(update={"spots": named})

@@ -192,6 +192,11 @@ class Landing:
         self.score = self.landing_points(self._tank)
         return LANDED
 
+    @property
+    def is_ranked(self) -> bool:
+        """Whether the score may enter the high scores: that of a landing, not of a crash."""
+        return self.game_over == LANDED
+
     def landing_points(self, tank: float) -> int:
         """Return the points of a landing with fuel, N·s, left."""
         return FOR_LANDING + round(FOR_FUEL * tank / self.full_tank)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice.forecast import Risk, formula_forecast
 from sandbox.measure.advice.game_code import GameCode, game_code
@@ -20,7 +22,7 @@ from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
-from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )
@@ -95,6 +97,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         truth_about=truth.about if isinstance(truth, Truth) else truth,
         trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
         duration=scene.world.duration,
+        left_at=_left_at(score.context),
         risks=tuple(measured.risks),
         notes=tuple(measured.notes),
         present=present,
@@ -111,6 +114,9 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         recorded_actions=0 if request.recording is None else len(request.recording.actions),
         replays=tuple(measured.replays),
         tried=0 if found is None else sum(point.status != "refused" for point in found.points),
+        tried_here=0
+        if found is None
+        else sum(point.engine == request.engine and point.status != "refused" for point in found.points),
         untried=measured.untried_knobs + (0 if found is None else found.untried),
         out_of_time=clock_without_compilation() > request.deadline,
         interrupted=measured.interrupted,
@@ -136,11 +142,19 @@ def _measured_setting(
         error_px=point.error * request.zoom if is_length and point.error is not None else None,
         invariant=None if score.invariant is None else point.metrics.get(score.invariant),
         missed_contacts=point.metrics.get("missed_contacts"),
+        objections=point.objections,
+        worst=point.worst if score.metric == "max_position" else None,
         within_until=measured.within_until.get(evaluation_key(point)),
         frame_ms=None if timed is None else timed.frame_time(request.fps),
         ratio=_ratio(None if timed is None else timed.cost_median, None if present is None else present.cost_median),
         repeats=0 if timed is None else timed.repeats,
     )
+
+
+def _left_at(context: EvaluationContext) -> dict[str, float]:
+    """Return the time at which each body leaves the level, s, of those that do while the truth is trusted."""
+    left = context.left_at
+    return {context.scene.bodies.names[k]: float(left[k]) for k in np.flatnonzero(left < context.until).tolist()}
 
 
 def _ratio(value: float | None, base: float | None) -> float | None:

@@ -4,17 +4,16 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from pydantic import ValidationError
-
 from sandbox.measure.preflight import Diagnostic, notes, run_preflight, warnings
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.measure.preflight.tunnelling import intervals
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 
 ELEMENT_KEYS = ("ball", "body", "joint", "thing", "first")
 """Details that name the element of a diagnostic, in the order of preference."""
-GAME_NOTES = frozenset({"flight", "pixels"})
+GAME_NOTES = frozenset({"flight", "pixels", "seams"})
 """Kinds of notes that matter for the settings of a game."""
 DETECTION_KINDS = frozenset({"tunnelling", "depth", "entry"})
 """Kinds of diagnostics that depend on how often contacts are detected."""
@@ -68,14 +67,16 @@ def formula_forecast(scene: Scene, settings: Settings, engine: str, fps: float) 
     return _ordered(found, settings, engine, fps, {each.message for each in found})
 
 
-def game_notes(scene: Scene, engine: str) -> list[str]:
+def game_notes(scene: Scene, engine: str, zoom: float) -> list[str]:
     """Return the notes about a scene that matter for the settings of a game.
 
     Args:
         scene: the scene, with the present setting as its `[solver]`.
         engine: name of the engine.
+        zoom: px/m; at 1 the unit of length is known to be the pixel, and no note asks whether it is.
     """
-    return [each.message for each in notes(scene, engine) if each.kind in GAME_NOTES]
+    kinds = GAME_NOTES - {"pixels"} if zoom == 1.0 else GAME_NOTES
+    return [each.message for each in notes(scene, engine) if each.kind in kinds]
 
 
 def _ordered(
@@ -108,5 +109,5 @@ def _safe_substeps(safe_dt: float | int | str | None, settings: Settings, fps: f
     needed = math.ceil(settings.substeps / (fps * float(safe_dt)) * (1.0 - ROUNDING))
     try:
         return settings.replace(substeps=max(needed, 1)).substeps
-    except ValidationError:  # more than a setting may have
+    except SettingsError:  # more than a setting may have
         return None

@@ -7,9 +7,10 @@ from typing import Any, Literal
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
+from sandbox.measure.tradeoff.metrics import WorstError
 from sandbox.scene.description.world import Settings
 
-FallbackKind = Literal["invariant", "budget", "accuracy"]
+FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]
 KnobStart = Literal["present", "recommended", "fallback"]
 
 
@@ -35,6 +36,10 @@ class MeasuredSetting:
     """invariant that also holds beyond the predictability horizon, in its unit; None if the advice has none"""
     missed_contacts: float | None
     """contacts that the engine missed"""
+    objections: tuple[str, ...] = ()
+    """reasons not to recommend the setting although its error may be within the tolerance, as clauses"""
+    worst: WorstError | None = None
+    """body, time and place of the largest distance from the truth; None without a truth"""
     within_until: float | None = None
     """s, time from which on the error exceeds the tolerance; None if it does not, or if that was not measured"""
     frame_ms: float | None = None
@@ -79,7 +84,10 @@ class ReplayedActions:
     """Run of a setting with the actions of a recording."""
 
     setting: str
-    """`present` or `recommended`"""
+    """`present`, `recommended`, `fallback`, or `rejected`: within the tolerance, but not without fault with the
+    actions"""
+    label: str
+    """the setting in words"""
     status: str
     reason: str | None
     missed_contacts: int | None
@@ -124,6 +132,9 @@ class Advice:
     """s, time up to which errors count; None without a truth"""
     duration: float
     """s, duration of the scene"""
+    left_at: Mapping[str, float]
+    """s, time from which on bodies do not count, because they have fallen past everything that could stop them, by
+    name"""
     risks: tuple[Risk, ...]
     """forecast for the present setting, the most severe first"""
     notes: tuple[str, ...]
@@ -137,8 +148,8 @@ class Advice:
     fallback: MeasuredSetting | None
     """another setting if the recommended one is missing or over the budget"""
     fallback_kind: FallbackKind | None
-    """choice of the fallback: the cheapest that keeps the `invariant`, the most accurate within the `budget`, or the
-    most accurate of all (`accuracy`)"""
+    """choice of the fallback: the cheapest that keeps the `invariant`, the most accurate within the `budget`, the most
+    accurate of all (`accuracy`), or the cheapest within the tolerance, which misses contacts with the `actions`"""
     remaining_risks: tuple[Risk, ...]
     """forecast for the recommended setting, or for the fallback without one"""
     knob_start: KnobStart | None
@@ -157,6 +168,8 @@ class Advice:
     """runs with these actions"""
     tried: int
     """number of settings that were tried"""
+    tried_here: int
+    """number of them on the present engine"""
     untried: int
     """number of settings left out because of their cost or the time limit"""
     out_of_time: bool
@@ -243,6 +256,7 @@ class AdviceDocument:
     truth_about: str | None
     trusted_until: float | None
     duration: float
+    left_at: Mapping[str, float]
     risks: Sequence[Risk]
     notes: Sequence[str]
     present: MeasuredSetting
@@ -260,6 +274,7 @@ class AdviceDocument:
     recorded_actions: int
     replays: Sequence[ReplayedActions]
     tried: int
+    tried_here: int
     untried: int
     out_of_time: bool
     interrupted: bool

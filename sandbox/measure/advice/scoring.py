@@ -5,8 +5,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
-from pydantic import ValidationError
-
 from sandbox.measure.compare.ground_truth import Truth, find_truth
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
@@ -15,6 +13,7 @@ from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 
 MIN_TRUSTED_FRAMES = 10
 """Frames that a truth must be trusted for at least, so that errors are those of a motion."""
@@ -138,5 +137,5 @@ def _shared_settings(request: AdviceRequest) -> Settings | None:
         return None
     try:
         return request.loop.replace(dt=float(shared))
-    except ValidationError:  # shorter than a dt may be
+    except SettingsError:  # shorter than a dt may be
         return None

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from sandbox.action import Switch
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.assembly import (
@@ -19,15 +18,12 @@ from sandbox.measure.advice.assembly import (
     settings_change,
 )
 from sandbox.measure.advice.forecast import forecast, game_notes
-from sandbox.measure.advice.result import (
-    Advice,
-    FallbackKind,
-    ReplayedActions,
-)
+from sandbox.measure.advice.replays import replay_actions
+from sandbox.measure.advice.result import Advice, FallbackKind
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
 from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
-from sandbox.measure.run.recorder import TooLargeError, require_memory
-from sandbox.measure.run.runner import run
+from sandbox.measure.run.recorder import require_memory
+from sandbox.measure.run.sessions import recorded_scene
 from sandbox.measure.seeds import is_random
 from sandbox.measure.tradeoff.configuration import (
     MIN_STEPS,
@@ -57,7 +53,6 @@ from sandbox.measure.tradeoff.timing import TimedRun, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import as_scene
 
 DEFAULT_FPS, DEFAULT_ZOOM = 60.0, 50.0
@@ -107,7 +102,7 @@ def advise(
         KeyboardInterrupt: Ctrl-C was pressed before the present setting was measured.
     """
     recording = scene if isinstance(scene, Recording) else None
-    played = _recorded_scene(scene) if isinstance(scene, Recording) else as_scene(scene)
+    played = recorded_scene(scene) if isinstance(scene, Recording) else as_scene(scene)
     if engine is None:
         names = able(played)
         engine = recording.engine if recording else "pymunk" if "pymunk" in names or not names else names[0]
@@ -148,18 +143,6 @@ def _check(**values: float | None) -> None:
             raise ValueError(f"{name.replace('_', ' ')} is {value:g}; it must be positive and finite")
 
 
-def _recorded_scene(recording: Recording) -> Scene:
-    """Return the scene of a recording with its duration, and with its settings as `[solver]`.
-
-    Settings that its engine chooses by itself are left out, so that other engines can run the scene.
-    """
-    scene, settings = recording.whole_scene, recording.settings
-    common = settings.common()
-    chosen = engine_named(recording.engine).resolve(scene, common)
-    own = {key: value for key in Settings.model_fields if (value := getattr(settings, key)) != getattr(chosen, key)}
-    return scene.model_copy(update={"solver": common.replace(**own)})
-
-
 def _advise(request: AdviceRequest) -> Advice:
     """Measure, and return the advice; after Ctrl-C, of what was measured before."""
     scene, engine = request.scene, request.engine
@@ -170,13 +153,13 @@ def _advise(request: AdviceRequest) -> Advice:
     request.on_progress(Progress("the truth"))
     score = find_score(request)
     request.on_progress(Progress("the present setting"))
-    measured = AdviceMeasurements(risks, game_notes(scene, engine), _evaluate_present(request, score))
+    measured = AdviceMeasurements(risks, game_notes(scene, engine, request.zoom), _evaluate_present(request, score))
     try:
         _search(request, score, measured)
         if not measured.interrupted:
             _turn_knobs(request, score, measured)
             _find_excess(request, score, measured)
-            _replay_actions(request, measured)
+            replay_actions(request, score, measured)
             _time_settings(request, measured)
     except KeyboardInterrupt:
         measured.interrupted = True
@@ -191,7 +174,7 @@ def _evaluate_present(request: AdviceRequest, score: AdviceScore) -> Evaluation:
         return refused_evaluation(engine, present, "; ".join(missing))
     space = SearchSpace(scene, present, (engine,), request.frame)
     limit = max(request.effort, MIN_RUN_COST)
-    return evaluate(space.starts()[0], space, [score.present], score.metric, limit)
+    return evaluate(space.starts()[0], space, [score.present], score.metric, score.tolerance, limit)
 
 
 def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> None:
@@ -280,9 +263,11 @@ def _turn_knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeas
             Progress(f"knobs: {settings_change(space.resolved(configuration), space.resolved(neighbour))}")
         )
         limit = max(RUN_FRACTION * request.effort, 2.0 * measured.start.counted_seconds)
-        measured.knobs.append(evaluate(neighbour, space, [score.context], score.metric, limit, request.deadline))
+        measured.knobs.append(
+            evaluate(neighbour, space, [score.context], score.metric, score.tolerance, limit, request.deadline)
+        )
     if measured.recommended is None and not is_random(request.scene):  # other seeds would have to confirm it
-        within = [each for each in measured.knobs if each.ranking_error <= score.tolerance]
+        within = [each for each in measured.knobs if each.meets(score.tolerance)]
         measured.recommended = min(within, key=lambda each: each.counted_seconds, default=None)
 
 
@@ -309,26 +294,6 @@ def _pymunk_slop(space: SearchSpace, configuration: Configuration) -> list[Confi
     is_known = present is not None and is_space_default("collision_slop", present)
     is_new = space.is_valid(changed) and not is_known
     return [changed] if is_new else []
-
-
-def _replay_actions(request: AdviceRequest, measured: AdviceMeasurements) -> None:
-    """Run the present and the recommended setting with the actions of a recording."""
-    if request.recording is None or not request.recording.actions:
-        return
-    actions = tuple(each for each in request.recording.actions if not isinstance(each, Switch))
-    chosen = measured.recommended or measured.fallback
-    named = {"present": measured.present, "recommended" if measured.recommended else "fallback": chosen}
-    for name, each in named.items():
-        if each is None or each.status == "refused":
-            continue
-        request.on_progress(Progress(f"the recording with the {name} setting"))
-        try:
-            found = run(request.scene, request.engine, actions=actions, **each.asked.model_dump())
-        except TooLargeError as error:
-            measured.replays.append(ReplayedActions(name, "failed", str(error), None))
-        else:
-            missed = found.missed_contacts if found.status == "ok" else None
-            measured.replays.append(ReplayedActions(name, found.status, found.reason, missed))
 
 
 def _time_settings(request: AdviceRequest, measured: AdviceMeasurements) -> None:

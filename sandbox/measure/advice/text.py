@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from sandbox.formatting import UNKNOWN, format_percent, format_plural, format_quantity
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine
+from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value
 from sandbox.scene.description.world import Settings
 
@@ -12,11 +13,15 @@ SMALLEST_PX = 1e-3
 """px; smaller errors are written as a bound, because nothing on the screen shows them."""
 SAME_STEP = 1e-9
 """Relative: a dt that differs from a frame by less is written as that of a frame."""
+OBJECTIONS = "has objections"
+"""Remark on a setting that is within the tolerance and not to be recommended."""
+MAX_LEFT = 3
+"""Bodies that are named because they do not count to the end."""
 METHODS = ("integrator", "detection", "response", "joints", "half_kick", "continuous", "slop", "bias", "persistence")
 """Settings that are named if they were asked for; others have no effect on results."""
 
 
-def setting_text(setting: MeasuredSetting, fps: float) -> str:
+def setting_text(setting: MeasuredSetting | Evaluation, fps: float) -> str:
     """Return a setting in a few words: `dt 1/60 s, 4 substeps, 10 iterations, half_kick`."""
     own, asked = setting.settings, setting.asked
     if setting.engine == "exact":
@@ -58,7 +63,8 @@ def error_text(advice: Advice, setting: MeasuredSetting) -> str:
         return "error unknown"
     if setting.error_px is None:
         return f"{advice.metric} {format_quantity(setting.error, advice.unit)}"
-    length = "" if setting.error_px < SMALLEST_PX else f" ({format_quantity(setting.error, 'm')})"
+    is_shown = setting.error_px >= SMALLEST_PX and advice.zoom != 1.0  # at 1 px per metre the figures are the same
+    length = f" ({format_quantity(setting.error, 'm')})" if is_shown else ""
     return f"error {pixels_text(setting.error_px)} px{length}"
 
 
@@ -72,6 +78,9 @@ def figures_text(advice: Advice, setting: MeasuredSetting) -> str:
         parts.append(format_plural(round(setting.missed_contacts), "missed contact"))
     if setting.within_until is not None:
         parts[0] += f" from {setting.within_until:.3g} s on"
+    if setting.worst is not None and setting.worst.error > SMALLEST_PX / advice.zoom:
+        x, y = setting.worst.position
+        parts.append(f"the largest is that of {setting.worst.body!r} at {setting.worst.time:.3g} s, ({x:.4g}, {y:.4g})")
     if advice.invariant is not None and setting.invariant is not None:
         parts.append(f"{advice.invariant} to the end {setting.invariant:.3g}")
     return "; ".join([*parts, *cost_parts(advice, setting)])
@@ -100,27 +109,44 @@ def target_text(advice: Advice) -> str:
     """Return the frame rate, tolerance and budget."""
     tolerance = format_quantity(advice.tolerance, advice.unit)
     if advice.tolerance_px is not None:
-        tolerance = f"{pixels_text(advice.tolerance_px)} px ({tolerance} at {advice.zoom:g} px per metre)"
+        scale = "the unit of length" if advice.zoom == 1.0 else f"{tolerance} at {advice.zoom:g} px per metre"
+        tolerance = f"{pixels_text(advice.tolerance_px)} px ({scale})"
     else:
         tolerance = f"{advice.metric} {tolerance}"
     budget = "" if advice.budget is None else f", budget {advice.budget:g} ms per frame"
     return f"{advice.engine} at {advice.fps:g} fps, tolerance {tolerance}{budget}"
 
 
+def coverage_sentence(advice: Advice) -> str | None:
+    """Return which part of a scene was judged and what of the rest was not; None if positions were to the end."""
+    if advice.is_predictable and advice.metric_reason is None:
+        return None
+    judged = "missed contacts, joint errors and the forecast"
+    if advice.metric_reason is not None:
+        return (
+            f"Not judged: positions, because {advice.metric_reason}. Judged: {advice.metric} ({advice.metric_about}), "
+            f"{judged}."
+        )
+    if advice.invariant is not None:
+        judged = f"{advice.invariant}, {judged}"
+    return (
+        f"Judged: positions up to {advice.trusted_until:.3g} s of {advice.duration:.4g} s. Not judged: positions after "
+        f"that, which no setting predicts; {judged} are judged to the end."
+    )
+
+
 def truth_sentences(advice: Advice) -> Iterator[str]:
-    """Yield the truth that errors are measured against, up to when, and what counts without one."""
+    """Yield the truth that errors are measured against, and the bodies that do not count to the end."""
     if advice.truth is None or advice.trusted_until is None:
-        yield f"No truth is known, so position errors are absent: {advice.truth_about}."
+        yield f"No truth is known: {advice.truth_about}."
     else:
         kind = advice.truth.replace("_", " ")
-        until = f"the end, {advice.duration:.4g} s"
-        if not advice.is_predictable:
-            until = f"{advice.trusted_until:.3g} s of {advice.duration:.4g} s only"
-        yield f"Errors are distances from the truth ({kind}: {advice.truth_about}), up to {until}."
-    if advice.metric_reason is not None:
-        yield f"The error is instead {advice.metric} ({advice.metric_about}), because {advice.metric_reason}."
-    elif advice.invariant is not None:
-        yield f"Beyond that time no setting predicts positions; {advice.invariant} is measured to the end."
+        until = "the end" if advice.is_predictable else "that time"
+        yield f"Errors of positions are distances from the truth ({kind}: {advice.truth_about}), up to {until}."
+    for name, time in list(advice.left_at.items())[:MAX_LEFT]:
+        yield f"{name!r} does not count after {time:.3g} s: it has fallen past everything that could stop it."
+    if len(advice.left_at) > MAX_LEFT:
+        yield f"The same holds for {len(advice.left_at) - MAX_LEFT} other bodies."
 
 
 def recording_sentences(advice: Advice) -> Iterator[str]:
@@ -135,7 +161,10 @@ def recording_sentences(advice: Advice) -> Iterator[str]:
         outcome = format_plural(each.missed_contacts or 0, "missed contact")
         if each.status != "ok" or each.missed_contacts is None:
             outcome = f"{each.status}{'' if each.reason is None else f': {each.reason}'}"
-        yield f"With the actions, the {each.setting} setting has: {outcome}."
+        if each.setting == "rejected":
+            yield f"With the actions, {each.label} has: {outcome}; so it is not recommended."
+        else:
+            yield f"With the actions, the {each.setting} setting has: {outcome}."
 
 
 def risk_label(risk: Risk) -> str:
@@ -153,15 +182,26 @@ def risk_text(risk: Risk, fps: float) -> str:
     return f"{risk.message}; at dt = 1/{fps:g} s, {remedy}"
 
 
+def cheapest_head(advice: Advice) -> str:
+    """Return the heading of the recommended setting, with the number of settings among which it is the cheapest."""
+    tried = f", of {advice.tried_here} tried on {advice.engine}" if advice.tried_here else ""
+    return f"Cheapest setting within the tolerance{tried}"
+
+
 def no_setting_text(advice: Advice) -> str:
     """Return why there is no recommended setting."""
     if not advice.tried:
         return "no setting was tried" + (" within the time limit" if advice.out_of_time else "")
-    return f"none of the settings tried on {advice.engine} is within the tolerance"
+    if any(each.setting == "rejected" for each in advice.replays):
+        return f"no setting tried on {advice.engine} is without a missed contact with the actions"
+    is_within = advice.fallback is not None and advice.is_within_tolerance(advice.fallback)
+    return "none without an objection" if is_within else "none"
 
 
 def fallback_head(advice: Advice) -> str:
     """Return what the fallback is."""
+    if advice.fallback_kind == "actions":
+        return "cheapest setting within the tolerance, without the actions"
     if advice.fallback_kind == "invariant":
         return f"cheapest setting with {advice.invariant} within {advice.invariant_tolerance:g} to the end"
     return f"most accurate setting {'within the budget' if advice.fallback_kind == 'budget' else 'tried'}"
@@ -180,7 +220,9 @@ def engine_text(other: OtherEngine) -> str:
         return f"cannot run the scene: {other.missing}"
     if other.setting is None:
         return "no setting reached the end of the scene"
-    return "" if other.is_within_tolerance else "misses the tolerance"
+    if not other.is_within_tolerance:
+        return "misses the tolerance"
+    return OBJECTIONS if other.setting.objections else ""
 
 
 def search_sentence(advice: Advice) -> str:

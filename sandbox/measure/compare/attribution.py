@@ -6,14 +6,13 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any, get_args
 
-from pydantic import ValidationError
-
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import in_json
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 from sandbox.trajectory import Trajectory
 
 MAX_EXPLAINED_RATIO = 0.9
@@ -109,8 +108,8 @@ class _Rerun:
         unknown = replace(effect, status="refused", max_position_error=None, ratio=None)
         try:
             settings = self.settings.replace(**changes)
-        except ValidationError as error:
-            return replace(unknown, reason=error.errors()[0]["msg"])
+        except SettingsError as error:
+            return replace(unknown, reason=error.faults[0].message)
         missing = ENGINES[self.engine].missing(self.scene, settings)
         if missing:
             return replace(unknown, reason="; ".join(missing))
@@ -161,7 +160,7 @@ def _literals(annotation: Any) -> tuple[str, ...]:
 def _is_allowed(settings: Settings, name: str, value: float) -> bool:
     try:
         settings.replace(**{name: value})
-    except ValidationError:
+    except SettingsError:
         return False
     return True
 

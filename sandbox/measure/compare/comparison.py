@@ -84,7 +84,7 @@ def compare(
         ValueError: the tolerance is not positive and finite; or a sweep is empty, too large, or has a key that
             `settings` sets too.
         SceneError: a swept key or value is invalid.
-        pydantic.ValidationError: a setting is invalid.
+        SettingsError: a setting is invalid.
     """
     scene = as_scene(scene)
     both = [key for key in sweep or () if short_key(key) in settings]
@@ -131,7 +131,7 @@ def compare_variants(
         UnknownEngineError: no engine has one of the names.
         TooLargeError: the frames of all runs would not fit into memory together.
         ValueError: the tolerance is not positive and finite.
-        pydantic.ValidationError: a setting is invalid.
+        SettingsError: a setting is invalid.
     """
     engines = [engines] if isinstance(engines, str) else engines
     for name in engines or ():

@@ -14,6 +14,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
+from sandbox.formatting import format_fraction
 from sandbox.measure.analytic import solution
 from sandbox.measure.analytic.trajectory import solution_run
 from sandbox.measure.compare.self_convergence import RefinedRun, halve_step, preferred_settings, refine
@@ -265,7 +266,7 @@ def _conserves_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[f
     end = scene.world.duration
     drift = momentum_drift(run, scene)
     if drift is not None and abs(drift) > GROWTH:
-        return 0.0, f"the momentum in {run.info['engine']} changes by {abs(drift):.1%} without a force"
+        return 0.0, f"the momentum in {run.info['engine']} changes by {format_fraction(abs(drift))} without a force"
     needed = demands(scene)
     windy = Demand.DRAG in needed and any(scene.world.wind)
     if windy or needed & SOURCES or (scene.bodies.born > 0.0).any():

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
@@ -16,6 +15,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_STEPS
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 from sandbox.schedule import frame_count
 from sandbox.trajectory import Trajectory
 
@@ -188,5 +188,5 @@ def halve_step(settings: Settings) -> Settings | None:
     """Return settings with half the time step and the same recorded frames; None if dt is out of bounds."""
     try:
         return settings.replace(dt=settings.dt / 2.0, record_every=settings.record_every * 2)
-    except ValidationError:
+    except SettingsError:
         return None

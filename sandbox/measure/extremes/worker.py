@@ -15,8 +15,6 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any, TextIO
 
-from pydantic import ValidationError
-
 from sandbox.engines.registry import engine_named
 from sandbox.jsonable import JsonObject
 from sandbox.measure.extremes.checks import RunUnderTest, classify
@@ -88,10 +86,8 @@ def evaluate_task(task: Task) -> Outcome:
         scene = from_document(scenario.document(task.parameters), "the scene", task.overrides)
         settings = _settings(scene, task)
     except SceneError as error:
-        return Outcome("refused", f"invalid scene: {error.faults[0].message}")
-    except ValidationError as error:
-        first = error.errors()[0]
-        return Outcome("refused", f"invalid scene: {'.'.join(map(str, first['loc']))}: {first['msg']}")
+        first = error.faults[0]
+        return Outcome("refused", f"invalid scene: {first.path}: {first.message}")
     predicted = tuple(dict.fromkeys(each.kind for each in warnings(scene, settings, task.engine)))
     engine = engine_named(task.engine)
     missing = engine.missing(scene, settings)

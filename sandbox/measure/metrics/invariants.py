@@ -64,6 +64,25 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
     return EnergyDrift(_ratio(change, scale), against)
 
 
+def conserves_energy(scene: Scene) -> bool:
+    """Return whether a scene conserves energy.
+
+    It has no drag, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way or that
+    jerks a body when it becomes taut, and elastic contacts.
+    """
+    if scene.world.has_drag or scene.world.has_damping or scene.thrusts or scene.drives:
+        return False
+    if scene.bodies.kinematic.any():
+        return False
+    springs, motors = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING), scene.links.of(LinkKind.MOTOR)
+    slides = scene.links.of(LinkKind.SLIDE)
+    if springs.figures[:, 2].any() or len(motors) or len(slides) or scene.links.is_limited.any():
+        return False
+    matrix = contact_matrix(scene)
+    elastic = (matrix.surfaces.restitution == 1.0) & matrix.surfaces.fixed_coefficients
+    return bool(elastic[matrix.touching].all() and matrix.friction == 0.0)
+
+
 def energy_gain(run: Trajectory, scene: Scene) -> float:
     """Return the largest excess of the energy over its initial value, as a fraction of the exchanged energy.
 
@@ -165,6 +184,10 @@ CONSTRAINT_KINDS = (
 """Kinds of joints that are constraints with an error; springs, motors and ratchets are not."""
 
 
+ANGLE_KINDS = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
+"""Kinds of joints whose error is an angle"""
+
+
 def has_constraints(links: JointArrays) -> bool:
     """Return whether a joint has an error: one of `CONSTRAINT_KINDS` that does not give way."""
     return bool((np.isin(links.kind, CONSTRAINT_KINDS) & ~links.is_limited).any())
@@ -201,7 +224,20 @@ def starting_errors(scene: Scene) -> FloatArray:
     return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], present)[0])
 
 
-def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
+class JointError(NamedTuple):
+    """Largest relative error of any joint in a run."""
+
+    relative: float
+    """fraction of a length (`joint_scales`), or rad"""
+    name: str
+    """of the joint"""
+    error: float
+    """m or rad"""
+    unit: str
+    """m or rad"""
+
+
+def joint_error(trajectory: Trajectory, start: Scene | Setup) -> JointError | None:
     """Return the largest relative error of any joint in any frame; None if the scene has no constraint.
 
     Lengths are relative to the length of the rod or rope, or the bound of the slide; if that is negligible, and for
@@ -212,9 +248,14 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     links = setup.links
     if not has_constraints(links) or not len(trajectory.time):
         return None
-    errors = joint_errors(trajectory, setup) / joint_scales(links, setup.bodies)
-    known = errors[~np.isnan(errors)]
-    return float(known.max()) if len(known) else None
+    errors = joint_errors(trajectory, setup)
+    largest: FloatArray = np.where(np.isnan(errors), -1.0, errors).max(axis=0)
+    if not (largest >= 0.0).any():
+        return None
+    relative = largest / joint_scales(links, setup.bodies)
+    worst = int(relative.argmax())
+    unit = "rad" if links.kind[worst] in ANGLE_KINDS else "m"
+    return JointError(float(relative[worst]), links.names[worst], float(largest[worst]), unit)
 
 
 def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
@@ -235,7 +276,7 @@ def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
     large, arm = (np.where(counts, each, 0.0).max(axis=1) for each in (diameter, arms))
     candidates = np.column_stack((length, small, large, arm))
     first = (candidates > NEGLIGIBLE * candidates.max(axis=1, keepdims=True)).argmax(axis=1)
-    turning = np.isin(links.kind, (LinkKind.ROTARY_LIMIT, LinkKind.GEAR))
+    turning = np.isin(links.kind, ANGLE_KINDS)
     return np.asarray(np.where(turning, 1.0, candidates[np.arange(len(first)), first]))
 
 

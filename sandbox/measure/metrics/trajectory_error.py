@@ -59,6 +59,8 @@ class Errors:
     """(2, K) sums of the squares of both over the bodies"""
     count: FloatArray
     """(K,) number of compared bodies"""
+    body: IntArray
+    """(K,) index of the body with the largest distance"""
 
     def until(self, end: float) -> Score:
         """Return the score of the frames up to a time, s, inclusive."""
@@ -93,22 +95,25 @@ def divergence_times(run: Trajectory, truth: Trajectory, tolerance: float) -> Fl
     return found
 
 
-def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
+def errors(run: Trajectory, truth: Trajectory, moving: BoolArray, until: FloatArray | None = None) -> Errors:
     """Return the errors of a run against the truth.
 
     Args:
         run: the run.
         truth: the truth; only frames with equal times are compared.
         moving: bodies that count, (N,).
+        until: (N,) s, time up to which each body counts; default: to the end.
     """
     frames, truth_frames = common_frames(run, truth)
     size = len(frames)
     largest, squares, count = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
-    numbers = np.flatnonzero(moving)
+    numbers, body = np.flatnonzero(moving), np.zeros(size, np.int64)
     step = max(1, CHUNK // max(1, len(numbers)))
     for begin in range(0, size if len(numbers) else 0, step):
         rows = slice(begin, begin + step)
         both = (run.present(frames[rows]) & truth.present(truth_frames[rows]))[:, numbers]
+        if until is not None:
+            both &= run.time[frames[rows], None] <= until[numbers]
         count[rows] = both.sum(axis=1)
         for k, name in enumerate(("position", "velocity")):
             actual, expected = getattr(run, name)[frames[rows]], getattr(truth, name)[truth_frames[rows]]
@@ -117,7 +122,9 @@ def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
                 away = np.hypot(*np.moveaxis(actual[:, numbers] - expected[:, numbers], 2, 0))
                 away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
                 largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
-    return Errors(run.time[frames], largest[0], largest[1], squares, count)
+            if name == "position":
+                body[rows] = numbers[away.argmax(axis=1)]
+    return Errors(run.time[frames], largest[0], largest[1], squares, count, body)
 
 
 def default_tolerance(scene: Scene) -> float:

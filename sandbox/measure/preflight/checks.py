@@ -72,6 +72,10 @@ DOUBLE_EPSILON = 2.0**-52
 EVENT_DRIVEN = frozenset({"exact"})
 """Engines without a time step, which refuse overlaps."""
 
+ITERATED = frozenset({"pymunk", "reference"})
+"""Engines that iterate contacts and joints, for which the laws of stacks and chains were measured. The contacts and
+joints of box2d are soft, and its substeps take the place of iterations."""
+
 
 @dataclass(frozen=True)
 class PreflightContext:
@@ -286,9 +290,9 @@ CHECKS: dict[str, Check] = {
     "springs": Check(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Check(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
     "orbits": Check(lambda s: orbit_warnings(s.scene, s.settings, s.matrix)),
-    "chains": Check(lambda s: chain_warnings(s.scene, s.settings)),
-    "stretch": Check(lambda s: stretch_warnings(s.scene, s.settings)),
-    "stacks": Check(lambda s: stack_warnings(s.scene, s.settings, s.close)),
+    "chains": Check(lambda s: chain_warnings(s.scene, s.settings), ITERATED),
+    "stretch": Check(lambda s: stretch_warnings(s.scene, s.settings), ITERATED),
+    "stacks": Check(lambda s: stack_warnings(s.scene, s.settings, s.close), ITERATED),
     "events": Check(lambda s: event_warnings(s.scene, s.matrix), EVENT_DRIVEN),
 }
 """All checks, in the order in which their diagnostics are listed. A new check is a function and a line here."""

@@ -6,12 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.base import SLOP_PER_RADIUS
+from sandbox.engines.common.solver_settings import SLOP_PER_RADIUS
+from sandbox.formatting import format_plural
 from sandbox.measure.metrics.clearance import bounding_clearances, clearance, hull_distance, posed_pieces
-from sandbox.measure.preflight.diagnostic import Diagnostic
+from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.tunnelling import collide_with_all
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
@@ -84,10 +86,10 @@ Overlap = tuple[float, str, str]
 
 
 def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts) -> Iterator[Diagnostic]:
-    """Yield a diagnostic for the overlaps at the start, with the deepest one.
+    """Yield a diagnostic for the overlaps of moving bodies at the start, and one for those with fixed ones.
 
-    Pairs whose collisions a joint disables do not count. Of bodies in planes, walls and posts, only overlaps deeper
-    than the slop of the engines count.
+    Each names the deepest. Pairs whose collisions a joint disables do not count. Of bodies in planes, walls, posts and
+    fixed bodies, only overlaps deeper than the slop of the engines count.
     """
     pairs, deepest, kinds = 0, (0.0, "", ""), "balls"
     if matrix.mutual:
@@ -102,10 +104,6 @@ def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts
             names = bodies.names[int(close.first[k])], bodies.names[int(close.second[k])]
             pairs, kinds = pairs + int(deep.sum()), "bodies"
             deepest = max(deepest, (-float(close.clearance[k]), *names))
-    with_static = list(_overlaps_with_static(scene, matrix))
-    if with_static:
-        kinds = f"{kinds} and fixed elements" if pairs else "bodies and fixed elements"
-        pairs, deepest = pairs + len(with_static), max(deepest, max(with_static))
     if pairs > 0:
         depth, first, second = deepest
         count = "overlapping pair" if pairs == 1 else "overlapping pairs"
@@ -114,6 +112,16 @@ def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts
             "the engine will push them apart"
         )
         yield Diagnostic("overlap", message, {"pairs": pairs, "depth": depth, "first": first, "second": second})
+    inside = [*_overlaps_with_static(scene), *_overlaps_with_fixed_bodies(scene, close)]
+    if inside:
+        depth, first, second = max(inside)
+        others = f", and {format_plural(len(inside) - 1, 'other pair')} overlap" if len(inside) > 1 else ""
+        message = (
+            f"{first!r} starts inside the fixed {second!r}, {depth:.3g} m deep{others}; move it, because the engine "
+            "will push it out, which adds energy"
+        )
+        details: Details = {"pairs": len(inside), "depth": depth, "first": first, "second": second}
+        yield Diagnostic("overlap", message, details)
 
 
 def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
@@ -138,7 +146,7 @@ def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
     return count, deepest
 
 
-def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overlap]:
+def _find_static_overlaps(scene: Scene) -> Iterator[Overlap]:
     """Yield the bodies that start in a plane, wall or post, deeper than the slop of the engines.
 
     Scenes with a `[surface]`, one-way walls and driven bodies are left out: cushions are hit at a height, a body in a
@@ -147,7 +155,7 @@ def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overl
     if scene.surface is not None:
         return
     bodies, filters = scene.bodies, filter_table(scene, scene.bodies)
-    able = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
+    able = contact_matrix(scene).touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
     examined = measured = 0
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if (not isinstance(thing, Plane) and not thing.solid) or (isinstance(thing, Wall) and thing.one_way):
@@ -166,6 +174,19 @@ def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overl
                 depth = -float(clearance(scene, bodies, *pose, (number, -1 - k))[0])
             if depth > SLOP_PER_RADIUS * float(bodies.thin[number]):
                 yield depth, bodies.names[number], name
+
+
+_overlaps_with_static = derived_once(lambda setup: tuple(_find_static_overlaps(setup.scene)))
+
+
+def _overlaps_with_fixed_bodies(scene: Scene, close: InitialContacts) -> Iterator[Overlap]:
+    """Yield the moving bodies that start in a fixed body, deeper than the slop of the engines."""
+    bodies = scene.bodies
+    for a, b, gap in zip(close.first.tolist(), close.second.tolist(), close.clearance.tolist(), strict=True):
+        if bodies.fixed[a] != bodies.fixed[b]:
+            mover, fixed = (b, a) if bodies.fixed[a] else (a, b)
+            if -gap > SLOP_PER_RADIUS * float(bodies.thin[mover]):
+                yield -gap, bodies.names[mover], bodies.names[fixed]
 
 
 def _near(bodies: Bodies, thing: Plane | Wall | Post) -> BoolArray:

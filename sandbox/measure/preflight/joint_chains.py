@@ -25,8 +25,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.base import BIAS
-from sandbox.measure.metrics.invariants import joint_scales, starting_errors
+from sandbox.engines.common.solver_settings import BIAS
+from sandbox.measure.metrics.invariants import ANGLE_KINDS, joint_scales, starting_errors
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits, required_iterations
 from sandbox.measure.preflight.stiffness import Product, connected_groups, extreme_eigenvalues
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
@@ -73,6 +73,7 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
             "joint": some.names[0],
             "needed": needed,
             "has": available,
+            "iterations": iterations,
             "safe_dt": dt,
         }
         shorter = f" or dt <= {floor_3_digits(dt)} s" if dt > 0.0 else ""
@@ -216,7 +217,6 @@ digits.
 FAR_ANCHOR_RADII = 2.0
 """An anchor farther from the centre of its body than this many radii is a lever without mass, or a mistake."""
 
-ANGLE_KINDS = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
 ANCHORED_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.SPRING)
 
 ANCHOR_ORDER = (

@@ -248,6 +248,13 @@ class SpeedBounds:
             speed[movers] = np.maximum(speed[movers], fastest[of_body])
         return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
 
+    @cached_property
+    def energy(self) -> float:
+        """Largest kinetic energy of all moving bodies that collide, J, without kicks."""
+        bodies = self.scene.bodies
+        movers = ~bodies.immovable & self.matrix.touches
+        return 0.5 * float((bodies.mass * np.square(self.own))[movers].sum())
+
     def core(self, attraction: Attraction) -> float:
         """Return the smallest distance of bodies from the centre of an attraction, m: to solid objects there."""
         scene, bodies = self.scene, self.scene.bodies

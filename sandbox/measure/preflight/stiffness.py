@@ -16,8 +16,10 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.speed_bound import SpeedBounds
 from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 
 MAX_DENSE = 400
@@ -198,17 +200,18 @@ class SpringMode(NamedTuple):
         return f"the spring {self.joint!r} oscillates"
 
 
-def fastest_modes(scene: Scene) -> list[SpringMode]:
+@derived_once
+def fastest_modes(setup: Setup) -> tuple[SpringMode, ...]:
     """Return the fastest mode of each group of connected springs at the start of a scene.
 
     ω² is the largest eigenvalue of M⁻¹K, with the lever arms of the anchors: for one spring k·(1/m_a + 1/m_b +
     arms²/I), in a chain or a cloth up to four times that. Across its line the stiffness of a stretched spring is k·(1 −
     l₀/l). Other joints are left out: they only add mass, so that the modes are slower than stated.
     """
-    bodies = scene.bodies
-    links = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+    bodies = setup.scene.bodies
+    links = setup.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
     if not len(links):
-        return []
+        return ()
     free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
     label = connected_groups(a, b, len(bodies))
@@ -225,7 +228,7 @@ def fastest_modes(scene: Scene) -> list[SpringMode]:
         with np.errstate(over="ignore"):
             zeta = 0.5 * omega * float(np.min(members.figures[:, 2] / members.figures[:, 1]))
         found.append(SpringMode(omega, zeta, rate, members.names[0], len(members)))
-    return found
+    return tuple(found)
 
 
 def _largest(links: JointArrays, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:

@@ -17,13 +17,14 @@ import numpy as np
 
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, start
-from sandbox.measure.metrics.invariants import energy_gain
-from sandbox.measure.preflight.checks import warnings
+from sandbox.formatting import format_fraction, format_quantity
+from sandbox.measure.metrics.invariants import conserves_energy, energy_drift, energy_gain
+from sandbox.measure.preflight.checks import ITERATED, warnings
 from sandbox.measure.preflight.diagnostic import Detail, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import initial_contacts
 from sandbox.measure.preflight.predictability import event_warning
 from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
-from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
+from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY, collide_with_all
 from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
@@ -32,6 +33,7 @@ from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 from sandbox.scene.validate.bodies import height_above
 from sandbox.trajectory import Trajectory
 
@@ -50,15 +52,21 @@ MAX_NAMED = 5
 
 MAX_JOINT_ERROR = 0.1
 """A joint with a larger error, as a fraction of its length, has come apart."""
+MAX_ENERGY_LOSS = 0.1
+"""Largest fraction of the kinetic energy that a scene which conserves energy may lose."""
 MAX_STACK_DISPLACEMENT = 0.5
 """A stack has fallen if one of its bodies has moved by a larger fraction of its width."""
 
 NAMING_KINDS = frozenset({"tunnelling", "depth"})
 """Kinds for which a trial run names each body at risk with its own speed, and the formulas only bounds."""
 
+SLENDER = 4.0
+"""A body is slender if its bounding radius is more than this many times that of its largest inscribed disc."""
 MAX_SPEED_UP = 2.0
 """Factor by which impacts may make bodies faster in the rest of a scene than in its first part."""
 
+REMEDIED = frozenset({"chain", "mass_ratio", "stack"})
+"""Kinds of diagnostics whose remedy is tried."""
 REFUTABLE = frozenset({"tunnelling", "depth", "chain", "mass_ratio", "stack", "spring", "iterations", "orbit"})
 """Kinds of diagnostics that a trial run of the whole scene confirms or refutes on its engine."""
 
@@ -102,6 +110,25 @@ class TrialRun:
         reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
         return MAX_SPEED_UP * fastest * self.settings.h > reach
 
+    def is_blind_to(self, predicted: Diagnostic) -> bool:
+        """Return whether the audit cannot see the predicted tunnelling: it follows the largest inscribed disc only.
+
+        The ends of a slender body pass through others unseen. It counts if they were fast enough for it.
+        """
+        bodies, run = self.scene.bodies, self.run
+        if predicted.kind != "tunnelling" or predicted.details["thing"] != ANOTHER_BODY:
+            return False
+        slender = ~bodies.fixed & (bodies.radius > SLENDER * bodies.core) & collide_with_all(bodies)
+        if not slender.any():
+            return False
+        with np.errstate(over="ignore", invalid="ignore"):
+            ends = np.hypot(run.velocity[..., 0], run.velocity[..., 1]) + np.abs(run.angular_velocity) * bodies.radius
+        fastest = np.nan_to_num(np.fmax.reduce(ends, axis=0))
+        others = fastest[~slender].max(initial=0.0)
+        closing = float(max(fastest[slender].max() + others, np.sort(fastest[slender])[-2:].sum()))
+        reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
+        return closing * self.settings.h > reach
+
     def findings(self) -> Iterator[Diagnostic]:
         """Yield a diagnostic for each problem that occurred."""
         if self.run.status == "diverged" or not np.isfinite(self.run.position[-1]).all():
@@ -113,6 +140,7 @@ class TrialRun:
         yield from self._broken_joints()
         yield from self._fallen_stacks()
         yield from self._energy_gains()
+        yield from self._energy_losses()
 
     def _missed_contacts(self) -> Iterator[Diagnostic]:
         """Yield the contacts that the audit found missed, with the closing speed of each body."""
@@ -132,14 +160,16 @@ class TrialRun:
             reach = float(bodies.thin[a]) + (float(bodies.thin[b]) if b >= 0 else self._half_thickness(-1 - b))
             thing = bodies.names[b] if b >= 0 else self.scene.fixed_names[-1 - b]
             safe = reach / speed * self.settings.substeps if speed > 0.0 else math.inf
-            remedy = f"; dt <= {floor_3_digits(safe)} s is safe at that speed" if math.isfinite(safe) else ""
-            message = (
-                f"{bodies.names[a]!r} tunnels through {thing!r}, or is detected too late, at {time:.3g} s of "
-                f"{self.description}, at {speed:.4g} m/s or {speed * self.settings.h:.3g} m per substep{remedy}"
-            )
             details: Details = {"ball": bodies.names[a], "thing": thing, "speed": speed, "time": time, "odds": 1.0}
-            if math.isfinite(safe):
+            pace = f"at {speed:.4g} m/s or {speed * self.settings.h:.3g} m per substep"
+            if safe < self.settings.dt:
                 details["safe_dt"] = safe
+                what = f"tunnels through {thing!r}, or is detected too late,"
+                pace += f"; dt <= {floor_3_digits(safe)} s is safe at that speed"
+            else:  # too slow to tunnel: the two overlap for less than a substep, or enter from the side
+                what = f"grazes {thing!r} within a substep, undetected,"
+                pace += "; with a shorter dt fewer such contacts are missed, and by less"
+            message = f"{bodies.names[a]!r} {what} at {time:.3g} s of {self.description}, {pace}"
             yield Diagnostic("tunnelling", message, details)
 
     def _half_thickness(self, number: int) -> float:
@@ -173,9 +203,13 @@ class TrialRun:
             yield Diagnostic("depth", message, details)
 
     def _broken_joints(self) -> Iterator[Diagnostic]:
-        error = self.run.info["joint_error"]
+        error, worst = self.run.info["joint_error"], self.run.info["worst_joint"]
         if error is not None and error > MAX_JOINT_ERROR:
-            message = f"the joint error reaches {error:.2g} of a joint's length in {self.description}"
+            size = format_quantity(worst["error"], worst["unit"])
+            relative = "" if worst["unit"] == "rad" else f", {error:.2g} of its length"
+            message = f"the error of the joint {worst['name']!r} reaches {size}{relative}, in {self.description}"
+            if self.engine == "box2d":
+                message += "; its joints are soft: more solver.substeps may not be enough under a heavy load"
             yield Diagnostic("chain", message, {"share": min(float(error), 1e300)})
 
     def _fallen_stacks(self) -> Iterator[Diagnostic]:
@@ -198,9 +232,10 @@ class TrialRun:
         both = ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
         mass_a, mass_b = bodies.mass[close.first[both]], bodies.mass[close.second[both]]
         ratio = float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0))
+        remedy = "more solver.substeps" if self.engine not in ITERATED else "more solver.iterations or a smaller dt"
         message = (
             f"the stacked body {bodies.names[stacked[k]]!r} moves by {fraction[k]:.3g} of its width in "
-            f"{self.description}; more solver.iterations or a smaller dt may stabilise the stack"
+            f"{self.description}; {remedy} may stabilise the stack"
         )
         kind = "mass_ratio" if ratio >= MIN_MASS_RATIO else "stack"
         yield Diagnostic(kind, message, {"body": bodies.names[stacked[k]], "moved": float(fraction[k])})
@@ -212,6 +247,18 @@ class TrialRun:
             message = f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.description}"
             message += self._by_impacts()
             yield Diagnostic("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})
+
+    def _energy_losses(self) -> Iterator[Diagnostic]:
+        """Yield a diagnostic if much energy is lost in a scene that conserves it."""
+        if not conserves_energy(self.scene):
+            return
+        loss = energy_drift(self.run, self.scene, None, False).fraction
+        if loss is not None and loss < -MAX_ENERGY_LOSS:
+            message = (
+                f"energy falls by {format_fraction(-loss)} of the largest kinetic energy in {self.description}, "
+                "although the scene conserves it: motion that should go on slows down"
+            )
+            yield Diagnostic("energy_loss", message, {"lost": -loss})
 
     def _by_impacts(self) -> str:
         """Return the possible cause of an energy gain: Newton's restitution with friction, off the centre of mass."""
@@ -334,8 +381,35 @@ def run_preflight(
     if trial is None:
         return PreflightResult(diagnostics, [], None)
     concerned = warnings(scene, settings, trial.engine) if engine is None else diagnostics
-    merged = _merge(diagnostics, concerned, trial)
-    return PreflightResult(*merged, TrialCoverage(trial.engine, trial.until, trial.whole))
+    found, refuted = _merge(diagnostics, concerned, trial)
+    if trial.whole:
+        found = [_with_tried_remedy(each, scene, settings, trial.engine) for each in found]
+    return PreflightResult(found, refuted, TrialCoverage(trial.engine, trial.until, trial.whole))
+
+
+def _with_tried_remedy(found: Diagnostic, scene: Scene, settings: Settings, engine: str) -> Diagnostic:
+    """Return a diagnostic with the outcome of a trial run with the first of its remedies that can be tried."""
+    if found.kind not in REMEDIED:
+        return found
+    for key in ("iterations", "substeps", "safe_dt"):
+        value = found.details.get(key)
+        if not value:
+            continue
+        name = "dt" if key == "safe_dt" else key
+        try:
+            changed = settings.replace(**{name: floor_3_digits(float(value)) if key == "safe_dt" else int(value)})
+        except SettingsError:  # more than a setting may have
+            continue
+        again = run_trial(scene, changed, engine)
+        if again is None or not again.whole:
+            continue
+        families = {_family(each) for each in again.findings()}
+        holds = _family(found) not in families and "diverged" not in families
+        remedy = f"{name} = {getattr(changed, name):g}"
+        outcome = "does not show it" if holds else "shows it too"
+        message = f"{found.message}; {'a' if holds else 'but a'} trial run with {remedy} {outcome}"
+        return replace(found, message=message, details={**found.details, "remedy": remedy, "remedy_holds": holds})
+    return found
 
 
 def _merge(
@@ -351,7 +425,7 @@ def _merge(
     found = list(trial.findings())
     if any(each.kind == "diverged" for each in found):
         return [*diagnostics, *found], []
-    families = {INDISTINGUISHABLE.get(each.kind, each.kind) for each in found}
+    families = {_family(each) for each in found}
     risks = {_risk_key(each, trial): each for each in reversed(found) if each.kind in NAMING_KINDS}
     kept: list[Diagnostic] = []
     refuted: list[Diagnostic] = []
@@ -359,22 +433,20 @@ def _merge(
         if each.kind not in REFUTABLE or each not in concerned:
             kept.append(each)
         elif each.kind not in NAMING_KINDS:
-            is_refuted = trial.whole and INDISTINGUISHABLE.get(each.kind, each.kind) not in families
+            is_refuted = trial.whole and _family(each) not in families
             (refuted if is_refuted else kept).append(each)
         elif (key := (each.kind, each.details["ball"], each.details["thing"])) in risks:
             time = risks.pop(key).details["time"]
             kept.append(replace(each, details={**each.details, "seen_at": time}))
+        elif trial.is_blind_to(each):
+            kept.append(each)
         else:
             (refuted if trial.whole or not trial.may_pass(each) else kept).append(each)
-    kept_families = {INDISTINGUISHABLE.get(each.kind, each.kind) for each in kept if each.kind not in NAMING_KINDS}
+    kept_families = {_family(each) for each in kept if each.kind not in NAMING_KINDS}
     new = [
         each
         for each in found
-        if (
-            _risk_key(each, trial) in risks
-            if each.kind in NAMING_KINDS
-            else INDISTINGUISHABLE.get(each.kind, each.kind) not in kept_families
-        )
+        if (_risk_key(each, trial) in risks if each.kind in NAMING_KINDS else _family(each) not in kept_families)
     ]
     return [*kept, *new], [_note(each, trial) for each in refuted]
 
@@ -394,6 +466,13 @@ STEPPING_ENGINES = ("pymunk", "reference")
 
 INDISTINGUISHABLE = {"mass_ratio": "stack", "energy": "iterations", "orbit": "iterations"}
 """Kinds that a trial run cannot distinguish: it shows that a stack falls, or that energy grows."""
+
+
+def _family(found: Diagnostic) -> str:
+    """Return the kind of a diagnostic, or that of all which a trial run cannot tell from it."""
+    if "joint" in found.details and found.kind == "mass_ratio":
+        return "chain"
+    return INDISTINGUISHABLE.get(found.kind, found.kind)
 
 
 def _note(refuted: Diagnostic, trial: TrialRun) -> Diagnostic:

@@ -75,7 +75,8 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None, engine: str 
     """Return the largest dt at which no body of the scene can tunnel, s, at its number of substeps.
 
     It is infinite if no body can tunnel at any dt, and None if bodies can collide and are accelerated by an amount that
-    no formula bounds.
+    no formula bounds, as by kicks. Bodies that collide count with the speed that one would have with the energy of all:
+    a light ball between a heavy one and a wall becomes faster with each impact.
 
     Args:
         scene: the scene.
@@ -87,9 +88,36 @@ def largest_safe_dt(scene: Scene, settings: Settings | None = None, engine: str 
     found, times = tunnelling_risks(scene, matrix), detection_factor(settings)
     if is_continuous(settings, engine):
         found = [passage for passage in found if passage.thing in (ANOTHER, ANOTHER_BODY)]
-    if found and math.isfinite(times) and SpeedBounds(scene, matrix).unknown:
+    speeds = SpeedBounds(scene, matrix)
+    if found and math.isfinite(times) and (speeds.unknown or (matrix.mutual and matrix.surfaces.kicks.any())):
         return None
-    return min((p.safe_h for p in found), default=math.inf) * intervals(settings, engine) * times
+    limits = [_safe_h_after_impacts(scene, speeds, is_continuous(settings, engine)), *(p.safe_h for p in found)]
+    return min(limits) * intervals(settings, engine) * times
+
+
+def _safe_h_after_impacts(scene: Scene, speeds: SpeedBounds, is_continuous: bool) -> float:
+    """Return the longest substep, s, that is safe for bodies with the energy of all that collide; inf without impacts.
+
+    Two bodies alone can collide once only, so that `SpeedBounds.struck` holds.
+    """
+    bodies, matrix = scene.bodies, speeds.matrix
+    movers = np.flatnonzero(matrix.touches & ~bodies.immovable & (bodies.thin > 0.0))
+    immovable = bool((bodies.immovable & matrix.touches).any())
+    if not matrix.mutual or len(movers) + (bool(scene.fixed) or immovable) < 3:
+        return math.inf
+    mass, thin = bodies.mass[movers], bodies.thin[movers]
+    limits = [math.inf]
+    if (scene.walls or scene.posts or immovable) and not is_continuous:  # planes have no other side
+        limits.append(_quotient(float((thin * np.sqrt(mass)).min()), math.sqrt(2.0 * speeds.energy)))
+    if len(movers) > 1:
+        # Largest speed at which two bodies with this energy approach each other
+        closing = math.sqrt(2.0 * speeds.energy * float((1.0 / np.sort(mass)[:2]).sum()))
+        limits.append(_quotient(float(np.sort(thin)[:2].sum()), closing))
+    return min(limits)
+
+
+def _quotient(length: float, speed: float) -> float:
+    return length / speed if speed > 0.0 else math.inf
 
 
 def detection_factor(settings: Settings) -> float:

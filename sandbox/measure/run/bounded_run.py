@@ -13,6 +13,7 @@ from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -20,38 +21,49 @@ from sandbox.trajectory import Trajectory
 
 COST_WEIGHTS: Mapping[str, Mapping[str, float]] = {
     "pymunk": {
-        "steps": 2e-5,
-        "step_bodies": 1e-8,
-        "substeps": 1e-6,
-        "meeting": 1.5e-7,
-        "dragged": 5e-6,
-        "attracted": 3.5e-5,
+        "steps": 3.4e-6,
+        "step_bodies": 3.9e-7,
+        "substeps": 1.3e-6,
+        "meeting": 2.7e-7,
+        "dragged": 1.1e-4,
+        "attracted": 1e-4,
         "driven": 1.3e-5,
-        "joined": 8e-7,
-        "on_floor": 2e-4,
-        "contact_iterations": 7e-8,
-        "joint_iterations": 1e-8,
+        "joined": 4.5e-7,
+        "springs": 4.2e-7,
+        "on_floor": 1.4e-4,
+        "contact_iterations": 1.6e-7,
+        "joint_iterations": 1.5e-8,
+    },
+    "box2d": {
+        "steps": 1.4e-5,
+        "step_bodies": 6.4e-7,
+        "meeting": 3.3e-7,
+        "attracted": 3.9e-4,
+        "driven": 3e-5,
+        "springs": 1.2e-3,
     },
     "reference": {
-        "steps": 1e-5,
-        "step_bodies": 2.5e-8,
-        "substeps": 1.6e-5,
-        "bodies": 1.2e-8,
-        "bodies_rk4": 3e-7,
+        "steps": 1e-6,
+        "step_bodies": 3.3e-7,
+        "substeps": 1.2e-7,
+        "bodies_rk4": 7.8e-9,
         "impact_times": 6e-5,
-        "attracted": 2e-5,
+        "attracted": 7e-5,
+        "attracted_rk4": 1.3e-4,
         "driven": 3e-5,
-        "joined": 2e-7,
-        "broad_tests": 8e-8,
-        "pair_tests": 3e-8,
-        "contact_iterations": 2.6e-8,
-        "joint_iterations": 1.1e-7,
+        "joined": 1.3e-7,
+        "springs": 1.7e-4,
+        "on_floor": 2.2e-4,
+        "broad_tests": 4.8e-8,
+        "pair_tests": 1.9e-8,
+        "contact_iterations": 7.6e-8,
+        "joint_iterations": 3.3e-8,
     },
     "exact": {"steps": 1.3e-5, "step_bodies": 3e-8, "events": 5e-7, "pair_tests": 1e-8},
 }
-"""s per unit of each amount (`_amounts`), by engine. Fitted to 199 compiled runs of 21 shipped scenes on two shared
-x86-64 cores: within a factor of 2.5 of the measured time in all but 8 runs. Other engines have the weights of
-reference.
+"""s per unit of each amount (`_amounts`), by engine. Fitted to 210 runs of the shipped scenes up to 3,000 bodies, by
+relative error, on two shared x86-64 cores: within a factor of 2.5 of the measured time in all but 18. Other engines
+have the weights of reference.
 """
 
 
@@ -123,14 +135,15 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         **work,
         "steps": steps,
         "step_bodies": steps * bodies,
-        "bodies": substeps * bodies,
         "bodies_rk4": substeps * bodies * (settings.integrator == "rk4"),
         "impact_times": substeps * (settings.detection in ("bisect", "swept", "shrink")),
         "meeting": substeps * colliding,
         "dragged": substeps * colliding * scene.world.has_drag,
         "attracted": substeps * bodies * len(scene.attractions),
+        "attracted_rk4": substeps * bodies * len(scene.attractions) * (settings.integrator == "rk4"),
         "driven": substeps * (len(scene.thrusts) + len(scene.drives)),
         "joined": substeps * len(setup.links),
+        "springs": substeps * len(setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)),
         "on_floor": substeps * (scene.surface is not None),
     }
 

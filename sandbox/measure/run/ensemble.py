@@ -137,7 +137,7 @@ def ensemble(
         UnknownEngineError: no engine has that name.
         SceneError: the name or path is not that of a valid scene.
         TooLargeError: the results would not fit into memory.
-        pydantic.ValidationError: a setting is invalid.
+        SettingsError: a setting is invalid.
     """
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
     engine_named(engine)

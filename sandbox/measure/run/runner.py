@@ -15,6 +15,8 @@ from sandbox.engines.contract import PairRuns, Refusal, Simulation
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.games.players import RECORDED
+from sandbox.games.registry import rules_of
 from sandbox.games.session import HeadlessGame
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.invariants import joint_error
@@ -24,6 +26,7 @@ from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
 from sandbox.measure.run.run_warnings import run_warnings
 from sandbox.progress import ProgressCallback
 from sandbox.provenance import versions
+from sandbox.recording import Recording
 from sandbox.scene.compile.filters import bits_of_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -38,8 +41,8 @@ from sandbox.trajectory import Contacts, Trajectory
 
 @reraise_interrupt()
 def run(
-    scene: Scene | Setup | str | Path,
-    engine: str = "pymunk",
+    scene: Scene | Setup | Recording | str | Path,
+    engine: str | None = None,
     *,
     actions: Sequence[Action] = (),
     audit: bool = True,
@@ -50,13 +53,17 @@ def run(
     strict: bool = False,
     **settings: Any,
 ) -> Trajectory:
-    """Run a scene from start to end.
+    """Run a scene or a recording from start to end.
+
+    A recording is run with its actions, settings and duration, and the rules of its game; on its own engine with the
+    same versions it ends in the same state, bit for bit.
 
     Args:
-        scene: the scene, or its name or path, as `load` takes it; or a setup, to start from another state.
-        engine: name of the engine.
-        actions: actions applied during the run, each before the first step that starts at its time or later. Actions at
-            the end of the run are applied after the last step.
+        scene: the scene, or its name or path, as `load` takes it; a setup, to start from another state; or a recording.
+        engine: name of the engine; default: pymunk, or that of the recording. Another engine computes the whole
+            recording, even if it switched engines.
+        actions: actions applied during the run, besides those of a recording, each before the first step that starts
+            at its time or later. Actions at the end of the run are applied after the last step.
         audit: count the contacts that the engine misses.
         account: record the energy account at every frame, which `measure.metrics.energy.ledger_of` reads.
         on_progress: progress callback; its fraction is the completed part of the run.
@@ -64,7 +71,7 @@ def run(
         on_work: callback with the steps done and the work counters. An exception that it raises ends the run without a
             result.
         strict: raise `RunFailedError` unless the status of the run is `ok`, as `Trajectory.raise_if_failed`.
-        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+        settings: changes to the scene's `[solver]`, or to the settings of the recording, such as `dt=0.001`.
 
     Returns:
         The recorded run up to its end or failure. Its `status` is `ok`; `diverged` if the state left the bounds of
@@ -77,9 +84,17 @@ def run(
         RunFailedError: with `strict`, the run was refused, diverged or failed.
         SceneError: the name or path is not that of a valid scene.
         TooLargeError: the frames would not fit into memory, or the number of steps exceeds the limit.
-        pydantic.ValidationError: a setting is invalid.
+        SettingsError: a setting is invalid.
+        UnsuitableSceneError: the scene of a recording lacks an element that its game needs.
         KeyboardInterrupt: Ctrl-C was pressed, even if a library converted it to another exception.
     """
+    if isinstance(scene, Recording):
+        recording = scene if engine is None else scene.on(engine)
+        scene, engine = recording.whole_scene, recording.engine
+        actions = (*recording.actions, *actions)
+        settings = recording.settings.model_dump() | settings
+        bout = bout or _recorded_game(recording)
+    engine = engine or "pymunk"
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
     scene = setup.scene
     engine_named(engine)
@@ -115,6 +130,12 @@ def run(
     trajectory = _recorded_run(setup, simulation, recorder, end, timed_audit, info)
     simulation.close()
     return trajectory.raise_if_failed() if strict else trajectory
+
+
+def _recorded_game(recording: Recording) -> HeadlessGame | None:
+    """Return the game of a recording, whose rules are evaluated without acting; None if it has none."""
+    rules = rules_of(recording.scene, on_request=recording.has_game)
+    return None if rules is None else HeadlessGame(rules, None, RECORDED, recording.presses)
 
 
 def _schedule(scene: Scene, settings: Settings, actions: tuple[Action, ...]) -> list[Stretch]:
@@ -163,7 +184,9 @@ def _recorded_run(
     )
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
-    info["joint_error"] = joint_error(trajectory, setup)
+    worst = joint_error(trajectory, setup)
+    info["joint_error"] = None if worst is None else worst.relative
+    info["worst_joint"] = None if worst is None else {"name": worst.name, "error": worst.error, "unit": worst.unit}
     is_ok = end.status == "ok"
     info["warnings"] = [*run_warnings(trajectory, setup.scene, (float(total[0]), float(total[-1])))] if is_ok else []
     return trajectory
@@ -186,9 +209,8 @@ def run_without_frames(
     scene, count = setup.scene, len(setup.bodies)
     outcome = {"status": status, "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
     outcome |= {"state_hash": None, "broken": 0}
-    info = _info(
-        scene, engine, settings, actions, **outcome, warnings=[], energy_start=None, energy_end=None, joint_error=None
-    )
+    outcome |= {"warnings": [], "energy_start": None, "energy_end": None, "joint_error": None, "worst_joint": None}
+    info = _info(scene, engine, settings, actions, **outcome)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
     unbroken = np.full(len(setup.links), np.nan)
@@ -204,7 +226,7 @@ def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, 
         "settings": settings.model_dump(mode="json"),
         "actions": actions_to_json(actions),
         "seed": scene.world.seed,
-        "versions": dict(versions()),
+        "versions": dict(versions(engine)),
         **outcome,
     }
 

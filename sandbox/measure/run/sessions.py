@@ -7,22 +7,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from sandbox.action import Action, Switch, actions_from_json
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.frame_table import FrameTable
 from sandbox.games.contract import Control, HasQuietSteps, Policy, Press, Rules
-from sandbox.games.players import RECORDED, PlayerSpec
-from sandbox.games.registry import required_rules, rules_of
+from sandbox.games.players import PlayerSpec
+from sandbox.games.registry import required_rules
 from sandbox.games.session import GameSession, HeadlessGame
 from sandbox.measure.run.runner import run
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.errors import Fault, SceneError
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import Fault, SceneError, SettingsError
 from sandbox.trajectory import Contacts, Frame, Trajectory
 
 
@@ -49,13 +48,25 @@ def read_session(path: str | Path) -> Recording:
             check_engine(action.engine, f"actions[{k}].engine")
         try:
             session.settings.replace(**action.settings)
-        except ValidationError as error:
-            for each in error.errors():
-                key = ".".join(("settings", *map(str, each["loc"])))
-                faults.append(Fault(str(path), None, f"actions[{k}].{key}", each["msg"]))
+        except SettingsError as error:
+            for each in error.faults:
+                key = each.path.replace("solver", "settings", 1)
+                faults.append(Fault(str(path), None, f"actions[{k}].{key}", each.message))
     if faults:
         raise SceneError(faults)
     return session
+
+
+def recorded_scene(recording: Recording) -> Scene:
+    """Return the scene of a recording with its duration, and with its settings as `[solver]`.
+
+    Settings that its engine chooses by itself are left out, so that other engines can run the scene.
+    """
+    scene, settings = recording.whole_scene, recording.settings
+    common = settings.common()
+    chosen = engine_named(recording.engine).resolve(scene, common)
+    own = {key: value for key in Settings.model_fields if (value := getattr(settings, key)) != getattr(chosen, key)}
+    return scene.model_copy(update={"solver": common.replace(**own)})
 
 
 def rerun(
@@ -80,17 +91,7 @@ def rerun(
         TooLargeError: the frames would not fit into memory.
         UnfitError: the scene lacks an element that its game needs.
     """
-    chosen = recording if engine is None else recording.on(engine)
-    rules = rules_of(chosen.scene, on_request=recording.has_game)
-    return run(
-        chosen.whole_scene,
-        chosen.engine,
-        actions=chosen.actions,
-        audit=audit,
-        on_progress=on_progress,
-        bout=None if rules is None else HeadlessGame(rules, None, RECORDED, chosen.presses),
-        **chosen.settings.model_dump(),
-    )
+    return run(recording, engine, audit=audit, on_progress=on_progress)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,19 +8,22 @@ from functools import cached_property
 from itertools import chain
 from typing import Any, get_args
 
-from pydantic import ValidationError
+import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import finite, in_json
 from sandbox.measure.compare.self_convergence import preferred_settings
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, measure_all
+from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, WorstError, measure_all, worst_error
+from sandbox.measure.tradeoff.objections import ErrorLimits, find_objections
 from sandbox.measure.tradeoff.timing import Timing
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_STEPS
 from sandbox.scene.description.world import DetectionName, IntegratorName, Joints, Response, Settings
+from sandbox.scene.errors import SettingsError
 from sandbox.trajectory import Trajectory
 
 MAX_SUBSTEPS, MAX_ITERATIONS = 512, 1000
@@ -75,7 +78,7 @@ class Configuration:
             base: settings that the configuration differs from.
 
         Raises:
-            pydantic.ValidationError: dt is out of bounds.
+            SettingsError: dt is out of bounds.
         """
         every = Fraction(base.record_every) * self.refinement
         return base.replace(
@@ -162,7 +165,7 @@ class SearchSpace:
             return False
         try:
             settings = self.settings(configuration)
-        except ValidationError:
+        except SettingsError:
             return False
         max_dt = self.frame if configuration.engine == "exact" else MAX_FRAMES_PER_STEP * self.frame
         if refinement < 1 and settings.dt > max_dt:
@@ -283,6 +286,10 @@ class Evaluation:
     """every metric by name, in its unit; the worst over the seeds"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
+    objections: tuple[str, ...] = ()
+    """reasons not to recommend the setting although its error may be within the tolerance, as clauses"""
+    worst: WorstError | None = None
+    """body, time and place of the largest distance from the truth; None without a truth"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the seeds; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))
@@ -307,6 +314,10 @@ class Evaluation:
     def is_usable(self) -> bool:
         """Whether the status is `ok`, and error and cost are finite."""
         return self.status == "ok" and finite(self.error) is not None and finite(self.cost) is not None
+
+    def meets(self, tolerance: float) -> bool:
+        """Return whether the error is within a tolerance and there is no objection."""
+        return self.ranking_error <= tolerance and not self.objections
 
     def frame_time(self, fps: float) -> float:
         """Return the computing time of the most expensive frame of a game, ms, for a usable evaluation.
@@ -337,6 +348,9 @@ class _Result:
     spent_seconds: float = 0.0
     seconds: float = 0.0
     work: Mapping[str, int] = field(default_factory=dict)
+    fastest: FloatArray | None = None
+    """(N,) m/s, largest speed of each body over the seeds; None unless the status is `ok`"""
+    worst: WorstError | None = None
 
 
 def evaluate(
@@ -344,6 +358,7 @@ def evaluate(
     space: SearchSpace,
     contexts: Sequence[EvaluationContext],
     metric: str,
+    tolerance: float,
     limit: float,
     deadline: float = math.inf,
     known: Trajectory | None = None,
@@ -355,6 +370,7 @@ def evaluate(
         space: search space of the configuration.
         contexts: contexts of the same scene with different seeds.
         metric: name of the metric of the error.
+        tolerance: largest accepted error, in the unit of the metric.
         limit: counted cost that one run may have, s.
         deadline: time of `clock_without_compilation` after which a run is stopped, s.
         known: this run in the first context, if already made.
@@ -362,6 +378,12 @@ def evaluate(
     requested = space.settings(configuration)
     resolved = ENGINES[configuration.engine].resolve(space.scene, requested)
     result = _run_contexts(configuration.engine, requested, resolved, contexts, limit, deadline, known)
+    objections: tuple[str, ...] = ()
+    if result.fastest is not None:
+        limits = ErrorLimits(METRICS[metric], tolerance, contexts[0].zoom)
+        objections = find_objections(
+            space.scene, configuration.engine, requested, result.metrics, result.fastest, limits
+        )
     return Evaluation(
         configuration=configuration,
         engine=configuration.engine,
@@ -378,6 +400,8 @@ def evaluate(
         reason=result.reason,
         metrics=result.metrics,
         work=result.work,
+        objections=objections,
+        worst=result.worst,
         counted_seconds=result.counted_seconds,
         spent_seconds=result.spent_seconds,
         seconds=result.seconds,
@@ -423,6 +447,8 @@ def _run_contexts(
     """Run all contexts until one fails, and return the worst metrics and the costs."""
     unknown: dict[str, float | None] = dict.fromkeys(METRICS)
     worst, cost, spent, seconds, work = unknown, 0.0, 0.0, 0.0, {}
+    fastest: FloatArray = np.zeros(len(contexts[0].scene.bodies))
+    farthest: WorstError | None = None
     for k, context in enumerate(contexts):
         try:
             if k == 0 and known is not None:
@@ -440,7 +466,9 @@ def _run_contexts(
         if run.status != "ok":
             return _Result(run.status, run.reason, unknown, cost, spent, seconds, work)
         worst = {name: _worst(worst[name], value) for name, value in measure_all(run, context).items()}
-    return _Result("ok", None, worst, cost, spent, seconds, work)
+        fastest = np.fmax(fastest, np.fmax.reduce(np.hypot(run.velocity[..., 0], run.velocity[..., 1]), axis=0))
+        farthest = max(filter(None, (farthest, worst_error(run, context))), key=lambda each: each.error, default=None)
+    return _Result("ok", None, worst, cost, spent, seconds, work, fastest, farthest)
 
 
 def _worst(a: float | None, b: float | None) -> float | None:

@@ -12,7 +12,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.metrics.clearance import clearance
 from sandbox.measure.metrics.contacts import are_collisions, collisions, share_layer
-from sandbox.measure.metrics.invariants import energy_drift, joint_error
+from sandbox.measure.metrics.invariants import ANGLE_KINDS, energy_drift, joint_error, joint_errors
 from sandbox.measure.metrics.trajectory_error import Errors, common_frames, errors
 from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Trajectory
@@ -67,13 +67,23 @@ class EvaluationContext:
             return np.sqrt(2.0 * gravity * REST_FRACTION * bodies.thin)
         return np.full(len(bodies), 1e-3 * float(np.hypot(*bodies.velocity.T).max(initial=0.0)))
 
+    @cached_property
+    def left_at(self) -> FloatArray:
+        """Time at which the truth has each body below everything that could stop it, (N,) s; inf if it never is.
+
+        From then on it does not count: how far it has fallen says nothing about the level that it has left.
+        """
+        if self.truth is None or self.down is None:
+            return np.full(len(self.scene.bodies), np.inf)
+        return times_of_leaving(self.scene, self.truth.trajectory, self.down)
+
     def errors(self, run: Trajectory) -> Errors:
         """Return the errors of a run against the truth. Those of the last run are kept: several metrics need them."""
         assert self.truth is not None
         for known, found in self._last_errors:
             if known is run:
                 return found
-        self._last_errors[:] = [(run, errors(run, self.truth.trajectory, self.moving))]
+        self._last_errors[:] = [(run, errors(run, self.truth.trajectory, self.moving, self.left_at))]
         return self._last_errors[0][1]
 
     @cached_property
@@ -92,6 +102,32 @@ class EvaluationContext:
         assert self.truth is not None
         distance = displacement(self.truth.trajectory, since=0.0)
         return np.asarray(self.at_rest & (distance <= REST_FRACTION * self.scene.bodies.thin))
+
+
+def times_of_leaving(scene: Scene, run: Trajectory, down: FloatArray) -> FloatArray:
+    """Return the time from which on each body is below all walls, posts, fixed and driven bodies, (N,) s; else inf.
+
+    Bodies that joints or attraction hold do not leave, nor those of a scene with a plane or without any such obstacle.
+    """
+    bodies = scene.bodies
+    left = np.full(len(bodies), np.inf)
+    if scene.planes or scene.attractions or not (scene.walls or scene.posts or bodies.immovable.any()):
+        return left
+    depths = [float((np.asarray(each.points) @ down).max()) + each.thickness / 2.0 for each in scene.walls]
+    depths += [float(np.asarray(each.position) @ down) + each.radius for each in scene.posts]
+    with np.errstate(over="ignore", invalid="ignore"):
+        depth = run.position @ down
+        carrying = np.where(np.isfinite(depth), depth, -np.inf)[:, bodies.immovable] + bodies.radius[bodies.immovable]
+        lowest = max([*depths, float(carrying.max(initial=-np.inf))])
+        is_below = depth - bodies.radius > lowest
+    able = ~bodies.immovable
+    able[np.concatenate((scene.links.a[scene.links.a >= 0], scene.links.b))] = False
+    # The last frame above decides: a body may be thrown up again from below, as by a thrust.
+    above = len(run.time) - (~is_below)[::-1].argmax(axis=0)
+    above = np.where(is_below.all(axis=0), 0, above)
+    for k in np.flatnonzero(able & (above < len(run.time))).tolist():
+        left[k] = run.time[above[k]]
+    return left
 
 
 def displacement(run: Trajectory, since: float = 0.5) -> FloatArray:
@@ -123,6 +159,33 @@ def default_zoom(scene: Scene, truth: Truth | None) -> float:
     if not (np.isfinite(size).all() and (size > 0.0).all()):
         return 100.0
     return float(min(SCREEN_FILL * SCREEN_SIZE[0] / size[0], SCREEN_FILL * SCREEN_SIZE[1] / size[1]))
+
+
+class WorstError(NamedTuple):
+    """Largest distance of a body from the truth."""
+
+    body: str
+    """name of the body"""
+    time: float
+    """s"""
+    position: tuple[float, float]
+    """m, where the run has it"""
+    error: float
+    """m"""
+
+
+def worst_error(run: Trajectory, context: EvaluationContext) -> WorstError | None:
+    """Return body, time and place of the largest error; None without a truth or a body that counts."""
+    if context.truth is None:
+        return None
+    found = context.errors(run)
+    kept = np.flatnonzero((found.time <= context.until) & (found.count > 0.0))
+    if not len(kept):
+        return None
+    k = kept[int(found.position[kept].argmax())]
+    body, time = int(found.body[k]), float(found.time[k])
+    x, y = run.position[int(np.searchsorted(run.time, time)), body].tolist()
+    return WorstError(str(run.names[body]), time, (x, y), float(found.position[k]))
 
 
 Measure = Callable[[Trajectory, EvaluationContext], float | None]
@@ -198,7 +261,15 @@ def energy(run: Trajectory, context: EvaluationContext) -> float | None:
 
 def joints(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the largest constraint violation of any joint as a fraction (`metrics.invariants.joint_error`)."""
-    return joint_error(run, context.scene)
+    found = joint_error(run, context.scene)
+    return None if found is None else found.relative
+
+
+def joint_distance(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest constraint violation of any joint that is a length, m; None without such joints."""
+    errors = joint_errors(run, context.scene)[:, ~np.isin(context.scene.links.kind, ANGLE_KINDS)]
+    known = errors[~np.isnan(errors)]
+    return float(known.max()) if len(known) else None
 
 
 def penetration(run: Trajectory, context: EvaluationContext) -> float | None:
@@ -281,6 +352,7 @@ METRICS: Mapping[str, Metric] = {
         Metric("bounce_height", "m", "error of the bounce height", bounce_height),
         Metric("energy", "", "drift of the energy as a fraction of the kinetic energy", energy),
         Metric("joint_error", "", "largest error of a joint as a fraction of its length", joints),
+        Metric("joint_distance", "m", "largest error of a joint", joint_distance),
         Metric("penetration", "m", "deepest overlap, apart from that at the start", penetration),
         Metric("drift", "m", "motion of bodies that should stay at rest", drift),
         Metric("missed_contacts", "", "contacts that the engine missed", missed_contacts),

@@ -5,12 +5,10 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 from sandbox.echo import short_repr
-from sandbox.measure.metrics.invariants import has_constraints
+from sandbox.measure.metrics.invariants import conserves_energy, has_constraints
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import LinkKind
-from sandbox.scene.compile.scene import Scene
 
 T = TypeVar("T")
 
@@ -115,24 +113,6 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
     if context.truth is None:
         return METRICS["energy"], doubt
     return METRICS["max_position"], f"{doubt}; errors count up to that time"
-
-
-def conserves_energy(scene: Scene) -> bool:
-    """Return whether a scene conserves energy.
-
-    It has no drag, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way, and
-    elastic contacts.
-    """
-    if scene.world.has_drag or scene.world.has_damping or scene.thrusts or scene.drives:
-        return False
-    if scene.bodies.kinematic.any():
-        return False
-    springs, motors = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING), scene.links.of(LinkKind.MOTOR)
-    if springs.figures[:, 2].any() or len(motors) or scene.links.is_limited.any():
-        return False
-    matrix = contact_matrix(scene)
-    elastic = (matrix.surfaces.restitution == 1.0) & matrix.surfaces.fixed_coefficients
-    return bool(elastic[matrix.touching].all() and matrix.friction == 0.0)
 
 
 def pareto(items: Iterable[T], cost: Callable[[T], float], error: Callable[[T], float]) -> list[T]:

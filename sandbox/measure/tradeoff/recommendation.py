@@ -16,13 +16,8 @@ FRAME_TOLERANCE = 1.01
 """A step may be this many times longer than a frame, such as 0.0167 s at 60 fps."""
 
 NOISE_FACTOR = 1.5
-"""Times of different engines within this factor count as equal, and counted work decides. The minimum of 5 repeats in
+"""Times within this factor count as equal, and counted work, which has no noise, decides. The minimum of 5 repeats in
 turns varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest allows for more load."""
-
-WORK_FACTOR = 4.0
-"""Within one engine, counted work, which has no noise, decides up to this factor of the smallest time; beyond it, the
-time decides. Counted works are within a factor of 2.5 of the time (`bounded_run.COST_WEIGHTS`).
-"""
 
 EQUAL_WORK_FACTOR = 1.05
 """Counted works within this factor of the least count as equal, and the setting with fewer changes is taken: the
@@ -37,15 +32,15 @@ def recommend_cheapest(
 ) -> Recommendation | None:
     """Return the cheapest evaluation within the tolerance, also with the validation seeds; None if there is none.
 
+    Evaluations with objections are left out.
+
     Args:
         points: the evaluations.
         objective: metric, tolerance and budget.
         seeds: validation seeds; empty if the scene has no randomness.
         validate: returns the error with these seeds.
     """
-    candidates = [
-        p for p in _recommendable(points, objective) if p.error is not None and p.error <= objective.tolerance
-    ]
+    candidates = [p for p in _eligible(points, objective) if p.error is not None and p.meets(objective.tolerance)]
     for point in by_cost(candidates):
         error = validate(point) if seeds else None
         if error is None or error <= objective.tolerance:
@@ -56,13 +51,15 @@ def recommend_cheapest(
 def recommend_most_accurate(
     points: Sequence[Evaluation], objective: Objective, seeds: Sequence[int], validate: Validate
 ) -> Recommendation | None:
-    """Return the evaluation with the smallest error whose frames are within the budget, or None.
+    """Return the evaluation with the smallest error, without objections, whose frames are within the budget, or None.
 
     Of equal errors it is the one with the least counted work. The arguments are those of `recommend_cheapest`.
     """
     if objective.budget is None:
         return None
-    candidates = [p for p in _recommendable(points, objective) if p.frame_time(objective.fps) <= objective.budget]
+    candidates = [
+        p for p in _eligible(points, objective) if not p.objections and p.frame_time(objective.fps) <= objective.budget
+    ]
     point = min(candidates, key=lambda each: (each.error or 0.0, _counted_cost(each)), default=None)
     if point is None:
         return None
@@ -70,21 +67,37 @@ def recommend_most_accurate(
     return Recommendation(point, describe(point, objective, error), tuple(seeds), error)
 
 
+def cheapest_rejected(
+    points: Sequence[Evaluation], objective: Objective, chosen: Recommendation | None
+) -> Recommendation | None:
+    """Return the cheapest evaluation within the tolerance that has objections, if none or a dearer one was chosen."""
+    within = [p for p in _eligible(points, objective) if p.ranking_error <= objective.tolerance]
+    first = next(iter(by_cost(within)), None)
+    if first is None or not first.objections or (chosen is not None and first is chosen.point):
+        return None
+    return Recommendation(first, describe(first, objective, None), (), None)
+
+
 def nearest_to_tolerance(points: Sequence[Evaluation], objective: Objective) -> Recommendation | None:
-    """Return the evaluation with the smallest error, of equals the one with the fewest changes; None without any."""
-    candidates = _recommendable(points, objective)
-    point = min(candidates, key=lambda p: (p.error or 0.0, len(p.changes), _counted_cost(p)), default=None)
+    """Return the evaluation with the smallest error, of equals the one with the fewest changes; None without any.
+
+    One without objections comes first.
+    """
+    candidates = _eligible(points, objective)
+    point = min(
+        candidates, key=lambda p: (bool(p.objections), p.error or 0.0, len(p.changes), _counted_cost(p)), default=None
+    )
     return None if point is None else Recommendation(point, describe(point, objective, None), (), None)
 
 
 def nearest_to_budget(points: Sequence[Evaluation], objective: Objective) -> Recommendation | None:
     """Return the evaluation whose most expensive frame takes the least time; None without any."""
-    point = min(_recommendable(points, objective), key=lambda p: p.frame_time(objective.fps), default=None)
+    point = min(_eligible(points, objective), key=lambda p: p.frame_time(objective.fps), default=None)
     return None if point is None else Recommendation(point, describe(point, objective, None), (), None)
 
 
 def by_cost(points: Sequence[Evaluation]) -> list[Evaluation]:
-    """Return evaluations from the cheapest on: of one engine by counted work, of several by time up to its noise.
+    """Return evaluations from the cheapest on: by time, and by counted work where times are within the noise.
 
     Evaluations that were timed separately come first: the times of the others include recording and audit.
     """
@@ -104,7 +117,7 @@ def by_cost(points: Sequence[Evaluation]) -> list[Evaluation]:
 def _by_work_and_time(points: Sequence[Evaluation]) -> list[Evaluation]:
     """Return the evaluations of one engine from the cheapest on."""
     by_time = sorted(points, key=lambda each: each.cost or 0.0)
-    comparable = [p for p in by_time if (p.cost or 0.0) <= WORK_FACTOR * (by_time[0].cost or 0.0)]
+    comparable = [p for p in by_time if (p.cost or 0.0) <= NOISE_FACTOR * (by_time[0].cost or 0.0)]
     return [*_by_work(comparable), *by_time[len(comparable) :]]
 
 
@@ -115,7 +128,7 @@ def _by_work(points: Sequence[Evaluation]) -> list[Evaluation]:
     return [*sorted(equal, key=lambda p: (len(p.changes), p.error or 0.0)), *ordered[len(equal) :]]
 
 
-def _recommendable(points: Sequence[Evaluation], objective: Objective) -> list[Evaluation]:
+def _eligible(points: Sequence[Evaluation], objective: Objective) -> list[Evaluation]:
     return [p for p in points if p.is_usable and p.settings.dt <= objective.max_dt]
 
 
@@ -134,6 +147,8 @@ def describe(point: Evaluation, objective: Objective, validation_error: float | 
     error = f"{objective.metric.name} {format_quantity(point.error, unit)}"
     if objective.metric.name == "passes" and point.error > 0.0:
         error += f", 1 in {1.0 / point.error:.3g} contacts missed"
+    if objective.metric.name == "joint_error" and (distance := point.metrics.get("joint_distance")) is not None:
+        error += f" of a length, {format_quantity(distance, 'm')}"
     validated = "" if validation_error is None else f", {format_quantity(validation_error, unit)} with other seeds"
     percent = point.cost / 10.0
     is_long = point.settings.dt > FRAME_TOLERANCE / objective.fps

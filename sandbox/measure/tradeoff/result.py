@@ -1,8 +1,9 @@
 """Results of a trade-off as frozen values and as a JSON document."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 from sandbox.echo import short_repr
@@ -11,12 +12,20 @@ from sandbox.html_repr import HtmlRepr
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.preflight.diagnostic import Diagnostic
-from sandbox.measure.tradeoff.configuration import Evaluation
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
 from sandbox.measure.tradeoff.metrics import Metric
 from sandbox.measure.tradeoff.objective import pareto
+from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.compile.scene import Scene
+
+LIMITS: Mapping[Limit | None, str] = {
+    "points": "The largest number of settings (--points)",
+    "effort": "The effort (--effort)",
+    "time": "The time limit",
+}
+"""Limits of a search in sentences."""
 
 MAX_SHOWN = 4
 """Answers in the representation of a trade-off."""
@@ -60,7 +69,7 @@ class Tradeoff(HtmlRepr):
     pareto: tuple[Evaluation, ...]
     """points of the Pareto front, cheapest first: no other point is both cheaper and more accurate"""
     splits: tuple[ErrorBudget, ...]
-    """position error of each engine, split into the parts of solver iterations, time step and model"""
+    """position error of each engine: the parts of solver iterations and time step, and the remaining error"""
     proposals: tuple[Simplification, ...]
     """cheaper models of the scene whose error is within the tolerance"""
     tolerance: float
@@ -75,6 +84,8 @@ class Tradeoff(HtmlRepr):
     """most accurate setting within the budget"""
     cheapest_by_engine: Mapping[str, Recommendation | None]
     """cheapest setting within the tolerance for each engine"""
+    rejected: Recommendation | None
+    """cheapest setting within the tolerance, if it is not recommended because of its `objections`"""
     nearest_to_tolerance: Recommendation | None
     """setting with the smallest error, if no setting is within the tolerance"""
     nearest_to_budget: Recommendation | None
@@ -87,6 +98,8 @@ class Tradeoff(HtmlRepr):
     """counted work that the search was allowed"""
     spent: float
     """counted work that the search used"""
+    limit: Limit | None
+    """limit that ended the search; None if no further setting was worth a run"""
     out_of_time: bool
     """whether the time limit ended the search; another run may then try more settings"""
     machine: Mapping[str, Any]
@@ -111,14 +124,6 @@ class Tradeoff(HtmlRepr):
         return None if self.best is None else self.best.kind
 
     @property
-    def floors(self) -> dict[str, float]:
-        """Error of each engine that remains with a small step and many iterations, m.
-
-        Engines without such an error are left out.
-        """
-        return {each.engine: each.model for each in self.splits if each.model is not None and math.isfinite(each.model)}
-
-    @property
     def error_about(self) -> str:
         """Metric of the error and the reason for it, as one sentence."""
         return f"error metric: {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
@@ -141,15 +146,44 @@ class Tradeoff(HtmlRepr):
             lines.append(f"{question}: {self._answer(self.within_budget, self.nearest_to_budget)}")
         overall = None if self.within_tolerance is None else self.within_tolerance.point
         others = {name: each for name, each in self.cheapest_by_engine.items() if each and each.point is not overall}
-        return lines + [
-            f"cheapest setting of {name} within the tolerance: {each.sentence}" for name, each in others.items()
-        ]
+        lines += [f"cheapest setting of {name} within the tolerance: {each.sentence}" for name, each in others.items()]
+        if self.rejected is not None:
+            reasons = "; ".join(self.rejected.point.objections)
+            lines.append(f"within the tolerance, but not recommended: {self.rejected.sentence}. Because: {reasons}")
+        return lines
 
     def _answer(self, found: Recommendation | None, nearest: Recommendation | None) -> str:
         if found is not None:
             return found.sentence
-        prefix = f"none of the {len(self.points)} settings tried"
-        return prefix if nearest is None else f"{prefix}; the nearest is {nearest.sentence}"
+        sentences = [f"none of the {len(self.points)} settings tried"]
+        if nearest is not None:
+            sentences[0] += f"; the nearest is {nearest.sentence}"
+            if nearest.point.objections and self.rejected is None:
+                sentences.append(f"It has objections: {'; '.join(nearest.point.objections)}")
+        if self.limit in LIMITS and not self.interrupted:
+            sentences.append(
+                f"{LIMITS[self.limit]} ended the search, after {self.spent:.2g} of an effort of {self.effort:g}"
+            )
+        return ". ".join([*sentences, *self._unsteady(nearest)])
+
+    def _unsteady(self, nearest: Recommendation | None) -> Iterator[str]:
+        """Yield a sentence if the errors of a method do not fall steadily with the step."""
+        if nearest is None:
+            return
+        chosen = nearest.point.configuration
+        series = sorted(
+            (each for each in self.points if each.status == "ok" and each.error and _has_method(each, chosen)),
+            key=lambda each: each.configuration.refinement * each.configuration.substeps,
+        )
+        rises = [(a, b) for a, b in pairwise(series) if (b.error or 0.0) > (a.error or 0.0)]
+        if rises:
+            a, b = max(rises, key=lambda pair: (pair[1].error or 0.0) / (pair[0].error or 1.0))
+            errors = [format_quantity(each.error or 0.0, self.metric.unit) for each in (a, b)]
+            steps = [f"{each.settings.dt / each.settings.substeps:.3g} s" for each in (a, b)]
+            yield (
+                f"Its errors do not fall steadily with the step: {errors[0]} with substeps of {steps[0]}, {errors[1]} "
+                f"with {steps[1]}"
+            )
 
     def document(self, scene: str | None = None) -> dict[str, Any]:
         """Return the trade-off as one JSON document.
@@ -173,7 +207,6 @@ class Tradeoff(HtmlRepr):
                 seeds=self.seeds,
                 points=self.points,
                 pareto=self.pareto,
-                floors=self.floors,
                 split=self.splits,
                 proposals=self.proposals,
                 tolerance=self.tolerance,
@@ -185,10 +218,12 @@ class Tradeoff(HtmlRepr):
                 nearest_to_tolerance=self.nearest_to_tolerance,
                 nearest_to_budget=self.nearest_to_budget,
                 cheapest_by_engine=self.cheapest_by_engine,
+                rejected=self.rejected,
                 answers=self.answers(),
                 untried=self.untried,
                 effort=self.effort,
                 spent=self.spent,
+                limit=self.limit,
                 out_of_time=self.out_of_time,
                 interrupted=self.interrupted,
                 machine=self.machine,
@@ -216,7 +251,6 @@ class TradeoffDocument:
     seeds: Sequence[int]
     points: Sequence[Evaluation]
     pareto: Sequence[Evaluation]
-    floors: Mapping[str, float]
     split: Sequence[ErrorBudget]
     proposals: Sequence[Simplification]
     tolerance: float
@@ -228,14 +262,22 @@ class TradeoffDocument:
     nearest_to_tolerance: Recommendation | None
     nearest_to_budget: Recommendation | None
     cheapest_by_engine: Mapping[str, Recommendation | None]
+    rejected: Recommendation | None
     answers: Sequence[str]
     untried: int
     effort: float
     spent: float
+    limit: Limit | None
     out_of_time: bool
     interrupted: bool
     machine: Mapping[str, Any]
     versions: Mapping[str, str]
+
+
+def _has_method(point: Evaluation, other: Configuration) -> bool:
+    """Return whether a point differs from a configuration only in its step."""
+    own = point.configuration
+    return (own.engine, own.iterations, own.options) == (other.engine, other.iterations, other.options)
 
 
 def front_of(points: Sequence[Evaluation]) -> list[Evaluation]:

@@ -5,16 +5,19 @@ the same order on every machine, unless a time limit ends it. Its phases are:
 
 1. the scene's own settings of each engine, with the substeps doubled until the tolerance is met, so that there is an
    answer;
-2. combinations of options that suit the scene (`SearchSpace.presets`);
+2. combinations of options that suit the scene (`SearchSpace.presets`); of an engine without an answer, all methods
+   tried so far with ever more substeps;
 3. neighbours of evaluations that no other evaluation of the same engine dominates, in the order of their importance
    for tolerance and budget;
-4. bisection for the smallest number of substeps and of iterations that meets the tolerance.
+4. of the cheapest evaluation of each engine that meets the tolerance, fewer iterations for more substeps;
+5. bisection for the smallest number of substeps and of iterations that meets it.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
+from typing import Literal
 
 from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
@@ -22,6 +25,9 @@ from sandbox.measure.tradeoff.metrics import EvaluationContext
 from sandbox.measure.tradeoff.objective import is_dominated
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.trajectory import Trajectory
+
+Limit = Literal["points", "effort", "time"]
+"""Limit that can end a search: the number of settings, the counted cost, or the time."""
 
 DOMINANCE_MARGIN = 0.7
 """An evaluation is dominated by one that has less than this fraction of its counted cost and is at least as accurate:
@@ -38,6 +44,8 @@ MAX_FIRST_FACTOR = 16
 """Largest factor of the substeps in the first phase: beyond it, another option may be cheaper."""
 EXPLORE_FRACTION = 0.8
 """Fraction of evaluations and effort for the first three phases; the rest is for the bisection."""
+REFINE_FRACTION = 0.5
+"""Fraction of evaluations and effort up to which the methods of an engine without an answer are refined."""
 MIN_IMPROVEMENT = 0.95
 """An evaluation with more than this fraction of the error of a cheaper one is not explored further."""
 
@@ -72,6 +80,8 @@ class SettingsSearch:
     """whether Ctrl-C ended the search"""
     spent: float = 0.0
     """counted cost of all evaluations, s"""
+    limit: Limit | None = None
+    """limit that ended the search; None if no further configuration was worth a run"""
 
     def run(self) -> list[Evaluation]:
         """Search until no configuration is worth a run or the effort is spent; return all evaluations in order."""
@@ -90,7 +100,10 @@ class SettingsSearch:
         for configuration in self.space.presets():
             if configuration.engine in by_engine and self._may_continue(EXPLORE_FRACTION):
                 self._evaluate(configuration, by_engine[configuration.engine])
+        if self.tolerance > 0.0:
+            self._refine_unanswered()
         self._explore()
+        self._trade_iterations()
         self._bisect_all()
 
     def _refine_to_tolerance(self, evaluation: Evaluation | None) -> None:
@@ -100,7 +113,7 @@ class SettingsSearch:
         the tolerance is 0, only the effort ends it.
         """
         useless = 0
-        while evaluation is not None and evaluation.ranking_error > self.tolerance and evaluation.engine != "exact":
+        while evaluation is not None and not evaluation.meets(self.tolerance) and evaluation.engine != "exact":
             configuration = evaluation.configuration
             finer = replace(configuration, substeps=2 * configuration.substeps)
             if evaluation.status in ("refused", "stopped") or not self.space.is_valid(finer):
@@ -120,6 +133,25 @@ class SettingsSearch:
                     return
             evaluation = found
 
+    def _refine_unanswered(self) -> None:
+        """Double the substeps of all methods tried, the cheapest first, of engines that do not meet the tolerance yet.
+
+        It does not end if errors grow: where bodies collide, they do not fall steadily with the step.
+        """
+        while self._may_continue(REFINE_FRACTION):
+            answered = {each.engine for each in self.evaluations.values() if each.meets(self.tolerance)} | {"exact"}
+            finer = {
+                replace(each.configuration, substeps=2 * each.configuration.substeps): each
+                for each in self.evaluations.values()
+                if each.engine not in answered and each.status == "ok" and math.isfinite(each.ranking_error)
+            }
+            untried = [each for each in finer if each not in self.evaluations and each not in self.skipped]
+            untried = [each for each in untried if self.space.is_valid(each)]
+            if not untried:
+                return
+            cheapest = min(untried, key=lambda each: finer[each].counted_seconds)
+            self._evaluate(cheapest, finer[cheapest])
+
     def _explore(self) -> None:
         """Evaluate the neighbours of promising evaluations, the engine with the least cost so far first."""
         expanded: set[Configuration] = set()
@@ -130,7 +162,7 @@ class SettingsSearch:
         )
         turns: Mapping[str, cycle[Callable[[Evaluation], float]]]
         turns = {engine: cycle(goals) for engine in self.space.engines}
-        while self._may_continue(EXPLORE_FRACTION):
+        while self.limit is None:
             promising = [e for c, e in self.evaluations.items() if c not in expanded and self._is_promising(e)]
             if not promising:
                 break
@@ -140,16 +172,21 @@ class SettingsSearch:
             expanded.add(best.configuration)
             for neighbour in self.space.neighbours(best.configuration):
                 is_faster = neighbour.work < best.configuration.work
-                if self._may_continue(EXPLORE_FRACTION) and (best.status != "stopped" or is_faster):
+                self.limit = self._exceeded(EXPLORE_FRACTION)
+                if self.limit is None and (best.status != "stopped" or is_faster):
                     self._evaluate(neighbour, best)
 
     def _may_continue(self, fraction: float = 1.0) -> bool:
         """Return whether a fraction of the evaluations and of the effort is not used up."""
-        return (
-            len(self.evaluations) < fraction * self.max_evaluations
-            and self._remaining > (1.0 - fraction) * self.effort
-            and clock_without_compilation() < self.deadline
-        )
+        return self._exceeded(fraction) is None
+
+    def _exceeded(self, fraction: float) -> Limit | None:
+        """Return the limit of which a fraction is used up, or the limit of time; None if there is none."""
+        if len(self.evaluations) >= fraction * self.max_evaluations:
+            return "points"
+        if self._remaining <= (1.0 - fraction) * self.effort:
+            return "effort"
+        return "time" if clock_without_compilation() >= self.deadline else None
 
     def _spent_on(self, engine: str) -> tuple[float, int]:
         """Return the cost of an engine's evaluations so far, and its index, which decides between equals."""
@@ -171,7 +208,9 @@ class SettingsSearch:
                 self.skipped.add(configuration)
                 return None
         self.on_progress(Progress(f"{len(self.evaluations) + 1} tried: {_describe(configuration)}"))
-        found = evaluate(configuration, self.space, self.contexts, self.metric, limit, self.deadline, known)
+        found = evaluate(
+            configuration, self.space, self.contexts, self.metric, self.tolerance, limit, self.deadline, known
+        )
         if found.status == "stopped" and clock_without_compilation() >= self.deadline:
             self.skipped.add(configuration)
             return None
@@ -196,7 +235,11 @@ class SettingsSearch:
             if evaluation.status == "ok" and evaluation.metrics.get(self.metric) is None:
                 return not successful and evaluation is same_engine[0]
             return not successful and work >= max(each.configuration.work for each in same_engine)
-        others = [(each.counted_seconds, MIN_IMPROVEMENT * self._positive_error(each)) for each in successful]
+        others = [
+            (each.counted_seconds, MIN_IMPROVEMENT * self._positive_error(each))
+            for each in successful
+            if evaluation.objections or not each.objections
+        ]
         return not is_dominated(evaluation.counted_seconds, self._positive_error(evaluation), others, DOMINANCE_MARGIN)
 
     def _tolerance_distance(self, evaluation: Evaluation) -> float:
@@ -213,14 +256,38 @@ class SettingsSearch:
     def _bisect_all(self) -> None:
         """Find the fewest substeps and iterations of each evaluation that meets the tolerance and is not dominated."""
         for setting in ("substeps", "iterations"):
-            accepted = [each for each in self.evaluations.values() if self._meets(each) and each.engine != "exact"]
+            stepped = [each for each in self.evaluations.values() if each.engine != "exact"]
+            accepted = [each for each in stepped if each.meets(self.tolerance)]
             for each in accepted:
                 is_used = setting == "substeps" or self.space.uses_iterations(each.engine)
                 if is_used and self._is_promising(each):
                     self._halve(setting, each)
 
-    def _meets(self, evaluation: Evaluation) -> bool:
-        return evaluation.ranking_error <= self.tolerance
+    def _trade_iterations(self) -> None:
+        """Halve the iterations of the cheapest evaluation of each engine, and find the substeps that this needs.
+
+        Bisection of one number after the other ends at the first corner: 5 substeps of 20 iterations, where 8 of 5
+        would do.
+        """
+        for engine in self.space.engines:
+            if engine == "exact" or not self.space.uses_iterations(engine):
+                continue
+            traded: set[Configuration] = set()
+            while self._may_continue():
+                met = [e for e in self.evaluations.values() if e.engine == engine and e.meets(self.tolerance)]
+                best = min(met, key=lambda each: each.counted_seconds, default=None)
+                if best is None or best.configuration in traded or best.configuration.iterations < 2:
+                    break
+                traded.add(best.configuration)
+                fewer = _with(best.configuration, "iterations", best.configuration.iterations // 2)
+                finer = _with(fewer, "substeps", 2 * fewer.substeps)
+                if not self.space.is_valid(finer):
+                    break
+                found = self._evaluate(fewer, best)
+                if found is not None and not found.meets(self.tolerance):
+                    found = self._evaluate(finer, best)
+                    if found is not None and found.meets(self.tolerance):
+                        self._bisect("substeps", fewer.substeps, finer.substeps, found)
 
     def _halve(self, setting: str, accepted: Evaluation) -> None:
         """Halve a setting as long as the tolerance is met, then bisect between the last two values."""
@@ -230,7 +297,7 @@ class SettingsSearch:
             found = self._evaluate(halved, accepted) if self.space.is_valid(halved) else None
             if found is None:
                 return
-            if not self._meets(found):
+            if not found.meets(self.tolerance):
                 self._bisect(setting, value // 2, value, accepted)
                 return
             accepted = found
@@ -244,7 +311,7 @@ class SettingsSearch:
             found = self._evaluate(middle, accepted)
             if found is None:
                 return
-            if self._meets(found):
+            if found.meets(self.tolerance):
                 high = getattr(middle, setting)
             else:
                 low = getattr(middle, setting)

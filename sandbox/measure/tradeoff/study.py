@@ -12,8 +12,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from pydantic import ValidationError
-
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.ground_truth import Truth, find_truth
 from sandbox.measure.metrics.trajectory_error import default_tolerance
@@ -43,6 +41,7 @@ from sandbox.measure.tradeoff.objective import (
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
     VALIDATION_SEEDS,
+    cheapest_rejected,
     nearest_to_budget,
     nearest_to_tolerance,
     recommend_cheapest,
@@ -56,6 +55,7 @@ from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.schedule import with_whole_steps
 from sandbox.trajectory import Trajectory
@@ -132,7 +132,7 @@ def tradeoff(
         UnknownMetricError: no metric has that name.
         TooLargeError: the frames would not fit into memory.
         ValueError: an argument is out of range.
-        pydantic.ValidationError: a setting is invalid.
+        SettingsError: a setting is invalid.
     """
     scene, on_progress = as_scene(scene), on_progress or ignore_progress
     engines = [engines] if isinstance(engines, str) else engines
@@ -339,12 +339,14 @@ class _Study:
             within_tolerance=self._with_warnings(within_tolerance),
             within_budget=self._with_warnings(within_budget),
             cheapest_by_engine={name: self._with_warnings(each) for name, each in cheapest.items()},
+            rejected=cheapest_rejected(points, self.objective, within_tolerance),
             nearest_to_tolerance=self._with_warnings(near_tolerance),
             nearest_to_budget=self._with_warnings(near_budget),
             seeds=self.seeding.search,
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
             spent=search.spent,
+            limit=search.limit,
             out_of_time=clock_without_compilation() >= self.deadline,
             machine=machine(),
             versions=versions(),
@@ -381,12 +383,12 @@ class _Study:
         near_front: list[Evaluation] = []
         for engine in self.space.engines:
             successful = [each for each in evaluations if each.status == "ok" and each.engine == engine]
-            others = [(each.counted_seconds, each.ranking_error) for each in successful]
-            near_front += [
-                each
-                for each in successful
-                if each.is_own or not is_dominated(each.counted_seconds, each.ranking_error, others, TIMED_MARGIN)
-            ]
+            costs = [(each.counted_seconds, each.ranking_error) for each in successful]
+            faultless = [(each.counted_seconds, each.ranking_error) for each in successful if not each.objections]
+            for each in successful:
+                others = costs if each.objections else faultless
+                if each.is_own or not is_dominated(each.counted_seconds, each.ranking_error, others, TIMED_MARGIN):
+                    near_front.append(each)
         return near_front
 
     def _validate(self, point: Evaluation) -> float:
@@ -401,6 +403,7 @@ class _Study:
                 self.space,
                 self._validation_contexts,
                 self.objective.metric.name,
+                self.objective.tolerance,
                 RUN_FRACTION * self.effort,
             )
             known[point.configuration] = found.ranking_error
@@ -455,7 +458,7 @@ def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diag
     ratio = settings.substeps * settings.dt / safe if safe > 0.0 else math.inf
     try:
         needed = settings.replace(substeps=math.ceil(ratio * (1.0 - ROUNDING))).substeps
-    except (OverflowError, ValidationError):  # more than a setting may have
+    except (OverflowError, SettingsError):  # more than a setting may have
         return found
     remedy = f"; at dt = {settings.dt:.4g} s, substeps >= {needed} {effect}"
     return [

@@ -9,6 +9,8 @@ from sandbox.formatting import format_number
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.result import Advice, MeasuredSetting
 from sandbox.measure.advice.text import (
+    cheapest_head,
+    coverage_sentence,
     engine_text,
     error_text,
     fallback_head,
@@ -35,6 +37,7 @@ from sandbox.report.html.page import (
     concatenated,
     engine_name,
     paragraph,
+    remark_paragraphs,
     table,
     write_page,
 )
@@ -43,17 +46,17 @@ LIKELY = 0.5
 """Odds from which on a risk has the colour of a failure."""
 
 
-def write_advice(advice: Advice, path: str | Path) -> Path:
+def write_advice(advice: Advice, path: str | Path, on_recording: Sequence[str] = ()) -> Path:
     """Write the page of an advice, to a temporary name first, and return its path.
 
     Raises:
         OSError: the file cannot be written.
     """
-    return write_page(advice_page(advice), path)
+    return write_page(advice_page(advice, on_recording), path)
 
 
-def advice_page(advice: Advice) -> Page:
-    """Return the page of an advice."""
+def advice_page(advice: Advice, on_recording: Sequence[str] = ()) -> Page:
+    """Return the page of an advice, with the remarks on the recording that it is for."""
     sections = [_present(advice), _recommended(advice)]
     if advice.knobs:
         sections.append(Section(knob_head(advice), _knobs(advice)))
@@ -63,10 +66,16 @@ def advice_page(advice: Advice) -> Page:
         lines, remarks = "\n".join(advice.code.lines), [paragraph(each) for each in advice.code.remarks]
         body = concatenated(Markup("<pre><code>{}</code></pre>").format(lines), *remarks)
         sections.append(Section("Lines to change in the game", body))
-    sentences = [f"{target_text(advice)}.", *truth_sentences(advice), *recording_sentences(advice)]
+    coverage = coverage_sentence(advice)
+    sentences = [
+        *filter(None, [coverage]),
+        f"{target_text(advice)}.",
+        *truth_sentences(advice),
+        *recording_sentences(advice),
+    ]
     if advice.interrupted:
         sentences.append("Interrupted: only what was measured before is shown.")
-    lead = concatenated(*map(paragraph, (*sentences, f"{search_sentence(advice)}.")))
+    lead = concatenated(*map(paragraph, (*sentences, f"{search_sentence(advice)}.")), remark_paragraphs(on_recording))
     return Page(advice.scene or "Untitled scene", "Advice", sections, lead, advice.versions, advice.machine)
 
 
@@ -87,13 +96,14 @@ def _recommended(advice: Advice) -> Section:
     if advice.fallback is not None:
         head, setting = fallback_head(advice), setting_text(advice.fallback, advice.fps)
         parts.append(paragraph(f"{head[:1].upper()}{head[1:]}: {setting}; {figures_text(advice, advice.fallback)}"))
+        parts += [paragraph(f"Objection: {each}") for each in advice.fallback.objections]
     elif chosen is not None and advice.fits_budget(chosen) is False:
         parts.append(paragraph("No setting that was tried is within the budget."))
     if advice.remaining_risks:
         parts.append(paragraph("Formulas still forecast, although the measured run may not show it:"))
         parts.append(_risks(advice.remaining_risks, advice, "Forecast for the recommended setting"))
     title = no_setting_text(advice) if chosen is None else setting_text(chosen, advice.fps)
-    return Section(f"Cheapest setting within the tolerance: {title}", concatenated(*parts))
+    return Section(f"{cheapest_head(advice)}: {title}", concatenated(*parts))
 
 
 def _risks(risks: Sequence[Risk], advice: Advice, caption: str) -> Markup:

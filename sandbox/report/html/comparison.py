@@ -27,6 +27,7 @@ from sandbox.report.html.page import (
     engine_name,
     fragment,
     isolated,
+    remark_paragraphs,
     table,
     write_page,
 )
@@ -117,21 +118,22 @@ ENGINES = (
 )
 
 
-def write_comparison(comparison: Comparison, path: str | Path) -> Path:
+def write_comparison(comparison: Comparison, path: str | Path, on_recording: Sequence[str] = ()) -> Path:
     """Write the page of a comparison, to a temporary name first, and return its path.
 
     Raises:
         OSError: the file cannot be written.
     """
-    return write_page(comparison_page(comparison), path)
+    return write_page(comparison_page(comparison, on_recording=on_recording), path)
 
 
-def comparison_page(comparison: Comparison, replayed: bool = True) -> Page:
+def comparison_page(comparison: Comparison, replayed: bool = True, on_recording: Sequence[str] = ()) -> Page:
     """Return the page of a comparison.
 
     Args:
         comparison: the comparison.
         replayed: with the replay and the charts beside it.
+        on_recording: remarks on the recording whose scene is compared.
     """
     scene = comparison.scene
     meanings = meanings_of(ENGINES)
@@ -140,7 +142,8 @@ def comparison_page(comparison: Comparison, replayed: bool = True) -> Page:
         sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW_TO_REPLAY))
     sections += explanations(comparison)
     sections.append(Section("Settings", settings_of(comparison)))
-    lead = fragment(TEMPLATE, "lead", scene.about, truth_sentence(comparison))
+    about = fragment(TEMPLATE, "lead", scene.about, truth_sentence(comparison))
+    lead = concatenated(about, remark_paragraphs(on_recording))
     return Page(scene.title or "Untitled scene", "Comparison", sections, lead, versions(), machine())
 
 

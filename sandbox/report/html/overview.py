@@ -34,6 +34,7 @@ from sandbox.report.html.page import (
     fragment,
     isolated,
     paragraph,
+    remark_paragraphs,
     table,
 )
 from sandbox.report.html.tradeoff import answers, diagram
@@ -68,6 +69,8 @@ class SceneReport:
     """reason why there is no comparison"""
     tradeoff: TradeoffMapping | None = None
     """document that `sandbox tradeoff --json` prints; None if it was not measured"""
+    remarks: tuple[str, ...] = ()
+    """remarks on a recording"""
 
 
 @dataclass
@@ -178,5 +181,6 @@ def _section(report: SceneReport, comparison: Comparison, anchor: str) -> Sectio
         parts.append(Section("Error against cost", diagram(report.tradeoff, f"{anchor}-cost"), level=3).markup())
     sections = [Section(each.title, each.body, level=3) for each in explanations(comparison)]
     parts.append(fragment(TEMPLATE, "more", sections, settings_of(comparison)))
-    lead = isolated(scene.about) if scene.about else None
+    about = isolated(scene.about) if scene.about else None
+    lead = concatenated(about, remark_paragraphs(report.remarks)) or None
     return Section(scene.title or report.name, concatenated(*parts), anchor, lead)

@@ -99,6 +99,11 @@ def paragraph(text: Content, css_class: str = "soft") -> Markup:
     return Markup('<p class="{}">{}</p>').format(css_class, text)
 
 
+def remark_paragraphs(remarks: Sequence[str]) -> Markup:
+    """Return the remarks on a recording, a paragraph each."""
+    return concatenated(*(paragraph(isolated(f"Recording: {each}")) for each in remarks))
+
+
 def concatenated(*parts: Content) -> Markup:
     """Return texts and markup, one after the other; None is left out."""
     return Markup("").join(part for part in parts if part is not None)

@@ -23,6 +23,7 @@ from sandbox.report.html.page import (
     engine_name,
     fragment,
     paragraph,
+    remark_paragraphs,
     table,
     write_page,
 )
@@ -41,7 +42,7 @@ from sandbox.report.tradeoff_plot import (
 )
 
 TEMPLATE = "tradeoff.html.j2"
-PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), ("left", "error at the finest step"))
+PARTS = (("time_step", "time step"), ("solver", "solver"), ("left", "error at the finest step"))
 """Parts of an error: key in the document, and name."""
 BAR_WIDTH, BAR_HEIGHT = 320.0, 14.0
 HIT_RADIUS, RING_RADIUS = 9.0, 9.5
@@ -68,7 +69,9 @@ def tradeoff_page(document: TradeoffMapping, comparison: Comparison | None = Non
     if comparison is not None and comparison.trajectories:
         how = f"Each engine runs with the scene's own settings. {HOW_TO_REPLAY}"
         sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=how))
-    lead = concatenated(answers(document), paragraph(truth_sentence(document)))
+    lead = concatenated(
+        answers(document), paragraph(truth_sentence(document)), remark_paragraphs(document.get("remarks") or ())
+    )
     title = document.get("title") or str(document.get("scene") or "Untitled scene")
     return Page(title, "Trade-off", sections, lead, document.get("versions") or {}, document.get("machine") or {})
 
@@ -232,8 +235,8 @@ def details(document: TradeoffMapping) -> list[Section]:
         found.append(Section("The Pareto front", body, lead=lead))
     if document.get("split"):
         lead = (
-            "Model: error that remains as the time step goes to 0. Solver: error that more iterations remove. "
-            "Time step: the rest."
+            "Solver: error that more iterations remove. Time step: error that the finest step tried removes. "
+            "The rest is left at that step; with collisions, a still finer one may remove it."
         )
         found.append(Section("Sources of error", error_budget(document["split"]), lead=lead))
     if document.get("proposals"):
@@ -248,8 +251,7 @@ def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
     """Return the parts of each engine's error as a table with bars of equal length.
 
     Args:
-        rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`, in m; unknown parts are None.
-            The error at the finest step, `left`, is that of the model where the latter is known.
+        rows: each with `engine`, `total`, `time_step`, `solver` and `left`, in m.
     """
     columns = [HtmlColumn("engine"), HtmlColumn("fractions"), HtmlColumn("error, m", True)]
     columns += [HtmlColumn(f"{name}, m", True) for _, name in PARTS]
@@ -268,8 +270,6 @@ def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
 def _bar(row: TradeoffMapping) -> Markup:
     """Return the bar of an engine: the fractions of its error."""
     parts = {key: max(float(row.get(key) or 0.0), 0.0) for key, _ in PARTS}
-    if row.get("model") is not None:
-        parts["left"] = 0.0
     total = sum(parts.values())
     x, bars, words = 0.0, [], []
     for key, name in PARTS:

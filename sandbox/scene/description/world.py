@@ -5,9 +5,10 @@ import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails
 
 from sandbox.scene.description.base import Acceleration, Falloff, Friction, Name, Part, Point, Restitution, Velocity
+from sandbox.scene.errors import EXPECTED, Fault, LocatedMessage, SettingsError, path_of, shown
 
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -133,20 +134,16 @@ class Settings(Part):
             changes: new values by name.
 
         Raises:
-            pydantic.ValidationError: a name or a value is invalid.
+            SettingsError: a name or a value is invalid.
         """
         unknown = [name for name in changes if name not in type(self).model_fields]
-        if unknown:
-            errors = [
-                InitErrorDetails(
-                    type=PydanticCustomError("unknown_setting", "{reason}", {"reason": _unknown(name)}),
-                    loc=(name,),
-                    input=changes[name],
-                )
-                for name in unknown
-            ]
-            raise ValidationError.from_exception_data(type(self).__name__, errors)
-        return type(self).model_validate({**self.model_dump(), **changes})
+        faults: list[LocatedMessage] = [(("solver", name), _unknown(name)) for name in unknown]
+        if not faults:
+            try:
+                return type(self).model_validate({**self.model_dump(), **changes})
+            except ValidationError as error:
+                faults = [(("solver", *each["loc"]), _wording(each)) for each in error.errors(include_url=False)]
+        raise SettingsError([Fault("settings", None, path_of(location, {}), message) for location, message in faults])
 
     def common(self) -> Self:
         """Return the settings with only those that every engine supports; the others get their defaults."""
@@ -195,6 +192,19 @@ class Kick(Part):
     adds_to: Literal["rebound", "approach"] = "rebound"
     """`rebound`: the speed is added after the bounce, as at a bumper; `approach`: the speed is added to the approach
     before the bounce, as at a slingshot"""
+
+
+BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+"""Violated bounds of a number in words"""
+
+
+def _wording(details: ErrorDetails) -> str:
+    """Return the message of an invalid setting: what it must be, and what it is."""
+    kind, context = details["type"], details.get("ctx", {})
+    bounds = [f"{words} {context[key]:g}" for key, words in BOUNDS.items() if key in context]
+    expected = EXPECTED.get(kind, details["msg"].removeprefix("Input should be ")).format(**context)
+    expected = bounds[0] if bounds else expected
+    return f"must be {expected}, is {shown(details['input'])}"
 
 
 def _unknown(name: str) -> str:

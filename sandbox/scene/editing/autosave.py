@@ -78,7 +78,7 @@ class AutosaveHeader:
         return self.host == host_name() and self.pid == os.getpid() and is_process_alive(self.pid, self.start)
 
     def is_of(self, path: Path | None) -> bool:
-        """Tell whether the autosave belongs to a scene file, whose folder may have been moved."""
+        """Return whether the autosave belongs to a scene file, whose folder may have been moved."""
         if path is None or self.file is None:
             return path is None and self.file is None
         return Path(self.file).name == path.name and _is_shipped(Path(self.file)) == _is_shipped(path)
@@ -242,7 +242,7 @@ def _read(file: Path) -> tuple[AutosaveHeader, str, float] | None:
 
 
 def _is_live(file: Path, header: AutosaveHeader) -> bool:
-    """Tell whether the editor that has written an autosave still runs; see `atomic_write.remove_stale`."""
+    """Return whether the editor that has written an autosave still runs; see `atomic_write.remove_stale`."""
     if header.is_of_this_process:
         return file in _in_use
     if header.host == host_name() and os.name != "nt":  # Windows has no signal that tests for a process
@@ -254,7 +254,7 @@ def _is_live(file: Path, header: AutosaveHeader) -> bool:
 
 
 def _is_free(file: Path, is_own: bool = False) -> bool:
-    """Tell whether an editor may write to a name.
+    """Return whether an editor may write to a name.
 
     Args:
         file: the name.

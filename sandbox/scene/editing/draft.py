@@ -37,7 +37,7 @@ duration = 10.0
 name = "ground"
 point = [0.0, 0.0]
 normal = [0.0, 1.0]
-friction = 0.5
+friction = 0.7071
 restitution = 0.5
 """
 """An empty scene with a ground."""
@@ -225,7 +225,7 @@ class SceneDraft:
         return self._now.label
 
     def is_file_changed(self) -> bool:
-        """Tell whether the file has changed on disk since it was read or saved."""
+        """Return whether the file has changed on disk since it was read or saved."""
         if self.path is None or self._saved is None:
             return False
         try:

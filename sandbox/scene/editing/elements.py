@@ -61,7 +61,7 @@ def all_elements(scene: SceneDescription) -> Iterator[tuple[ElementKey, Part]]:
 
 
 def exists(scene: SceneDescription, key: ElementKey) -> bool:
-    """Tell whether a scene has an element."""
+    """Return whether a scene has an element."""
     return 0 <= key.index < len(elements_of_table(scene, key.table))
 
 
@@ -94,7 +94,7 @@ def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> 
 
 
 def differ_in_places_only(scene: Scene, other: Scene) -> bool:
-    """Tell whether two scenes have the same bodies and static elements, but for the places and angles of bodies.
+    """Return whether two scenes have the same bodies and static elements, but for the places and angles of bodies.
 
     It recognises scenes of `with_moved_bodies`, by identity.
     """
@@ -299,3 +299,10 @@ def material_users(scene: Scene, material: str) -> list[ElementKey]:
 def table_values(element: Part) -> dict[str, Any]:
     """Return the values of an element's table, without defaults."""
     return element.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+
+def counted(keys: Sequence[ElementKey]) -> str:
+    """Return the number of elements in words: `a ball`, `3 balls`, `4 elements`."""
+    tables = {key.table for key in keys}
+    word = tables.pop() if len(tables) == 1 else "element"
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}" if len(keys) == 1 else f"{len(keys)} {word}s"

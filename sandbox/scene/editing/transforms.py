@@ -191,6 +191,12 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
     return {}
 
 
+def mirroring(box: tuple[Point, Point], *, is_vertical: bool) -> Similarity:
+    """Return the transformation that mirrors a box, given by its corners in m, left and right, or up and down."""
+    centre = 0.5 * (box[0][0] + box[1][0]), 0.5 * (box[0][1] + box[1][1])
+    return Similarity(centre, angle=math.pi if is_vertical else 0.0, mirrored=True)
+
+
 def alignment(own: tuple[Point, Point], box: tuple[Point, Point], side: AlignmentSide) -> Point:
     """Return the way that aligns a side of an element's box, given by two corners, with that of another box, m."""
     match side:

@@ -2,7 +2,6 @@
 
 import copy
 import difflib
-import json
 import math
 import re
 from collections.abc import Iterable, Iterator
@@ -10,32 +9,13 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import ValidationError
 
-from sandbox.echo import shorten
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Wording
 from sandbox.scene.description.game_tables import PRESETS, has_preset
-from sandbox.scene.errors import LocatedMessage, Location
+from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, shown
 from sandbox.scene.files.document import TAGGED, keys_of, list_tables, model_at, read_model
 from sandbox.scene.files.presets import expanded_document, stated_location
 from sandbox.scene.validate.scene import crosscheck
-
-_EXPECTED = {
-    "float_type": "a number",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "finite_number": "a finite number",
-    "bool_type": "true or false",
-    "string_type": "text in quotes",
-    "tuple_type": "an array, such as [0.0, 1.0]",
-    "model_type": "a table",
-    "model_attributes_type": "a table",
-    "dict_type": "a table",
-    "too_short": "an array of {min_length} or more",
-    "too_long": "an array of {max_length} at most",
-    "string_too_short": "text of {min_length} or more characters",
-    "string_too_long": "text of {max_length} characters at most",
-    "literal_error": "one of {expected}",
-}
 
 _RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
 """Violated bound of each type of pydantic error."""
@@ -73,11 +53,9 @@ def explain(details: Any) -> LocatedMessage:
     if kind == "union_tag_not_found":
         return location, f"is missing; {_one_of(location)}"
     if kind == "union_tag_invalid":
-        return location, f"is {_shown(context['tag'])}; {_one_of(location)}"
+        return location, f"is {shown(context['tag'])}; {_one_of(location)}"
     if kind == "value_error":
         return location, str(context["error"])
-    if kind == "unknown_setting":
-        return location, str(context["reason"])
     if kind == "string_pattern_mismatch":
         expected = "text '#rrggbb'" if location[-1] == "colour" else "text without control characters"
     elif kind == "tuple_type" and len(location) == 1:
@@ -92,11 +70,11 @@ def explain(details: Any) -> LocatedMessage:
         expected = f"an array of {_length(tuple(details['loc']), context)}"
     elif kind in _RANGES:
         expected = _range(tuple(details["loc"]), _RANGES[kind], context, value)
-    elif kind in _EXPECTED:
-        expected = _EXPECTED[kind].format(**context)
+    elif kind in EXPECTED:
+        expected = EXPECTED[kind].format(**context)
     else:
         expected = details["msg"].removeprefix("Input should be ")
-    message = f"must be {expected}, is {_shown(value)}"
+    message = f"must be {expected}, is {shown(value)}"
     if kind in _RANGES and abs(value) <= _DEGREES and _is_angle(tuple(details["loc"])):
         message += f"; angles are in radians, {value:g}° is {math.radians(value):.4g}"
     elif kind == "less_than_equal" and location[-1] == "restitution":
@@ -228,12 +206,6 @@ def location_of(details: Any) -> Location:
     if details["type"] in ("union_tag_invalid", "union_tag_not_found"):
         return (*location, "kind")
     return location
-
-
-def _shown(value: Any) -> str:
-    if isinstance(value, float) and value.is_integer():
-        return f"{value:.15g}"
-    return shorten(json.dumps(value, ensure_ascii=False, default=str))
 
 
 def _known_keys(location: Location) -> str:

@@ -56,7 +56,11 @@ def as_scene(scene: Scene | str | Path) -> Scene:
 
     Raises:
         SceneError: as `load`.
+        TypeError: it is neither.
     """
+    if not isinstance(scene, Scene | str | Path):
+        hint = "; a recording has its scene in `.scene`" if hasattr(scene, "actions") else ""
+        raise TypeError(f"a scene, a name or a path is needed, not a {type(scene).__name__}{hint}")
     return scene if isinstance(scene, Scene) else load(scene)
 
 

@@ -16,8 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from sandbox.scene.errors import Location, path_of
-from sandbox.scene.files.toml_edit import Statement, written
-from sandbox.scene.files.toml_index import BLANK_LINE, COMMENT_LINE, InlineContainer, TextEntry, TomlIndex
+from sandbox.scene.files.toml_index import BLANK_LINE, COMMENT_LINE, InlineContainer, Statement, TextEntry, TomlIndex
 
 
 class TextEditError(ValueError):
@@ -126,7 +125,7 @@ def with_swapped_elements(text: str, table: str, one: int, other: int) -> str:
 
 
 def _ends_with_comment(text: str) -> bool:
-    """Tell whether the last line of a statement or block is a comment."""
+    """Return whether the last line of a statement or block is a comment."""
     return COMMENT_LINE.match(text, text.rfind("\n", 0, -1) + 1) is not None
 
 
@@ -270,6 +269,18 @@ def _toml(value: Any) -> str:
     if isinstance(value, str):
         return _quoted(value)
     return str(value) if type(value) is int else written(value)
+
+
+def written(value: Any) -> str:
+    """Return a setting in TOML, numbers in their shortest form: 0.001, 1e-6, 4."""
+    value = value.item() if hasattr(value, "item") else value  # a number of numpy
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return repr(value)
+        return re.sub(r"e([+-]?)0*(\d)", lambda e: f"e{e[1].strip('+')}{e[2]}", repr(value))
+    import tomlkit  # imported only if something is rewritten
+
+    return str(tomlkit.item(value).as_string())
 
 
 def _assignment(key: str, value: Any) -> str:

@@ -4,15 +4,73 @@ Positions are offsets in characters. Inline arrays and tables are read when some
 """
 
 import re
+import tomllib
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sandbox.scene.errors import TOKEN, Location, enter
-from sandbox.scene.files.toml_edit import Statement, keys_of, statements
 
 COMMENT_LINE = re.compile(r"[ \t]*#[^\n]*\n")
 BLANK_LINE = re.compile(r"[ \t]*\r?\n")
+
+
+class Statement(NamedTuple):
+    """A heading, or a key with its value, of a TOML text; positions are offsets in characters."""
+
+    keys: tuple[str, ...]
+    """parts of the key, without those of the heading above"""
+    heading: bool
+    begin: int
+    """start of its first line"""
+    head: tuple[int, int]
+    """start and end of its key or heading"""
+    value: tuple[int, int]
+    """start and end of its value; for a heading, its end twice"""
+    end: int
+    """end of its last line, including comment and line break"""
+
+
+def statements(text: str) -> Iterator[Statement]:
+    """Yield the statements of a valid TOML text in order, in linear time."""
+    open_brackets, first, equals, last = 0, -1, -1, -1
+    for token in TOKEN.finditer(text):
+        sign = token[0]
+        if sign == "\n":
+            if first >= 0 and open_brackets == 0:
+                yield _statement(text, first, equals, last, token.end())
+                first, equals = -1, -1
+        elif sign[0] != "#":
+            if first < 0:
+                first = token.start()
+            if sign == "=" and equals < 0:
+                equals = token.start()
+            open_brackets += (sign in ("[", "{")) - (sign in ("]", "}"))
+            last = token.end()
+    if first >= 0:
+        yield _statement(text, first, equals, last, len(text))
+
+
+def _statement(text: str, first: int, equals: int, last: int, end: int) -> Statement:
+    begin = text.rfind("\n", 0, first) + 1
+    if text[first] == "[":
+        return Statement(keys_of(text[first:last]), True, begin, (first, last), (last, last), end)
+    blank = re.compile(r"\s*").match(text, equals + 1)
+    assert blank is not None  # it also matches the empty text
+    head = first, first + len(text[first:equals].rstrip())
+    return Statement(keys_of(text[slice(*head)] + "=0"), False, begin, head, (blank.end(), last), end)
+
+
+@lru_cache(maxsize=10_000)
+def keys_of(text: str) -> tuple[str, ...]:
+    """Return the parts of the key of a statement, such as `a.b = 0`, or of a heading."""
+    keys: list[str] = []
+    value: Any = tomllib.loads(text)
+    while isinstance(value, dict) and value:
+        key, value = next(iter(value.items()))
+        keys.append(key)
+    return tuple(keys)
 
 
 class TextEntry(NamedTuple):

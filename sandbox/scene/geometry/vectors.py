@@ -1,4 +1,4 @@
-"""Rotation of plane vectors, and nearest points of segments. Angles are counter-clockwise.
+"""Rotation of plane vectors, nearest points of segments, and sides of bends. Angles are counter-clockwise.
 
 Cosine and sine are arguments: numpy and the math module may round them differently, and a start state must not depend
 on which function computes it. The functions are plain Python; `engines.common.geometry` has them compiled, for kernels.
@@ -57,3 +57,20 @@ def nearest_on_segment(point: Point, a: Point, b: Point) -> tuple[float, float]:
     fraction = nearest_fraction(*a, *b, *point)
     x, y = b[0] - a[0], b[1] - a[1]
     return fraction, math.hypot(point[0] - a[0] - fraction * x, point[1] - a[1] - fraction * y)
+
+
+def is_left_of_bend(x: float, y: float, in_x: float, in_y: float, out_x: float, out_y: float) -> bool:
+    """Return whether a point is to the left of two half-lines that meet in the origin.
+
+    Args:
+        x: point, m.
+        y: likewise.
+        in_x: direction of the first half-line, towards the origin.
+        in_y: likewise.
+        out_x: direction of the second one, away from it.
+        out_y: likewise.
+    """
+    left_of_first, left_of_second = in_x * y - in_y * x >= 0.0, out_x * y - out_y * x >= 0.0
+    if in_x * out_y - in_y * out_x < 0.0:  # it turns to the right: the left side is the larger one
+        return left_of_first or left_of_second
+    return left_of_first and left_of_second

@@ -53,7 +53,7 @@ class CaptureController:
             self._notify(str(error), "error")
 
     def start_recording(self, size: Size, name: str) -> None:
-        """Start a film of a window of a size, px."""
+        """Start a film of pictures of a size, px."""
         try:
             self._recorder = recorder_in(self._folder, name, self._film, size_within(size, MAX_WIDTH), FRAME_RATE)
         except PictureError as error:
@@ -61,11 +61,11 @@ class CaptureController:
             return
         self._seconds = self._pending_seconds = 0.0
 
-    def update(self, surface: pygame.Surface, elapsed: float) -> None:
+    def update(self, picture: Callable[[], pygame.Surface], elapsed: float) -> None:
         """Add a picture to the film if it is due, and save a session whose jump in time is complete.
 
         Args:
-            surface: surface of the window.
+            picture: draws the picture of a film.
             elapsed: time since the last call, s.
         """
         if self._seeking is not None and self._seeking[0].busy is None:
@@ -78,7 +78,7 @@ class CaptureController:
         if self._pending_seconds < 1.0 / FRAME_RATE:
             return
         try:
-            self._recorder.add(surface, self._pending_seconds)
+            self._recorder.add(picture(), self._pending_seconds)
         except PictureError as error:
             self._notify(str(error), "warning")
             self.stop_recording()

@@ -5,6 +5,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part, Point
 from sandbox.scene.description.bodies import Box, Capsule, Polygon
@@ -16,6 +17,24 @@ from sandbox.scene.editing.transforms import plain_value, round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture, typed_numbers
 from sandbox.window.editor.snapping import rounded
+
+BODY_TABLES = ("ball", "box", "capsule", "polygon")
+STATIC_TABLES = ("plane", "wall", "post")
+FRICTION = 0.7071
+"""Friction of a new element: two frictions are multiplied, so that it is 0.5 between two new elements"""
+
+
+def has_friction(scene: Scene, table: str) -> bool:
+    """Return whether a new element of a table states a friction: if a body does, or there is none.
+
+    One side is enough for friction, so that a single element with it would rub on all others of a scene whose bodies
+    state none. Balls on a `[surface]` have no friction of this kind.
+    """
+    if table not in (*BODY_TABLES, *STATIC_TABLES) or scene.surface is not None:
+        return False
+    surfaces = contact_matrix(scene).surfaces
+    frictions = [surfaces.surfaces[k].friction for k in set(surfaces.of_shape.tolist())]
+    return not frictions or any(each is not None for each in frictions)
 
 
 class DrawGesture(Gesture):
@@ -51,8 +70,9 @@ class DrawGesture(Gesture):
     def preview(self) -> Scene:
         """Return the scene with the new element."""
         values = self.values()
-        if values is None:
-            return self.scene
+        return self.scene if values is None else self._scene_with(values)
+
+    def _scene_with(self, values: dict[str, Any]) -> Scene:
         element = ELEMENT_TYPES[self.table].model_construct(
             None, **{**defaults_of(self.table), **{key: _tuples(value) for key, value in values.items()}}
         )
@@ -64,7 +84,9 @@ class DrawGesture(Gesture):
         values = self.values()
         if values is None:
             return []
-        return [AddElement(self.table, {"name": self.name, **{key: plain_value(v) for key, v in values.items()}})]
+        drawn = {key: plain_value(value) for key, value in values.items()}
+        surface = {"friction": FRICTION} if has_friction(self.scene, self.table) else {}
+        return [AddElement(self.table, {"name": self.name, **drawn, **surface})]
 
     @property
     def selects(self) -> list[ElementKey] | None:

@@ -28,6 +28,8 @@ DELEGATED_WITH_CONTROL = {
     pygame.K_r: Command.RECORD,
     pygame.K_o: Command.PICKER,
 }
+KEPT_IN_FIELDS = frozenset({pygame.K_e, pygame.K_s, *DELEGATED_WITH_CONTROL})
+"""keys that act with Ctrl while a field is edited, whose value they apply first; others would change the scene"""
 HELP_GROUPS = (
     HelpGroup("Tools", tuple((tool.key.upper(), tool.about) for tool in TOOLS)),
     HelpGroup(
@@ -44,7 +46,7 @@ HELP_GROUPS = (
             ("PageUp or PageDown", "later or earlier in the file: above or below"),
             ("Delete", "delete"),
             ("Ctrl+A", "select all"),
-            ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste"),
+            ("Ctrl+X, Ctrl+C, Ctrl+V", "cut, copy, paste; in a field: its text"),
             ("Ctrl+D", "duplicate"),
         ),
     ),
@@ -52,11 +54,11 @@ HELP_GROUPS = (
         "Scene",
         (
             ("Space or Ctrl+E", "run the scene; Ctrl+E returns"),
-            ("Ctrl+Z", "undo"),
+            ("Ctrl+Z", "undo; in a field: in its text"),
             ("Ctrl+Shift+Z", "redo"),
             ("Ctrl+S", "save"),
             ("Ctrl+Shift+S", "save as"),
-            ("Ctrl+Shift+X", "take a preset or generators apart"),
+            ("Ctrl+Shift+X", "take a preset or generators apart; divide walls at their corners"),
             ("Ctrl+O", "open a scene"),
             ("Ctrl+P", "screenshot"),
             ("Esc", "cancel; select nothing; quit"),

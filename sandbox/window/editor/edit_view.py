@@ -17,7 +17,7 @@ from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
 from sandbox.window.editor.draw_gestures import OutlineGesture
-from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, TYPED
+from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, KEPT_IN_FIELDS, TYPED
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import location_of, property_sections
 from sandbox.window.editor.gestures import ViewScale
@@ -80,7 +80,7 @@ class EditView:
         self.autosave, self._folder = Autosave(draft, folder), folder
         self.recovered: RecoveredText | None = recoverable(draft.path, folder)
         """unsaved changes of a former editor, about which the user is asked"""
-        self._renderer, self._ghost = Renderer(), GhostPredictor()
+        self._renderer, self._ghost = Renderer(context.gui.accents), GhostPredictor()
         self.live_check, self.check_marks = LiveCheck(), CheckMarks()
         self._shown: tuple[object, ...] = ()
         self._button_held = False
@@ -234,6 +234,8 @@ class EditView:
         return True
 
     def _press_control(self, key: int, shift: bool) -> None:
+        if self.panel.has_focus and key not in KEPT_IN_FIELDS:
+            return
         editor, view = self.editor, self.view_scale
         self.panel.commit()
         if key == pygame.K_e:

@@ -14,6 +14,7 @@ from sandbox.scene.editing.elements import (
     all_elements,
     all_names,
     bodies_of,
+    counted,
     element_of_body,
     exists,
     name_of,
@@ -21,9 +22,10 @@ from sandbox.scene.editing.elements import (
     unique_name,
 )
 from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
-from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, transformation
+from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, mirroring, transformation
 from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import (
+    AddElement,
     Change,
     TextEditError,
     with_swapped_elements,
@@ -244,7 +246,7 @@ class Editor:
         scene, tool = self.draft.scene, self.tool
         tolerance = view.metres(PICK_REACH)
         if tool in JOINT_KINDS:
-            end = JointEnd(point, self._snap(point, view, control))
+            end = self._joint_end(point, view, control)
             return JointGesture(scene, tool, unique_name(tool, all_names(scene)), end, tolerance)
         if tool == "plunger":
             start = self._snap(point, view, control)
@@ -283,7 +285,7 @@ class Editor:
             gesture.is_snapped = not control
             gesture.move(point)
         elif isinstance(gesture, JointGesture):
-            gesture.move_end(JointEnd(point, self._snap(point, view, control)))
+            gesture.move_end(self._joint_end(point, view, control))
         elif isinstance(gesture, OutlineGesture) and self._pressed is not None and self.is_dragging:
             gesture.draw_freehand(point, view.metres(FREEHAND_TOLERANCE))
         elif isinstance(gesture, SelectGesture | VelocityGesture | ThrustGesture):
@@ -318,6 +320,10 @@ class Editor:
         self.snapped = (found.point, found.to) if found.to != "grid" else None
         return found.point
 
+    def _joint_end(self, point: Point, view: ViewScale, control: bool) -> JointEnd:
+        anchor = self._snap(point, view, control)
+        return JointEnd(point, anchor, is_snapped=self.snapped is not None, is_free=control)
+
     def release(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
         """Release the left button at a point."""
         gesture = self.gesture
@@ -347,7 +353,7 @@ class Editor:
         gesture = self.gesture
         assert gesture is not None
         if isinstance(gesture, JointGesture):
-            gesture.move_end(JointEnd(point, self._snap(point, view, control)))
+            gesture.move_end(self._joint_end(point, view, control))
             self.finish()
         elif gesture.click(self._snap(point, view, control)):
             self.finish()
@@ -371,6 +377,8 @@ class Editor:
             return False
         if isinstance(gesture, PlungerGesture):
             self._select_driven(gesture.name)
+        if isinstance(gesture, JointGesture) and gesture.note:
+            self._notify(gesture.note, "info")
         if selects is not None:
             self.selection = [key for key in selects if exists(self.draft.scene, key)]
         return True
@@ -424,7 +432,7 @@ class Editor:
         keys = self._selection_or_note()
         if keys:
             self.selection = []
-            if not self.apply(removal(self.draft.scene, keys), f"delete {_count(keys)}"):
+            if not self.apply(removal(self.draft.scene, keys), f"delete {counted(keys)}"):
                 self.selection = keys
 
     def select_all(self) -> None:
@@ -464,7 +472,7 @@ class Editor:
 
     def _add_copies(self, elements: tuple[CopiedElement, ...], shift: Point, label: str) -> None:
         changes, keys = pasting(self.draft.scene, elements, Similarity(shift=shift))
-        if changes and self.apply(changes, f"{label} {_count(keys)}"):
+        if changes and self.apply(changes, f"{label} {counted(keys)}"):
             self.tool = "select"
             self.selection = [key for key in keys if key.table not in ("drive",)]
 
@@ -472,17 +480,15 @@ class Editor:
         """Move the selection by a vector, m."""
         if self.selection:
             values = transformation(self.draft.scene, self.selection, Similarity(shift=shift))
-            self.apply(set_values(values), f"move {_count(self.selection)}", "nudge")
+            self.apply(set_values(values), f"move {counted(self.selection)}", "nudge")
 
     def mirror(self, *, is_vertical: bool = False) -> None:
         """Mirror the selection about the middle of its box, left and right or up and down."""
         box = self.selection_bounds(self.draft.scene)
         if box is None or not self._selection_or_note():
             return
-        centre = 0.5 * (box[0][0] + box[1][0]), 0.5 * (box[0][1] + box[1][1])
-        by = Similarity(centre, angle=math.pi if is_vertical else 0.0, mirrored=True)
-        values = transformation(self.draft.scene, self.selection, by)
-        self.apply(set_values(values), f"mirror {_count(self.selection)}")
+        values = transformation(self.draft.scene, self.selection, mirroring(box, is_vertical=is_vertical))
+        self.apply(set_values(values), f"mirror {counted(self.selection)}")
 
     def align(self, side: AlignmentSide) -> None:
         """Align the selected elements by a side of their boxes, with the box of all of them."""
@@ -495,7 +501,7 @@ class Editor:
             own = bounds_of(self.draft.scene, key)
             if own is not None:
                 values |= transformation(self.draft.scene, [key], Similarity(shift=alignment(own, box, side)))
-        self.apply(set_values(values), f"align {_count(self.selection)}")
+        self.apply(set_values(values), f"align {counted(self.selection)}")
 
     def reorder(self, step: Literal[-1, 1]) -> None:
         """Exchange the selected element with the next (1) or the previous one (−1) of its table.
@@ -536,10 +542,10 @@ class Editor:
         self._notify(f"nothing to be {what}" if label is None else f"{what}: {label}", "info")
 
     def take_apart(self) -> None:
-        """Replace the preset of the scene by its elements, or else the selected generators by their bodies."""
+        """Replace the preset of the scene by its elements, or else selected generators by bodies, and divide walls."""
         preset = self.draft.preset
         if preset is None:
-            self._take_generators_apart()
+            self._take_elements_apart()
             return
         self._drop_gesture()
         try:
@@ -549,17 +555,19 @@ class Editor:
             return
         self._notify(f"[{preset}] was replaced by its elements, without comments", "info")
 
-    def _take_generators_apart(self) -> None:
+    def _take_elements_apart(self) -> None:
         keys = self._selection_or_note()
         try:
             changes = taking_apart(self.draft.scene, keys)
         except TakeApartError as error:
             self._notify(str(error), "warning")
             return
-        bodies = sum(len(bodies_of(self.draft.scene, key)) for key in keys)
-        if keys and self.apply(changes, f"take {_count(keys)} apart"):
+        are_walls = all(key.table == "wall" for key in keys)
+        if keys and self.apply(changes, f"divide {counted(keys)}" if are_walls else f"take {counted(keys)} apart"):
             self.selection = []
-            self._notify(f"{bodies} bodies are elements of their own now", "info")
+            parts = sum(isinstance(change, AddElement) for change in changes)
+            walls = f"divided into {parts + len(keys)} walls of two points"
+            self._notify(walls if are_walls else f"{parts} elements in their place now", "info")
 
     def _selection_or_note(self) -> list[ElementKey]:
         if not self.selection:
@@ -571,7 +579,7 @@ class Editor:
     def set_property(self, keys: Collection[ElementKey], name: str, value: Any) -> str | None:
         """Set a key of elements, as `element_changes` does; return the message of a fault, or None."""
         changes = element_changes(self.draft.scene, self.draft.document, keys, name, value)
-        return self._change_property(changes, f"set {name} of {_count(list(keys))}", name)
+        return self._change_property(changes, f"set {name} of {counted(list(keys))}", name)
 
     def set_value(self, location: Location, name: str, value: Any) -> str | None:
         """Set a key of a table at a location, as `table_changes` does; return the message of a fault, or None."""
@@ -611,10 +619,3 @@ class Editor:
             self._notify(str(error), "warning")
             return False
         return bool(found) and self.apply(found, label)
-
-
-def _count(keys: Sequence[ElementKey]) -> str:
-    """Return the number of elements in words: `a ball`, `3 balls`, `4 elements`."""
-    tables = {key.table for key in keys}
-    word = tables.pop() if len(tables) == 1 else "element"
-    return f"{'an' if word[0] in 'aeiou' else 'a'} {word}" if len(keys) == 1 else f"{len(keys)} {word}s"

@@ -4,13 +4,16 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.editing.elements import all_names, naming, unique_name
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
-from sandbox.window.editor.picking import bodies_at, to_body
+from sandbox.window.editor.picking import bodies_at, start_frame, to_body
+from sandbox.window.hit_test import hulls_of, signed_distance
 
 JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor", "slide", "groove", "gear")
 """Joints that have a tool; a rope is a `slide` whose lower limit is 0"""
@@ -22,6 +25,8 @@ SLIDE_FRACTION = 0.5
 """Lower limit of a new slide, as a fraction of its length"""
 MESHING_REACH = 1.1
 """Gears whose distance is at most this multiple of the sum of their radii mesh; others are joined by a belt"""
+MIN_OVERLAP = 0.02
+"""A body that overlaps a wheel by more than this fraction of its radius carries it; a wheel rests on others"""
 MOTOR_RATE = 2.0 * math.pi
 """rad/s of a new motor: a revolution per second"""
 MOTOR_TORQUE_FACTOR = 20.0
@@ -40,6 +45,10 @@ class JointEnd:
     """m, where a body is looked for"""
     anchor: Point
     """m, the same point, snapped"""
+    is_snapped: bool = False
+    """whether the anchor is a centre or a corner"""
+    is_free: bool = False
+    """whether the user wants it exactly where the click is"""
 
 
 def joint_changes(
@@ -124,15 +133,14 @@ def _groove(scene: Scene, first: JointEnd, second: JointEnd, tolerance: float, n
 
 
 def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name: str) -> list[Change]:
-    """Return the changes that add a pivot or motor of the two topmost bodies at a point, or of one and the world."""
-    found = bodies_at(scene, end.click, tolerance)[:2]
+    """Return the changes that add a pivot or motor, as `bodies_of_pivot` and `centre_of_wheel` have it."""
+    found = bodies_of_pivot(scene, end, tolerance)
     if not found:
         raise PlacementError(f"a {kind} needs a body: click a body, or two that lie on each other")
     if all(scene.bodies.immovable[k] for k in found):
         raise PlacementError("a fixed or kinematic body needs no joint to the world; click a body that forces move")
-    found.sort(key=lambda k: (bool(scene.bodies.round[k]), -float(scene.bodies.radius[k])))  # a wheel comes second
     names, changes = _names(scene, found)
-    point = [round_value(x) for x in end.anchor]
+    point = [round_value(x) for x in centre_of_wheel(scene, end, found)]
     pivot: dict[str, Any] = {"name": name, "kind": "pivot", "between": names, "at": point}
     if kind == "pivot":
         return [*changes, AddElement("joint", pivot)]
@@ -148,6 +156,37 @@ def _at_one_point(scene: Scene, kind: str, end: JointEnd, tolerance: float, name
         "max_torque": float(f"{torque:.2g}"),
     }
     return [*changes, AddElement("joint", pivot), AddElement("joint", motor)]
+
+
+def bodies_of_pivot(scene: Scene, end: JointEnd, tolerance: float) -> list[int]:
+    """Return the indices of the bodies that a click joins: none, one to be joined to the world, or two, a wheel last.
+
+    They are the two topmost bodies at the point. If only a wheel is there, the other one is the topmost body that
+    overlaps it: the middle of a wheel is often below the body that it carries.
+    """
+    bodies = scene.bodies
+    found = bodies_at(scene, end.click, tolerance)[:2]
+    if len(found) == 1 and bodies.round[found[0]] and not end.is_free:
+        found += _overlapping(scene, found[0])[:1]
+    return sorted(found, key=lambda k: (bool(bodies.round[k]), -float(bodies.radius[k])))
+
+
+def _overlapping(scene: Scene, wheel: int) -> list[int]:
+    """Return the indices of the bodies that overlap a disc, the topmost first."""
+    bodies, frame = scene.bodies, start_frame(scene)
+    (x, y), radius = bodies.position[wheel].tolist(), float(bodies.radius[wheel])
+    near = np.flatnonzero(np.hypot(*(bodies.position - (x, y)).T) < bodies.radius + radius)
+    deepest = (1.0 - MIN_OVERLAP) * radius
+    found = [k for k in near.tolist() if k != wheel and signed_distance(hulls_of(bodies, frame, k), x, y) < deepest]
+    return found[::-1]
+
+
+def centre_of_wheel(scene: Scene, end: JointEnd, found: list[int]) -> Point:
+    """Return the point of a pivot, m: the centre of the wheel, else the point that was clicked."""
+    if not found or end.is_snapped or end.is_free or not scene.bodies.round[found[-1]]:
+        return end.anchor
+    x, y = scene.bodies.position[found[-1]].tolist()
+    return x, y
 
 
 def _names(scene: Scene, bodies: list[int]) -> tuple[list[str], list[Change]]:
@@ -202,6 +241,17 @@ class JointGesture(Gesture):
             PlacementError: there is no body that can be joined.
         """
         return joint_changes(self.scene, self.kind, self._first, self._second, self._tolerance, self.name)
+
+    @property
+    def note(self) -> str:
+        """What is to be said when the joint is made: that it joins a body to the world, where two may be meant."""
+        if self.kind not in ONE_CLICK:
+            return ""
+        found = bodies_of_pivot(self.scene, self._first, self._tolerance)
+        if len(found) != 1:
+            return ""
+        body = self.scene.bodies.names[found[0]]
+        return f"the {self.kind} joins {body} to the world; to join two bodies, click where they lie on each other"
 
     def dimensions(self) -> str:
         """Return the length."""

@@ -12,7 +12,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.clearance import bounding_clearances
@@ -36,6 +35,7 @@ from sandbox.scene.editing.elements import (
     elements_of_table,
 )
 from sandbox.scene.editing.transforms import Similarity, transformed
+from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.toml_changes import Change, RemoveValue, SetValue
 from sandbox.window.editor.latest_job import LatestJob
 
@@ -209,7 +209,7 @@ def _solver_remedy(scene: Scene, name: str, value: float) -> Iterator[Remedy]:
     """Yield the remedy that sets a key of `[solver]`, if its value is allowed."""
     try:
         solver = scene.solver.replace(**{name: value})
-    except ValidationError:
+    except SettingsError:
         return
     if scene.world.duration / solver.h > MAX_STEPS:
         return
@@ -251,7 +251,7 @@ def _thickness(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
 
 
 def _has_room(scene: Scene, wall: Wall, added: float) -> bool:
-    """Tell whether no moving body starts within a distance of a wall, m."""
+    """Return whether no moving body starts within a distance of a wall, m."""
     bodies = scene.bodies
     moving = ~bodies.fixed
     clearances = bounding_clearances(wall, bodies.position[moving], bodies.radius[moving])
@@ -309,7 +309,7 @@ def _separation(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
 
 
 def _is_referred_to(scene: Scene, name: str) -> bool:
-    """Tell whether a joint, force or drive refers to a body: it is not moved by itself."""
+    """Return whether a joint, force or drive refers to a body: it is not moved by itself."""
     return any(name in bodies_referred_to(element) for _, element in all_elements(scene))
 
 
@@ -333,7 +333,7 @@ def _direction_of_separation(scene: Scene, name: str, other: str, static: Elemen
 
 
 def _is_free_at(scene: Scene, name: str, shift: Point) -> bool:
-    """Tell whether the bounding disc of a body, moved by a vector in m, overlaps no others and no static elements.
+    """Return whether the bounding disc of a body, moved by a vector in m, overlaps no others and no static elements.
 
     An element that it already touches, such as the one that it is moved out of, does not count.
     """

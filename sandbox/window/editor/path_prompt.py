@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pygame
 
-from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import FAINT, INK, PANEL_RAISED, SKY, WARNING
 from sandbox.window.render.text import draw_box, draw_text, wrap_text
+from sandbox.window.ui.text_edit import TextEdit, draw_text_edit
 
 WIDTH = 520
 """px at UI scale 1"""
@@ -35,7 +35,7 @@ class PathPrompt:
             elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
                 return self._path()
             else:
-                self._edit.press(event.key, event.mod)
+                self._edit.press(event)
         return None
 
     def _path(self) -> Path | None:

@@ -175,7 +175,7 @@ def _polyline_distance(points: tuple[Point, ...], closed: bool, x: FloatArray, y
 
 
 def _is_inside(corners: tuple[Point, ...], point: Point) -> bool:
-    """Tell whether a point is inside a polygon, by the number of crossings."""
+    """Return whether a point is inside a polygon, by the number of crossings."""
     inside, (x, y) = False, point
     for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
         if (ay > y) != (by > y) and x < ax + (y - ay) * (bx - ax) / (by - ay):

@@ -5,7 +5,6 @@ Rows are positions and values, not widgets: a scene has hundreds of them, and on
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import pygame
@@ -15,8 +14,11 @@ from sandbox.window.editor.property_rows import (
     DIMMED,
     TYPED_KINDS,
     VALUE_SIZE,
+    FieldEdit,
     PropertyRow,
     PropertySection,
+    RejectedInput,
+    RowId,
     draw_check_box,
     draw_choice,
     draw_heading_button,
@@ -26,7 +28,6 @@ from sandbox.window.editor.property_rows import (
     shown_text,
     text_room,
 )
-from sandbox.window.editor.text_edit import TextEdit, draw_text_edit
 from sandbox.window.render.palette import (
     FAINT,
     INK,
@@ -37,6 +38,7 @@ from sandbox.window.render.palette import (
 )
 from sandbox.window.render.text import draw_hint, draw_text, ellipsis, text_size, wrap_text
 from sandbox.window.ui.panel import MAX_WIDTH_FRACTION, PANEL_WIDTH, SCROLL_STEP
+from sandbox.window.ui.text_edit import TextEdit, draw_text_edit
 
 LABEL_SIZE, UNIT_SIZE, ERROR_SIZE, NOTE_SIZE = 12.0, 10.5, 11.0, 12.0
 """px at UI scale 1, font sizes"""
@@ -45,38 +47,6 @@ ROW_HEIGHT, BOX_HEIGHT, HEADING_HEIGHT, SECTION_GAP = 24, 20, 26, 8
 MAX_ERROR_LINES, MAX_NOTE_LINES = 5, 8
 _ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
 _MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
-
-
-class RowId(NamedTuple):
-    """Identity of a row: the keys of its section and of its field."""
-
-    section: str
-    field: str
-
-
-@dataclass
-class FieldEdit:
-    """Editing of a field."""
-
-    row: RowId
-    edit: TextEdit
-    initial: str
-    """text before the editing, which need not be applied"""
-    is_touched: bool = False
-    """whether the user has typed or deleted something"""
-    shift: int = 0
-    """px by which the text is moved to the left, so that the caret is in the box"""
-
-
-@dataclass(frozen=True)
-class RejectedInput:
-    """Input that was not applied, and the reason."""
-
-    text: str | None
-    """typed text; None for check boxes and choices"""
-    error: str
-    value: Any
-    """value of the field at that time"""
 
 
 class PanelItem(NamedTuple):
@@ -429,9 +399,7 @@ class PropertyPanel:
                 self._end_editing()
         elif event.key == pygame.K_TAB and not is_command:
             self._go(-1 if event.mod & pygame.KMOD_SHIFT else 1)
-        elif editing.edit.press(event.key, event.mod):
-            editing.is_touched |= event.key in (pygame.K_BACKSPACE, pygame.K_DELETE)
-        elif is_command or pygame.K_F1 <= event.key <= pygame.K_F12:
+        elif not editing.press(event) and (is_command or pygame.K_F1 <= event.key <= pygame.K_F12):
             return False
         return True
 

@@ -1,7 +1,7 @@
-"""Rows of the property panel: a field with its present value, its text, and the drawing of check boxes and choices."""
+"""Rows of the property panel: a field with its value, its text and its editing, and how check boxes are drawn."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import pygame
 
@@ -18,6 +18,7 @@ from sandbox.window.render.palette import (
     mix_colours,
 )
 from sandbox.window.render.text import draw_text, ellipsis
+from sandbox.window.ui.text_edit import TextEdit
 
 VALUE_SIZE = 11.5
 """px at UI scale 1, font size of values"""
@@ -54,6 +55,53 @@ class PropertySection:
     """whether it is initially unfolded"""
     button: Literal["", "add", "remove"] = ""
     """button of its heading: a plus that adds a table of its kind, or a cross that removes what it shows"""
+
+
+class RowId(NamedTuple):
+    """Identity of a row: the keys of its section and of its field."""
+
+    section: str
+    field: str
+
+
+@dataclass
+class FieldEdit:
+    """Editing of a field."""
+
+    row: RowId
+    edit: TextEdit
+    initial: str
+    """text before the editing, which need not be applied"""
+    is_touched: bool = False
+    """whether the user has typed or deleted something"""
+    shift: int = 0
+    """px by which the text is moved to the left, so that the caret is in the box"""
+
+    def press(self, event: pygame.event.Event) -> bool:
+        """Process the press of a key; return whether the text uses it.
+
+        Raises:
+            ClipboardError: the system gives no access to its clipboard. The text is unchanged.
+        """
+        before = self.edit.text
+        if not self.edit.press(event):
+            return False
+        if event.key in (pygame.K_BACKSPACE, pygame.K_DELETE):
+            self.is_touched = True
+        elif self.edit.text != before:
+            self.is_touched = self.edit.can_undo
+        return True
+
+
+@dataclass(frozen=True)
+class RejectedInput:
+    """Input that was not applied, and the reason."""
+
+    text: str | None
+    """typed text; None for check boxes and choices"""
+    error: str
+    value: Any
+    """value of the field at that time"""
 
 
 def is_typed(row: PropertyRow) -> bool:

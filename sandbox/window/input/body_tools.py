@@ -213,7 +213,7 @@ def _find_free_position(live: LiveView, body: Ball | Box) -> Ball | Box:
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:
-    """Return the number of manual changes: bodies added, removed and moved, parameters set.
+    """Return the number of manual changes: bodies added, removed, moved, pulled and nudged, parameters set.
 
     Args:
         actions: of a session.
@@ -222,8 +222,13 @@ def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -
     count, last = 0, ""
     for action in actions:
         match action:
-            case Spawn() | Remove():
+            case Spawn() | Remove() | Impulse():
                 now = ""
+            case Pull(target=None):  # the release of a pull
+                last = ""
+                continue
+            case Pull():
+                now = f"pull {action.body}"
             case Move():
                 now = "" if action.body == moved_by_keys else f"move {action.body}"
             case SetParameter():
@@ -232,15 +237,16 @@ def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -
                 last = ""
                 continue
         moved_so = isinstance(action, Move) and not now
-        count += not moved_so and (not now or now != last)  # a drag consists of many moves
+        count += not moved_so and (not now or now != last)  # a drag consists of many moves or pulls
         last = now
     return count
 
 
-def describe_loss(count: int, how: str) -> str:
-    """Return the confirmation question for the loss of `count` manual changes."""
+def describe_loss(count: int, how: str, kept: int = 0) -> str:
+    """Return the confirmation question for the loss of `count` manual changes, while `kept` others remain."""
     changes = "1 hand-made change" if count == 1 else f"{count:,} hand-made changes"
-    return f"{changes} will be lost: {how}, Ctrl+S saves the session"
+    rest = "" if not kept else " (1 setting stays)" if kept == 1 else f" ({kept:,} settings stay)"
+    return f"{changes} will be lost{rest}: {how}, Ctrl+S saves the session"
 
 
 def _new_body_like(bodies: Bodies, index: int, position: Position, box: bool) -> Ball | Box:

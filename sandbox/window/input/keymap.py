@@ -1,7 +1,7 @@
 """Keymap: all key bindings of the window, and the state of the keyboard.
 
-A key is matched by its key code or its character, so that `[` also works on layouts that need AltGr for it, and by its
-scan code on layouts without Latin letters.
+A command's key is matched by its key code or its character, so that `[` also works on layouts that need AltGr for it,
+and by its scan code on layouts without Latin letters. The keys that a scene or its game binds come first (`bound_key`).
 """
 
 from collections.abc import Set as AbstractSet
@@ -144,14 +144,23 @@ _BY_CHARACTER = {character: binding.command for binding in BINDINGS for characte
 
 _NAMED = 1 << 30
 """bit that SDL sets in key codes without a character, such as F1"""
-_BOARD = {
+_US_KEYS = {
     **{pygame.KSCAN_A + k: pygame.K_a + k for k in range(26)},
+    **{pygame.KSCAN_1 + k: pygame.K_1 + k for k in range(9)},
+    pygame.KSCAN_0: pygame.K_0,
+    pygame.KSCAN_GRAVE: pygame.K_BACKQUOTE,
+    pygame.KSCAN_MINUS: pygame.K_MINUS,
+    pygame.KSCAN_EQUALS: pygame.K_EQUALS,
     pygame.KSCAN_LEFTBRACKET: pygame.K_LEFTBRACKET,
     pygame.KSCAN_RIGHTBRACKET: pygame.K_RIGHTBRACKET,
-    pygame.KSCAN_PERIOD: pygame.K_PERIOD,
+    pygame.KSCAN_BACKSLASH: pygame.K_BACKSLASH,
+    pygame.KSCAN_SEMICOLON: pygame.K_SEMICOLON,
+    pygame.KSCAN_APOSTROPHE: pygame.K_QUOTE,
     pygame.KSCAN_COMMA: pygame.K_COMMA,
+    pygame.KSCAN_PERIOD: pygame.K_PERIOD,
+    pygame.KSCAN_SLASH: pygame.K_SLASH,
 }
-"""Key codes of the US layout by scan code."""
+"""Key codes of the US layout by scan code, of the keys that type a character."""
 
 
 def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
@@ -171,7 +180,7 @@ def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset
         return None
     if control and not alt:
         return _BY_KEY.get((key, _CTRL))
-    if any(code in claimed and code not in GLOBAL for code in (key, event.key)):
+    if bound_key(event, claimed - GLOBAL) is not None:
         return None
     plain = not (control or alt)
     if character in _BY_CHARACTER and (plain or ord(character) != key):
@@ -184,26 +193,62 @@ def latin_key(event: pygame.event.Event) -> int:
     """Return the key code; on a layout without Latin letters, the US key code of the scan code."""
     key = int(event.key)
     foreign = key > 0x24F and not key & _NAMED  # beyond the Latin blocks of Unicode
-    return _BOARD.get(int(getattr(event, "scancode", 0)), key) if foreign else key
+    return _us_key(event, key) if foreign else key
+
+
+def bound_key(event: pygame.event.Event, bound: AbstractSet[int]) -> int | None:
+    """Return which key that a scene or game binds is pressed, by the character on the key, else by its place.
+
+    The place counts on keys without a Latin letter or a digit, as other layouts have signs elsewhere or only with
+    Shift: at the place of `/`, Russian keyboards have `.`, and German ones `-`. A letter has a key of its own on all
+    layouts with Latin letters, so that a sign with a command keeps it at the place of a letter.
+
+    Args:
+        event: a key press.
+        bound: key codes.
+    """
+    key = int(event.key)
+    if key in bound:
+        return key
+    character = "" if key & _NAMED else chr(key)
+    if not character or (character.isascii() and character.isalnum()):
+        return None
+    place = _us_key(event, key)
+    has_command = character in _BY_CHARACTER and chr(place).isalpha()
+    return place if place in bound and not has_command else None
+
+
+def _us_key(event: pygame.event.Event, key: int) -> int:
+    """Return the key code that the US layout has at the scan code of an event; `key` if it has none."""
+    return _US_KEYS.get(int(getattr(event, "scancode", 0)), key)
+
+
+def pressed_key(event: pygame.event.Event) -> tuple[bool, int]:
+    """Return what press and release of a key have in common: the scan code, as the layout may change in between.
+
+    Events without a scan code, such as those of a virtual keyboard, have their key code.
+    """
+    scancode = int(getattr(event, "scancode", 0))
+    return (True, scancode) if scancode else (False, int(event.key))
 
 
 class Keyboard:
     """Set of pressed keys, which suppresses key repeat for commands that do not repeat."""
 
     def __init__(self) -> None:
-        self._held: set[int] = set()
+        self._held: set[tuple[bool, int]] = set()
         self.is_repeat = False
         """whether the last KEYDOWN was a key repeat"""
 
     def command(self, event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
         """Return the command of an event, or None. Every event must be passed, so that releases are tracked."""
         if event.type == pygame.KEYUP:
-            self._held.discard(event.key)
+            self._held.discard(pressed_key(event))
         elif event.type == pygame.WINDOWFOCUSLOST:  # another window receives the key releases
             self._held.clear()
         if event.type != pygame.KEYDOWN:
             return None
-        self.is_repeat = event.key in self._held
-        self._held.add(event.key)
+        self.is_repeat = pressed_key(event) in self._held
+        self._held.add(pressed_key(event))
         command = command_for(event, claimed)
         return None if self.is_repeat and command not in REPEATING else command

@@ -18,6 +18,8 @@ class ActionLog:
         self._actions = list(actions)
         self.done = 0
         """number of applied actions"""
+        self.saved: tuple[Action, ...] = ()
+        """all actions at the last save"""
 
     @property
     def past(self) -> tuple[Action, ...]:
@@ -28,6 +30,14 @@ class ActionLog:
     def all(self) -> tuple[Action, ...]:
         """All actions, including those in the future."""
         return tuple(self._actions)
+
+    @property
+    def unsaved(self) -> tuple[Action, ...]:
+        """The actions since the last save, also those in the future."""
+        saved, done = (
+            [action for action in actions if not _only_restores(action)] for actions in (self.saved, self._actions)
+        )
+        return tuple(done[len(saved) :] if done[: len(saved)] == saved else done)
 
     @property
     def has_future(self) -> bool:
@@ -96,6 +106,11 @@ def insert_switch(actions: tuple[Action, ...], index: int, time: float) -> tuple
     """Return actions with the restoring of a checkpoint inserted at an index, unless it is already there; time in s."""
     switch = Switch(time=time, resumes=True)
     return actions if actions[:index][-1:] == (switch,) else (*actions[:index], switch, *actions[index:])
+
+
+def _only_restores(action: Action) -> bool:
+    """Return whether an action restores a checkpoint, which changes nothing."""
+    return isinstance(action, Switch) and action.engine is None and not action.settings
 
 
 class SceneHistory:

@@ -89,6 +89,10 @@ class ShadowRun:
         self.simulation.close()
 
 
+GHOST_ENGINES = ("exact", "reference", "pymunk")
+"""engines of the ghost, the preferred one first; others follow"""
+
+
 def create_ghost(point: Checkpoint, step: int = 0, excluded: Collection[str] = ()) -> tuple[ShadowRun, str]:
     """Return the ghost of a session, on `exact` or else the first engine that can continue, and the other refusals.
 
@@ -101,7 +105,7 @@ def create_ghost(point: Checkpoint, step: int = 0, excluded: Collection[str] = (
         ActionError: no other engine can continue from here.
     """
     reasons: list[str] = []
-    for name in ("exact", "reference", "pymunk", *ENGINES):
+    for name in (*GHOST_ENGINES, *ENGINES):
         if name == point.engine or name in excluded or name not in ENGINES:
             continue
         try:

@@ -22,6 +22,8 @@ BYTES_PER_BODY, BYTES_PER_FRAME = 6 * 8 + 1, 1100
 MIN_KEYFRAME_INTERVAL = 30
 """states stored between two checkpoints"""
 MAX_KEYFRAMES = 64
+MAX_FINE_STEPS, MAX_FINE_BYTES = 512, 32 * 2**20
+"""the last steps of which each state is stored, also those between two pictures, and bound of their size"""
 
 
 class Keyframe(NamedTuple):
@@ -78,6 +80,7 @@ class History:
         self._steps: list[int] = []
         self._frames: list[Frame] = []
         self._bytes = 0
+        self._fine: dict[int, Frame] = {}  # of the last steps, between those above
         self._keyframes: list[Keyframe] = []
         self.checkpoints_enabled = True
         """False once a checkpoint has led to another state than a replay from the start"""
@@ -113,6 +116,13 @@ class History:
         if self._bytes > MAX_BYTES and len(self._steps) > 2:
             self._thin()
 
+    def store_fine(self, step: int, frame: Frame) -> None:
+        """Store a state between two pictures for a while, so that single steps back can show it."""
+        self._fine.setdefault(step, frame)
+        kept = max(min(MAX_FINE_STEPS, MAX_FINE_BYTES // _bytes(frame)), 1)
+        while len(self._fine) > kept:
+            del self._fine[next(iter(self._fine))]
+
     def _thin(self) -> None:
         half = len(self._steps) // 2
         kept = [*range(0, half, 2), *range(half, len(self._steps))]
@@ -124,7 +134,9 @@ class History:
     def get(self, step: int) -> Frame | None:
         """Return the state after a step, if it is stored."""
         at = bisect_left(self._steps, step)
-        return self._frames[at] if at < len(self._steps) and self._steps[at] == step else None
+        if at < len(self._steps) and self._steps[at] == step:
+            return self._frames[at]
+        return self._fine.get(step)
 
     def next_stored(self, step: int) -> int | None:
         """Return the first step after a step whose state is stored."""
@@ -146,6 +158,8 @@ class History:
 
     def last_at(self, step: int) -> tuple[int, Frame] | None:
         """Return the last stored state at or before a step, and its step."""
+        if step in self._fine:
+            return step, self._fine[step]
         at = bisect_right(self._steps, step) - 1
         return (self._steps[at], self._frames[at]) if at >= 0 else None
 
@@ -181,6 +195,7 @@ class History:
     def discard(self, steps: list[int]) -> None:
         """Discard the states of some steps."""
         discarded = set(steps)
+        self._fine = {step: frame for step, frame in self._fine.items() if step not in discarded}
         kept = [k for k, step in enumerate(self._steps) if step not in discarded]
         self._steps, self._frames = [self._steps[k] for k in kept], [self._frames[k] for k in kept]
         self._bytes = sum(map(_bytes, self._frames))
@@ -190,6 +205,7 @@ class History:
         first = bisect_right(self._steps, step)
         self._bytes -= sum(map(_bytes, self._frames[first:]))
         del self._steps[first:], self._frames[first:]
+        self._fine = {each: frame for each, frame in self._fine.items() if each <= step}
         self._keyframes = [keyframe for keyframe in self._keyframes if keyframe.step <= step]
 
 

@@ -1,5 +1,6 @@
 """Interactive view of a session: drives it in real time, seeks in time slices, and shows any stored state."""
 
+import math
 from collections.abc import Iterator, Sequence
 from time import perf_counter
 
@@ -21,6 +22,10 @@ from sandbox.window.playback.snapshot import BreakNotifier, Snapshot, active_thr
 
 SEEK_BUDGET = 0.04
 """s, computation time of a seek per picture"""
+SEEK_DELAY = 0.25
+"""s after which a seek begins whose target is stored, and so is displayed at once: another step back may follow"""
+FOLLOW_BUDGET, IDLE_FOLLOW_BUDGET = 0.003, 0.02
+"""s, computation time per picture of the follower of the session, while it plays and while it is paused"""
 MIN_STEP_BUDGET, MAX_STEP_BUDGET = 0.012, 0.03
 """s, bounds of the computation time of steps per picture, which is as long as everything else takes. If steps need
 more, the scene runs slower than selected."""
@@ -35,20 +40,22 @@ class Seek:
         """target step of the last seek"""
         self.fraction = 0.0
         """completed fraction of the replay"""
+        self.begins_at = 0.0
+        """time (`perf_counter`, s) from which on it advances"""
 
     @property
     def is_active(self) -> bool:
         """Whether the target has not been reached yet."""
         return self._steps is not None
 
-    def start(self, session: Session, step: int) -> None:
-        """Start a seek to a step; it replaces an active one."""
-        self.fraction, self.target = 0.0, step
+    def start(self, session: Session, step: int, delay: float) -> None:
+        """Start a seek to a step after a delay, s; it replaces an active one."""
+        self.fraction, self.target, self.begins_at = 0.0, step, perf_counter() + delay
         self._steps = session.seek(step)
 
-    def advance(self) -> bool:
-        """Replay for `SEEK_BUDGET` seconds; return whether the target is reached."""
-        until = perf_counter() + SEEK_BUDGET
+    def advance(self, budget: float) -> bool:
+        """Replay for a time, s; return whether the target is reached."""
+        until = perf_counter() + budget
         while self._steps is not None and perf_counter() < until:
             try:
                 self.fraction = next(self._steps)
@@ -218,11 +225,15 @@ class LiveView:
     def update(self, elapsed: float, paused: bool) -> None:
         """Make the steps that are due after elapsed real time, s, or a part of a seek."""
         if self._seek.is_active:
-            self._advance_seek()
+            if not paused or perf_counter() >= self._seek.begins_at:
+                self._advance_seek()
+            else:
+                self._follow(IDLE_FOLLOW_BUDGET, is_idle=True)
             return
         if paused or self.session.ended is not None:
             self.clock.reset()
             self.session.reset_interpolation()
+            self._follow(IDLE_FOLLOW_BUDGET, is_idle=True)
             return
         dt = self.session.settings.dt
         asked = self.clock.steps_due(elapsed, dt)
@@ -241,6 +252,12 @@ class LiveView:
             self.clock.reset()
         else:
             self.clock.record_steps(elapsed, made, asked, dt)
+        if made == asked:
+            self._follow(FOLLOW_BUDGET, is_idle=False)
+
+    def _follow(self, budget: float, *, is_idle: bool) -> None:
+        """Advance the follower of the session, from which steps back continue, for a time, s."""
+        self.session.follow(perf_counter() + budget, is_idle=is_idle)
 
     def step(self) -> None:
         """Make one step."""
@@ -282,7 +299,7 @@ class LiveView:
         Raises:
             ActionError: it cannot be applied; nothing has changed then.
         """
-        self._check_not_seeking()
+        self.finish_seek()
         before = self.session.replaced
         self._inform_companions([self.session.apply(action)])
         self._notify_replaced(before)
@@ -294,7 +311,7 @@ class LiveView:
         Raises:
             ActionError: the engine refuses an action of the rules; nothing has changed then.
         """
-        self._check_not_seeking()
+        self.finish_seek()
         before, simulation = self.session.replaced, self.session.simulation
         try:
             actions = self.session.press(control, value)
@@ -321,7 +338,7 @@ class LiveView:
         Raises:
             ActionError: the engine cannot continue from here.
         """
-        self._check_not_seeking()
+        self.finish_seek()
         message = switch_engine(self.session, engine)
         self._restart_diagnostics(companions=True)
         return message
@@ -332,11 +349,8 @@ class LiveView:
         Args:
             index: index of the action.
             inputs: number of inputs of the game that remain; default: those before the time of that action.
-
-        Raises:
-            ActionError: another seek is active.
         """
-        self._check_not_seeking()
+        self.finish_seek()
         step, self._restart_companions = self.session.retract(index, inputs), True
         self.seek(step)
 
@@ -347,10 +361,6 @@ class LiveView:
                 self.diagnostics.apply(action)
         else:
             self.session.take_replayed_actions()  # no companion repeats them
-
-    def _check_not_seeking(self) -> None:
-        if self._seek.is_active:
-            raise ActionError("wait until the jump in time is complete")
 
     def _notify_replaced(self, before: ReplacedFuture | None) -> None:
         """Notify if the last action has replaced the actions after it."""
@@ -370,14 +380,17 @@ class LiveView:
         """Start a seek to a step. It takes one part a picture; meanwhile the nearest stored state is displayed."""
         self.clock.reset()
         self._end_notified = False
-        self._preview = self.session.history.last_at(max(step, 0))
-        self._seek.start(self.session, max(step, 0))
-        self._advance_seek()
+        step = max(step, 0)
+        self._preview = self.session.history.last_at(step)
+        is_displayed = self._preview is not None and self._preview[0] == step
+        self._seek.start(self.session, step, SEEK_DELAY if is_displayed else 0.0)
+        if not is_displayed:
+            self._advance_seek()
 
     def finish_seek(self) -> None:
         """Complete the seek, however long it takes."""
-        while self._seek.is_active:
-            self._advance_seek()
+        if self._seek.is_active:
+            self._advance_seek(math.inf)
 
     def step_back(self) -> None:
         """Start a seek to the step before."""
@@ -396,8 +409,8 @@ class LiveView:
             if step != self.session.step_number:
                 self.seek(step)
 
-    def _advance_seek(self) -> None:
-        if self._seek.advance():
+    def _advance_seek(self, budget: float | None = None) -> None:
+        if self._seek.advance(SEEK_BUDGET if budget is None else budget):
             self._preview = None
             self.session.reset_interpolation()
             self._restart_diagnostics(self._restart_companions)

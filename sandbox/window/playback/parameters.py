@@ -9,7 +9,8 @@ from sandbox.action import Action, SetParameter, Switch, heading_of
 from sandbox.engines.registry import ENGINES
 from sandbox.formatting import format_percent, format_si
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.base import BodySource, HasMaterial
+from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.description.world import DetectionName, IntegratorName, Settings
 from sandbox.window.playback.live import LiveView
 
@@ -210,8 +211,8 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
             label = f"{key} of {disc.material}"
         return Parameter(key, label, 0.0, high, value, default=default)
     if index < len(file.body_sources):
-        default = stated(file, file.body_sources[index], key)
-    return Parameter(key, label, 0.0, high, stated(scene, disc, key), default=default)
+        default = _stated(file, file.body_sources[index], key)
+    return Parameter(key, label, 0.0, high, acting(scene, disc, key), default=default)
 
 
 def _source_index(live: LiveView, picked: int | None) -> int:
@@ -224,12 +225,26 @@ def _pairs(scene: Scene, disc: BodySource | None) -> list[int]:
     return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
 
 
-def stated(scene: Scene, disc: BodySource, key: str) -> float:
-    """Return the restitution or friction of a body or else of its material; 0 if neither defines it."""
-    own: float | None = getattr(disc, key)
-    if own is None and disc.material is not None:
-        own = next((getattr(each, key) for each in scene.materials if each.name == disc.material), None)
-    return own or 0.0
+def _stated(scene: Scene, element: HasMaterial, key: str) -> float | None:
+    """Return the restitution or friction of an element or else of its material; None if neither defines it."""
+    own: float | None = getattr(element, key)
+    if own is None and element.material is not None:
+        own = next((getattr(each, key) for each in scene.materials if each.name == element.material), None)
+    return own
+
+
+def acting(scene: Scene, body: BodySource, key: str) -> float:
+    """Return the restitution or friction of a body that its contacts with static objects have.
+
+    Where neither the body nor its material states one, it is that of the other side: the largest of planes, walls and
+    posts; 0 if they state none either.
+    """
+    own = _stated(scene, body, key)
+    if own is not None:
+        return own
+    return max(
+        (_stated(scene, each, key) or 0.0 for each in scene.fixed if isinstance(each, Plane | Wall | Post)), default=0.0
+    )
 
 
 def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) -> list[Action]:

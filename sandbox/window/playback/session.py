@@ -1,10 +1,11 @@
 """Interactive simulation with undo: steps an engine, logs actions, and seeks to any step by replay.
 
-A session is its scene and its actions. Seeking backwards restores a keyframe and replays the steps and actions from
-there. On engines that can copy their state, keyframes are snapshots, from which a session continues exactly. On others
-they are checkpoints, which do not hold the contacts that an engine caches. So checkpoints are taken only after some
-time without contact, and wherever a state was seen before, the state hash of the replayed one must be the same. If it
-differs, checkpoints are disabled and the session is replayed from the start, which leads to the same states every time.
+A session is its scene and its actions. Seeking backwards restores a keyframe, or takes over the simulation that follows
+the session on engines without snapshots (`follower`), and replays the steps and actions from there. On engines that can
+copy their state, keyframes are snapshots, from which a session continues exactly. On others they are checkpoints, which
+do not hold the contacts that an engine caches. So checkpoints are taken only after some time without contact, and
+wherever a state was seen before, the state hash of the replayed one must be the same. If it differs, checkpoints are
+disabled and the session is replayed from the start, which leads to the same states every time.
 
 States that were not seen before cannot be checked so. If new steps follow a replay from a checkpoint, the restoring of
 that checkpoint therefore becomes an action of the session: a switch that changes no setting. A replay of the recording
@@ -14,25 +15,28 @@ restores the engine at the same moment.
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
-from sandbox.action import Action, ActionError, Pull, Switch
+from sandbox.action import Action, ActionError, Pull
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.session import GameSession
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
+from sandbox.window.playback.follower import Follower, FollowerSlot, advance_batch, next_action_time
 from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe, keyframe_state
 
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
-SEEK_BATCH = 16
-"""steps between two yields of `Session.seek`"""
+SEEK_BATCH, REPLAY_BATCH = 16, 256
+"""steps between two yields of `Session.seek`; the second where the replay is certain to lead to the same states"""
+BATCH_ADVANTAGE = 4
+"""factor by which a replay in batches is faster than one that is compared: 2 to 8 on pymunk, measured"""
 SEEK_FINE_STEPS = 64
 """steps before the target of a seek that are stored one by one, so that stepping further back needs no replay"""
 MAX_PENDING_CONTACTS = 64
@@ -84,6 +88,7 @@ class Session:
             Refusal: the engine cannot run the scene.
         """
         self._start = scene, engine, settings
+        self._source: Recording | None = None
         self.ended: str | None = None
         """reason why no step can follow: divergence, exhaustion, or a logged action that the engine refuses"""
         self._exhausted = False
@@ -97,7 +102,9 @@ class Session:
         self.history = History()
         self._start_simulation()
 
+        self._followers = FollowerSlot(self._start, self._initial_game)
         self._contact_free = ContactFreeTimer()
+        self._step_cost = 0.0  # s, computation time of the last step
         self._origin: Keyframe | None = None  # restored by the last seek, while all that followed was seen before
         self._unconfirmed: list[int] = []
         self._off_track = False  # the present state is not one of the session
@@ -105,11 +112,20 @@ class Session:
         self._complete: tuple[int, Recording] | None = None  # the last step and the recording, before a seek backwards
         self.replaced: ReplacedFuture | None = None
         """the last part of the session that was replaced"""
-        self._saved = self._log.all
+        self.mark_saved()
         self._all_bodies = self.bodies
         self._breaks = BreakTimes(len(self.scene.links))
         self._previous = self._frame = self.simulation.frame()
         self.history.store(0, self._frame)
+
+    @classmethod
+    def of_recording(cls, recording: Recording, game: GameSession | None) -> Self:
+        """Return a session that repeats a recording; see `__init__`."""
+        session = cls(
+            recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
+        )
+        session._source = recording
+        return session
 
     # --- State ---------------------------------------------------------------------------------------------------
 
@@ -213,6 +229,7 @@ class Session:
 
     def close(self) -> None:
         """Release the resources of the engine."""
+        self._followers.discard_from(0)
         self.simulation.close()
 
     # --- Recording -----------------------------------------------------------------------------------------------
@@ -230,7 +247,7 @@ class Session:
         if origin is not None and self._unconfirmed:
             actions = insert_switch(actions, origin.actions, origin.time)
         scene, engine, settings = self._start
-        return Recording(
+        found = Recording(
             scene=scene,
             engine=engine,
             settings=scene.solver if settings is None else settings,
@@ -240,22 +257,25 @@ class Session:
             presses=() if self.game is None else self.game.presses,
             score=None if self.game is None else self.game.rules.score,
         )
+        source = self._source
+        if source is None or source.game is None:
+            return found
+        is_whole = found.actions == source.actions and self._step == round(source.duration / self.settings.dt)
+        program = RecordedGame(source.game.omitted, source.game.inexact)  # a changed session has another end
+        return replace(found, game=source.game if is_whole else program)
 
     @property
     def unsaved_actions(self) -> tuple[Action, ...]:
         """The actions since the start or the last save, also those later than now."""
-        saved, done = (
-            [action for action in actions if not _only_restores(action)] for actions in (self._saved, self._log.all)
-        )
-        return tuple(done[len(saved) :] if done[: len(saved)] == saved else done)
+        return self._log.unsaved
 
     def mark_saved(self) -> None:
         """Count all actions as saved."""
-        self._saved = self._log.all
+        self._log.saved = self._log.all
 
     def mark_unsaved(self) -> None:
         """Count all actions as unsaved."""
-        self._saved = ()
+        self._log.saved = ()
 
     # --- Stepping ------------------------------------------------------------------------------------------------
 
@@ -264,7 +284,8 @@ class Session:
 
         Args:
             steps: how many, at most.
-            until: the time (`perf_counter`, s) by which to stop, after one step at least.
+            until: the time (`perf_counter`, s) before which to stop, after one step at least; the next step is expected
+                to take as long as the last one did.
             hold: whether to stop as soon as the rules wait for the player, also before the first step.
 
         Raises:
@@ -272,16 +293,25 @@ class Session:
         """
         made, last = 0, False
         while made < steps and self.ended is None and not last and not (hold and self.waiting):
-            last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
+            began = perf_counter()
+            # The state before the last step is kept for interpolation, so that step must be known beforehand.
+            last = made + 1 == steps or (until is not None and began + 2.0 * self._step_cost > until)
             if last:
                 self._previous = self.simulation.frame()
+            repeated = 0 if until is not None else self._repeat_steps(steps - made - 1)
+            if repeated:
+                made += repeated
+                continue
             if self._step >= self.history.last_step:
                 self._commit_checkpoint()
             if not self._make_step():
                 break
+            self._step_cost = perf_counter() - began
             made += 1
             if self._origin is not None and not last:
                 self._compare_with_history(None)
+            elif not last and until is not None and self.ended is None:
+                self.history.store_fine(self._step, self.simulation.frame())
         if made:
             self._store_state()
             if hold and self.waiting:  # no later state follows to which pictures could interpolate
@@ -302,6 +332,19 @@ class Session:
             self._run_rules()
             self._replay_actions()
         return True
+
+    def _repeat_steps(self, steps: int) -> int:
+        """Repeat steps that were made before, in a batch up to the next action; return how many, 0 if not possible."""
+        steps = min(steps, self.history.last_step - 1 - self._step)
+        if steps < 2 or self.game is not None or self._origin is not None:
+            return 0
+        try:
+            made = advance_batch(self.simulation, steps, next_action_time(self._log.all, self._log.done))
+        except (Divergence, Exhaustion) as error:  # they did not occur in the run itself
+            raise ReplayMismatchError(str(error)) from None
+        self._step += made
+        self._replay_actions()
+        return made
 
     def _run_rules(self) -> None:
         """Show the state to the rules, and apply their actions; in a replay, compare them with the logged ones."""
@@ -383,6 +426,7 @@ class Session:
         self._unconfirmed.clear()
         if origin is not None and self._log.insert_switch(origin.actions, origin.time):
             self.history.count_inserted_action(origin.step)
+            self._followers.discard_from(origin.step)
 
     # --- Actions -------------------------------------------------------------------------------------------------
 
@@ -452,8 +496,21 @@ class Session:
     def _discard_from(self, step: int) -> None:
         """Discard the stored states from a step on."""
         self.history.truncate(step - 1)
+        self._followers.discard_from(step)
         self._all_bodies = self.bodies
         self._breaks.reset()
+
+    def follow(self, until: float, *, is_idle: bool) -> None:
+        """Keep the follower a short way behind the present, until a time (`perf_counter`, s).
+
+        Args:
+            until: s.
+            is_idle: whether no picture waits, so that a large scene may be started as well.
+        """
+        if self._off_track or self._origin is not None:
+            return
+        presses = () if self.game is None else self.game.all_presses
+        self._followers.advance(self._step, self.simulation, self._log.all, presses, until, is_idle=is_idle)
 
     def retract(self, index: int, inputs: int | None = None) -> int:
         """Remove the action of an index and all later ones, and the inputs since then; discard the states after it.
@@ -498,12 +555,28 @@ class Session:
             yield from self._replay_from_start(step)
 
     def _replay_to(self, step: int) -> Iterator[float]:
-        """Restore the last checkpoint before a step, and go to that step."""
-        self._restore(self.history.keyframe_before(step))
+        """Restore the last checkpoint before a step, or take over the follower, and go to that step."""
+        keyframe = self.history.keyframe_before(step)
+        if keyframe is not None and not keyframe.is_exact and self.game is None:
+            # A replay from a checkpoint is compared at each stored state; one from the start is made in batches.
+            keyframe = keyframe if (step - keyframe.step) * BATCH_ADVANTAGE < step else None
+        follower = self._followers.take(step, keyframe)
+        if follower is None:
+            self._restore(keyframe)
+        else:
+            self._continue_with(follower)
         try:
             yield from self._advance_to(step)
         except ReplayMismatchError:
             yield from self._replay_from_start(step)
+
+    def _continue_with(self, follower: Follower) -> None:
+        """Replace the simulation by the follower, which is at an earlier step."""
+        self.simulation.close()
+        self.ended, self._exhausted = None, False
+        self._step, self._log.done = follower.step, follower.done
+        self._set_simulation(follower.simulation, follower.game)
+        self._begin_replay(None)
 
     def _replay_from_start(self, step: int) -> Iterator[float]:
         """Go to a step from the start, from now on without checkpoints."""
@@ -514,9 +587,13 @@ class Session:
     def _advance_to(self, step: int) -> Iterator[float]:
         start = self._step
         while self._step < step and self.ended is None:
-            batch = SEEK_BATCH if step - self._step > SEEK_FINE_STEPS else 1
-            stored = self.history.next_stored(self._step)  # to be compared with
-            self.advance(min(batch, stored - self._step if stored is not None else batch))
+            coarse = step - SEEK_FINE_STEPS - self._step
+            if coarse > 0 and self._origin is None and self.game is None and self._step < self.history.last_step:
+                self.advance(min(REPLAY_BATCH, coarse))
+            else:
+                batch = SEEK_BATCH if coarse > 0 else 1
+                stored = self.history.next_stored(self._step)  # to be compared with
+                self.advance(min(batch, stored - self._step if stored is not None else batch))
             yield (self._step - start) / (step - start)
 
     def _restore(self, keyframe: Keyframe | None) -> None:
@@ -524,7 +601,11 @@ class Session:
         restored = self._load(keyframe)
         if keyframe is not None and not restored:
             self.history.disable_checkpoints()
-        self._origin = keyframe if restored and keyframe is not None and not keyframe.is_exact else None
+        self._begin_replay(keyframe if restored and keyframe is not None and not keyframe.is_exact else None)
+
+    def _begin_replay(self, origin: Keyframe | None) -> None:
+        """Start to repeat the session from the present simulation, which comes from a checkpoint `origin`."""
+        self._origin = origin
         self._unconfirmed.clear()
         self._off_track = False
         self._contact_free = ContactFreeTimer()
@@ -568,8 +649,3 @@ class Session:
         before, self.game = self.game, None if game is None else game.copy()
         if self.game is not None and before is not None:
             self.game.set_presses(before.all_presses)
-
-
-def _only_restores(action: Action) -> bool:
-    """Return whether an action restores a checkpoint, which changes nothing."""
-    return isinstance(action, Switch) and action.engine is None and not action.settings

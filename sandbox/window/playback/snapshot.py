@@ -140,6 +140,8 @@ class HudStatus:
     """s, simulated"""
     paused: bool = False
     waits_for_start: bool = False
+    start_keys: str = ""
+    """the most important keys of a game that waits for its start"""
     """whether a real-time game waits for the first key"""
     question: str | None = None
     """confirmation that is asked for before data is lost"""

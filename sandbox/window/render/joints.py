@@ -42,6 +42,8 @@ SOLID_RODS = 500
 """Number of rods up to which each is drawn wider than one pixel."""
 ANCHOR_RADIUS = 3.2
 """px, radius of the mark at an anchor on the world"""
+MAX_HATCHED = 40
+"""Number of anchors on the world up to which each is drawn as a fixed support"""
 HALF_WINDINGS = 18
 """Half windings of a spring."""
 MIN_COIL_LENGTH = 20.0
@@ -113,6 +115,9 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     anchors = fast.ends[fast.links.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(anchors), 3))
     size = np.full(len(anchors), (ANCHOR_RADIUS if len(anchors) <= SOLID_RODS else 0.5 * ANCHOR_RADIUS) * view.ui_scale)
+    if len(anchors) <= MAX_HATCHED:
+        for x, y in anchors.tolist():
+            _draw_support(view, (x, y))
     discs.draw(view.surface, anchors, size, tint, CircleStyle(0.0, antialias=view.antialias))
     _draw_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
     _draw_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
@@ -128,6 +133,17 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     for k, row in enumerate(springs.ends.tolist()):
         red, green, blue = SHADES[shade[k]].tolist()
         _draw_coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
+
+
+def _draw_support(view: DrawContext, anchor: Pixel) -> None:
+    """Draw the symbol of a fixed support of statics around an anchor: a plate with hatching below it."""
+    unit, (x, y) = view.ui_scale, anchor
+    half, drop = 12.0 * unit, 7.0 * unit
+    top = y + ANCHOR_RADIUS * unit
+    draw_line(view.surface, (x - half, top), (x + half, top), SURFACE, 1.6 * unit, view.antialias)
+    for k in range(4):
+        foot = x - half + (k + 0.5) * 0.5 * half
+        draw_line(view.surface, (foot, top + drop), (foot + 0.5 * drop, top), SURFACE, 1.2 * unit, view.antialias)
 
 
 def _draw_pulleys(view: DrawContext, pulleys: JointSegments, discs: CircleRenderer) -> None:

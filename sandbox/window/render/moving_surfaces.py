@@ -9,11 +9,13 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray
+from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import surface_parts
 from sandbox.scene.description.base import BodySource, HasMaterial, Point
 from sandbox.scene.description.bodies import Compound
@@ -78,7 +80,7 @@ def _outlines(view: DrawContext) -> Iterator[MovingOutline]:
         if _is_moving(collider) and (isinstance(collider, Plane) or collider.solid):
             for points, origin in _outline_of(view, collider):
                 yield MovingOutline.of(collider, points, np.asarray(origin))
-    moving = [_has_moving_surface(element) for element in bodies.elements]
+    moving = moving_elements(bodies)
     if not any(moving):
         return
     for index in view.shown.tolist():
@@ -93,10 +95,20 @@ def _outlines(view: DrawContext) -> Iterator[MovingOutline]:
                 yield MovingOutline.of(parts[piece.part], centre + turned, centre)
 
 
+_MOVING_ELEMENTS: WeakKeyDictionary[Bodies, tuple[bool, ...]] = WeakKeyDictionary()
+
+
+def moving_elements(bodies: Bodies) -> tuple[bool, ...]:
+    """Return for each element of bodies whether a part of it has a moving surface, computed once for the bodies."""
+    found = _MOVING_ELEMENTS.get(bodies)
+    if found is None:
+        found = _MOVING_ELEMENTS[bodies] = tuple(map(_has_moving_surface, bodies.elements))
+    return found
+
+
 def _has_moving_surface(element: BodySource) -> bool:
-    if not isinstance(element, Compound):  # at once, as all elements are asked in each frame
-        return _is_moving(element)
-    return any(map(_is_moving, surface_parts([element])))
+    parts = surface_parts([element]) if isinstance(element, Compound) else (element,)
+    return any(map(_is_moving, parts))
 
 
 def _outline_of(view: DrawContext, collider: Plane | Wall | Post) -> Iterator[tuple[FloatArray, Point]]:

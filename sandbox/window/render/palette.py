@@ -3,6 +3,8 @@
 Source: M. Okabe, K. Ito, "Color Universal Design", 2008; black is omitted, as the background is dark.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -83,15 +85,20 @@ def colour_of_fixed(thing: HasMaterial, otherwise: RgbColour = NEUTRAL) -> RgbCo
     return otherwise if thing.colour is None else hex_colour(thing.colour)
 
 
-def colour_of(bodies: Bodies) -> ColourArray:
+def colour_of(bodies: Bodies, numbers: Sequence[int] | None = None) -> ColourArray:
     """Return the colours of bodies, (N, 3); adding a body does not change those of the others.
 
-    The colour of the element, or the first colour of its fade; else accents in turn; static bodies are neutral.
+    The colour of the element, or the first colour of its fade; else an accent; static bodies are neutral.
+
+    Args:
+        bodies: N of them.
+        numbers: numbers of the accents of `bodies.elements`; by default their indices.
     """
     colours = np.empty((len(bodies), 3), np.uint8)
     first = np.searchsorted(bodies.element, np.arange(len(bodies.elements) + 1))
-    for k, element in enumerate(bodies.elements):
-        start, end = int(first[k]), int(first[k + 1])
+    accents = range(len(bodies.elements)) if numbers is None else numbers
+    for index, (element, k) in enumerate(zip(bodies.elements, accents, strict=True)):
+        start, end = int(first[index]), int(first[index + 1])
         if element.colour is not None:
             colours[start:end] = hex_colour(element.colour)
         elif isinstance(element, Emitter) and element.colours is not None:

@@ -15,6 +15,8 @@ from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.accents import AccentNumbers
+from sandbox.window.render.attractions import draw_attractions
 from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
 from sandbox.window.render.draw_context import DrawContext
@@ -70,9 +72,14 @@ class BodySizes(NamedTuple):
 
 
 class Renderer:
-    """Draws snapshots of scenes. One renderer serves a window for its whole life; its caches are bounded."""
+    """Draws snapshots of scenes. One renderer serves a window for its whole life; its caches are bounded.
 
-    def __init__(self) -> None:
+    Args:
+        accents: of the elements, if they are to stay while the scene is edited; by default those of their order.
+    """
+
+    def __init__(self, accents: AccentNumbers | None = None) -> None:
+        self._accents = accents
         self._discs = CircleRenderer()
         self._points = ParticleRenderer()
         self._polygons = PolygonRenderer()
@@ -248,7 +255,8 @@ class Renderer:
         bodies, scene = snapshot.bodies, snapshot.scene
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
-        self._known, self._colours = (bodies, scene), colour_of(bodies)
+        numbers = None if self._accents is None else self._accents.update(bodies.elements)
+        self._known, self._colours = (bodies, scene), colour_of(bodies, numbers)
         ageing = LifetimeColours(bodies)
         self._ageing = ageing if len(ageing) else None
         has_rotated = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
@@ -268,6 +276,7 @@ class Renderer:
                 draw_markings(target, scene)
                 draw_lamps(target, scene)
                 draw_zones(target, scene)
+                draw_attractions(target, scene)
                 draw_static_bodies(target, scene if len(scene.layers) == 1 else on_layer(scene, 0))
             if has_bounds:
                 draw_bounds(target, scene.world.bounds)
@@ -326,8 +335,8 @@ EDGE_COLOUR = mix_colours(SKY, INK, 0.25)
 class InsetRenderer:
     """Draws the inset of a scene that defines one."""
 
-    def __init__(self) -> None:
-        self._picture = Renderer()
+    def __init__(self, accents: AccentNumbers | None = None) -> None:
+        self._picture = Renderer(accents)
         self._surface: pygame.Surface | None = None
 
     def draw(

@@ -16,6 +16,7 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import Parameter, SessionParameters
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.snapshot import OVERLAYS, HudStatus
+from sandbox.window.render.accents import AccentNumbers
 from sandbox.window.render.grid import scale_rect
 from sandbox.window.render.palette import BACKGROUND, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
@@ -52,9 +53,12 @@ class Gui:
         self.scene_browser: SceneBrowser | None = None
         """None while closed"""
         self._high_scores = HighScoreDialog()
+        self._film: pygame.Surface | None = None  # picture for films, of the size of the window
         self._timeline = Timeline()
         self._graph = EnergyGraph()
-        self._renderer, self._inset = Renderer(), InsetRenderer()
+        self.accents = AccentNumbers()
+        """colours of the bodies of the open scene, also while it is edited"""
+        self._renderer, self._inset = Renderer(self.accents), InsetRenderer(self.accents)
         self._sounds = Sounds()
         self._parameters = SessionParameters()
         self._size = size
@@ -74,6 +78,7 @@ class Gui:
         self._graph.clear()
         self._panel_inputs = ()
         if not same:
+            self.accents.clear()
             self._announces_keys = True
 
     def announce_keys(self, app_state: AppState) -> None:
@@ -156,6 +161,7 @@ class Gui:
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
         """Return the layout of the score panel, cached for the last arguments."""
+        display = display._replace(can_restart=not self._high_scores.is_typing)
         arguments = display, self.area, self._hud_width(show), self.ui_scale
         if self._score is None or self._score[0] != arguments:
             self._score = arguments, layout_score(*arguments)
@@ -322,6 +328,23 @@ class Gui:
                 app_state.key_bindings.help_rows,
                 app_state.key_bindings.gamepad_rows if self.has_gamepad else (),
             )
+
+    def film_picture(self, camera: Camera, app_state: AppState) -> pygame.Surface | None:
+        """Return a picture for films: scene and score, without panel, messages and state; None if no scene is visible.
+
+        Args:
+            camera: camera of the window.
+            app_state: the application state.
+        """
+        show = app_state.view
+        if show is None or self.scene_browser is not None:
+            return None
+        if self._film is None or self._film.get_size() != self._size:
+            self._film = pygame.Surface(self._size)
+        display = None if app_state.host is None else self._display_of(app_state.host)
+        self._draw_scene(self._film, camera, app_state, show, display, {})
+        self._draw_game(self._film, app_state, show, display, {})
+        return self._film.subsurface(self.area)
 
     def _draw_scene(
         self,

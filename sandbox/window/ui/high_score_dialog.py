@@ -1,18 +1,23 @@
 """High-score dialog: asks for initials after a game with a score among the ten best, and lists the scores."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pygame
 
+from sandbox.games.contract import HasRanking
 from sandbox.games.high_scores import BEST, LETTERS, Entry, HighScores, initials_of, opened, table_of
 from sandbox.window.game_host import GameHost
+from sandbox.window.input.keymap import latin_key
 from sandbox.window.render.palette import FAINT, GREEN, INK
 from sandbox.window.render.text import draw_box, draw_text, text_size
+from sandbox.window.ui.text_edit import TextEdit, is_text_shortcut
 
 TEXT_SIZE = 15.0
 """px at UI scale 1"""
 MIN_DELAY_S = 0.8
 """s after the end of the game during which keys are ignored, as the player may still be pressing keys of the game"""
+FIRST_FUNCTION_KEY = 1 << 30
+"""key codes from here on belong to keys without a character, such as F1 and the arrows"""
 ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
 
 
@@ -27,19 +32,14 @@ class HighScoreEntry:
     """1 is the best"""
     others: tuple[Entry, ...] = ()
     """scores in the file before this one is saved"""
-    letters: str = ""
+    edit: TextEdit = field(default_factory=lambda: TextEdit("", clean=_initials, max_length=LETTERS))
     saved: tuple[Entry, ...] | None = None
     """scores in the file after this one was saved; None before"""
 
-    def type(self, text: str) -> None:
-        """Append a letter; any other text is ignored."""
-        letter = text.upper()
-        if len(letter) == 1 and len(self.letters) < LETTERS and initials_of(letter) == letter:
-            self.letters += letter
-
-    def backspace(self) -> None:
-        """Remove the last letter."""
-        self.letters = self.letters[:-1]
+    @property
+    def letters(self) -> str:
+        """Initials typed so far."""
+        return self.edit.text
 
     def save(self) -> None:
         """Save the score to the file.
@@ -57,6 +57,12 @@ class HighScoreEntry:
             return self.saved
         own = Entry(self.letters.ljust(LETTERS, "_"), self.score)
         return (*self.others[: self.rank - 1], own, *self.others[self.rank - 1 :])[:BEST]
+
+
+def _initials(text: str) -> str:
+    """Return the characters of a text that initials can have, as capital letters."""
+    letters = (letter.upper() for letter in text)
+    return "".join(letter for letter in letters if len(letter) == 1 and initials_of(letter) == letter)
 
 
 class HighScoreDialog:
@@ -81,6 +87,8 @@ class HighScoreDialog:
         return notes
 
     def _new_entry(self, host: GameHost) -> HighScoreEntry | None:
+        if isinstance(host.rules, HasRanking) and not host.rules.is_ranked:
+            return None
         try:
             scores = opened()
             if scores.notice is not None:
@@ -92,10 +100,22 @@ class HighScoreDialog:
             self._notes.append(f"high scores unavailable: {error}")
             return None
 
+    @property
+    def is_typing(self) -> bool:
+        """Whether letters are typed as initials, so that they are no commands."""
+        return self.entry is not None and self.entry.saved is None
+
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Process a key press; return whether it was consumed."""
+        """Process a key press; return whether it was consumed.
+
+        Raises:
+            ClipboardError: a text was to be copied or pasted, and the system gives no access to its clipboard.
+        """
         entry = self.entry
-        if entry is None or event.type != pygame.KEYDOWN or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
+        if entry is None or event.type != pygame.KEYDOWN:
+            return False
+        is_shortcut = is_text_shortcut(event) and entry.saved is None
+        if event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT) and not is_shortcut:
             return False
         if entry.saved is not None:
             if event.key not in (*ENTER_KEYS, pygame.K_ESCAPE):
@@ -104,17 +124,20 @@ class HighScoreDialog:
             return True
         if pygame.time.get_ticks() - self._opened_at < 1000 * MIN_DELAY_S:
             return True
-        if event.key in ENTER_KEYS:
+        if is_shortcut:
+            entry.edit.press(event)
+        elif event.key in ENTER_KEYS:
             if entry.letters:  # Enter may be a game key that is still being pressed
                 self._save(entry)
         elif event.key == pygame.K_ESCAPE:
             self.entry = None
         elif event.key == pygame.K_BACKSPACE:
-            entry.backspace()
+            entry.edit.delete(-1)
         elif event.unicode and event.unicode.isprintable():
-            entry.type(event.unicode)
-        else:
-            return False
+            key = latin_key(event)  # a layout without Latin letters cannot type initials
+            entry.edit.insert(event.unicode if key == event.key else chr(key))
+        else:  # keys of characters are no commands here, whatever text an input method makes of them
+            return bool(event.key < FIRST_FUNCTION_KEY)
         return True
 
     def _save(self, entry: HighScoreEntry) -> None:

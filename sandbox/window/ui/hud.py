@@ -204,7 +204,8 @@ def draw_hud(
     if status.question is not None:
         draw_notice(surface, status.question, area, size, WARNING)
     elif status.waits_for_start:
-        draw_notice(surface, "Press Space to start", area, 1.5 * size, SKY)
+        on_field = area if field is None or not area.colliderect(field) else area.clip(field)
+        draw_notice(surface, "Press Space to start", on_field, 1.5 * size, SKY, status.start_keys)
     elif status.out_of_sight is not None:
         draw_notice(surface, status.out_of_sight, area, size, SKY)
     return nothing
@@ -259,14 +260,24 @@ def draw_mark(
             pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
 
 
-def draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: RgbColour) -> None:
-    """Draw a notice in the centre of the area."""
+def draw_notice(
+    surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: RgbColour, detail: str = ""
+) -> None:
+    """Draw a notice in the centre of the area, with details below it in small letters."""
     lines = wrap_text(text, size, area.width - 2 * size, 3, bold=True)
-    line_height = round(1.4 * size)
-    width = max(text_size(each, size, bold=True)[0] for each in lines)
-    rect = pygame.Rect(0, 0, width + 2 * round(size), len(lines) * line_height + round(size))
+    small = 0.62 * size
+    details = wrap_text(detail, small, area.width - 2 * size, 4) if detail else ()
+    line_height, small_height = round(1.4 * size), round(1.5 * small)
+    width = max(
+        *(text_size(each, size, bold=True)[0] for each in lines), *(text_size(each, small)[0] for each in details), 0
+    )
+    height = len(lines) * line_height + len(details) * small_height + round(size)
+    rect = pygame.Rect(0, 0, width + 2 * round(size), height)
     rect.center = area.center
     draw_box(surface, rect, 0.5 * size, opacity=244, edge=edge)
+    for k, each in enumerate(details):
+        y = rect.top + 0.5 * size + len(lines) * line_height + (k + 0.5) * small_height
+        draw_text(surface, each, (rect.centerx, y), small, FAINT, "center")
     for k, each in enumerate(lines):
         position = rect.centerx, rect.top + 0.5 * size + (k + 0.5) * line_height
         draw_text(surface, each, position, size, INK, "center", bold=True)

@@ -18,10 +18,12 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
+from sandbox.window.input.keymap import latin_key
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY, WARNING
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.ui.text_edit import TextEdit, draw_text_edit, is_text_shortcut
 from sandbox.window.view_bounds import should_rotate, view_bounds
 
 MAX_PREVIEW_BODIES = 40
@@ -164,8 +166,8 @@ class SceneBrowser:
     def __init__(self, scenes: Sequence[tuple[str, Path]]) -> None:
         """Create a browser of scenes, given as (name, file); a name is, for example, `tutorial/bounce`."""
         self.cards = [SceneCard(name, Path(path)) for name, path in scenes]
-        self.typed = ""
-        """filter text"""
+        self._edit = TextEdit("", max_length=MAX_FILTER_LENGTH)
+        self._shift = 0  # px by which the filter is moved to the left
         self.chosen = 0
         """index among the matching cards"""
         self.confirmed: Path | None = None
@@ -183,6 +185,11 @@ class SceneBrowser:
         self._size = 0, 0
 
     @property
+    def typed(self) -> str:
+        """Filter text."""
+        return self._edit.text
+
+    @property
     def shown(self) -> list[SceneCard]:
         """The cards that match the filter; exact matches of name or title come first."""
         words = self.typed.casefold().split()
@@ -194,7 +201,11 @@ class SceneBrowser:
         self.confirmed, self._note = path, note
 
     def handle_event(self, event: pygame.event.Event) -> Path | None:
-        """Process an event; return the file of the scene that it chooses, if any."""
+        """Process an event; return the file of the scene that it chooses, if any.
+
+        Raises:
+            ClipboardError: a text was to be copied or pasted, and the system gives no access to its clipboard.
+        """
         if event.type == pygame.KEYDOWN:
             return self._key(event)
         if event.type == pygame.MOUSEWHEEL:
@@ -223,7 +234,10 @@ class SceneBrowser:
         control = getattr(event, "mod", 0) & pygame.KMOD_CTRL
         letter = str(getattr(event, "unicode", ""))
         self._follow = True
-        if event.key == pygame.K_ESCAPE or (control and event.key == pygame.K_o):
+        typed = self.typed
+        if is_text_shortcut(event):
+            self._edit.press(event)
+        elif event.key == pygame.K_ESCAPE or (control and latin_key(event) == pygame.K_o):
             self.closed = True
         elif event.key in (pygame.K_RETURN, pygame.K_KP_ENTER):
             return shown[min(self.chosen, len(shown) - 1)].path if shown else None
@@ -233,13 +247,14 @@ class SceneBrowser:
         elif event.key in (pygame.K_HOME, pygame.K_END):
             self.chosen = 0 if event.key == pygame.K_HOME else max(len(shown) - 1, 0)
         elif event.key == pygame.K_BACKSPACE:
-            self._filter("" if control else self.typed[:-1])
+            if control:
+                self._edit.select_all()
+            self._edit.delete(-1)
         elif letter.isprintable() and len(letter) == 1 and not control:
-            self._filter((self.typed + letter)[:MAX_FILTER_LENGTH].lstrip())
+            self._edit.insert(letter if self.typed else letter.lstrip())
+        if self.typed != typed:
+            self.chosen = self._scroll = 0
         return None
-
-    def _filter(self, typed: str) -> None:
-        self.typed, self.chosen, self._scroll = typed, 0, 0
 
     def draw(self, surface: pygame.Surface, ui_scale: float) -> None:
         """Draw the browser over the whole window, and read one more file or draw one more thumbnail."""
@@ -274,12 +289,12 @@ class SceneBrowser:
         box.width = min(round(26 * size), surface.get_width() - margin - box.left)
         if box.width > 8 * size:
             draw_box(surface, box, 0.5 * size, PANEL, 255, SKY if self.typed else LINE)
-            position = box.left + 0.8 * size, box.centery
-            text = ellipsis(self.typed or hint, size, box.width - 1.6 * size)
-            word = draw_text(surface, text, position, size, INK if self.typed else FAINT, "midleft")
             if self.typed:
-                x = word.right + max(round(0.1 * size), 1)
-                pygame.draw.line(surface, SKY, (x, box.top + 0.5 * size), (x, box.bottom - 0.5 * size))
+                area = box.inflate(-round(1.6 * size), 0)
+                self._shift = draw_text_edit(surface, self._edit, area, size, self._shift)
+            else:
+                text = ellipsis(hint, size, box.width - 1.6 * size)
+                draw_text(surface, text, (box.left + 0.8 * size, box.centery), size, FAINT, "midleft")
         if self._note:
             note = ellipsis(self._note, size, width)
             rect = draw_text(surface, note, (margin, rect.bottom + 0.6 * size), size, WARNING, bold=True)

@@ -162,7 +162,7 @@ def _draw_cells(
 
 
 def _end_text(display: ScoreDisplay) -> str:
-    return f"{display.over}  ·  R: new game"
+    return f"{display.over}  ·  R: new game" if display.can_restart else f"{display.over}"
 
 
 def _line_width(line: str, size: float) -> int:

@@ -3,6 +3,7 @@
 import math
 
 from sandbox.formatting import format_si
+from sandbox.game_names import spec_of
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.bodies import Box, Capsule
 from sandbox.scene.description.generators import Stack
@@ -100,6 +101,7 @@ def hud_status(
         time=show.frame.time,
         paused=app_state.paused,
         waits_for_start=app_state.waits_for_start,
+        start_keys=_start_keys(show, scene_keys) if app_state.waits_for_start else "",
         question=app_state.question,
         unfocused=app_state.unfocused,
         ended=_ended(show),
@@ -119,6 +121,18 @@ def hud_status(
         faults=app_state.faults,
         claimed=scene_keys,
     )
+
+
+MAX_START_KEYS = 4
+"""number of keys that a game names before its start, unless it has a line of its own"""
+
+
+def _start_keys(show: LiveView | RecordedView, scene_keys: tuple[tuple[str, str], ...]) -> str:
+    """Return the most important keys of a game in one line."""
+    spec = spec_of(show.scene.play.game)
+    if spec is not None and spec.hint:
+        return spec.hint
+    return " · ".join(f"{keys}: {about}" for keys, about in scene_keys[:MAX_START_KEYS])
 
 
 def _ended(show: LiveView | RecordedView) -> str | None:

@@ -140,7 +140,9 @@ def test_kernels_work_if_no_cache_is_writable(tmp_path):
     (root / "sandbox" / "engines" / "__pycache__").write_text("")
     home = tmp_path / "cache"
     home.write_text("")
+    (tmp_path / f"sandbox2d-{os.getuid()}").write_text("")
     environment = {"XDG_CACHE_HOME": str(home), "NUMBA_DISABLE_JIT": "0", "PYTHONDONTWRITEBYTECODE": "1"}
+    environment["TMPDIR"] = str(tmp_path)
     out, _ = python(ONE_KERNEL_SCRIPT, root, **environment)
     assert out == "(3.0, 0.6000000000000001, 0.8)\n"
 

@@ -61,7 +61,7 @@ def test_ball_falls_into_a_pocket_and_a_move_returns_it() -> None:
     [
         ({"solver": {"integrator": "rk4"}}, "integrator 'rk4' is not supported on a [surface]"),
         ({"solver": {"detection": "swept"}}, "detection 'swept' is not supported on a [surface]"),
-        ({"solver": {"joints": "xpbd"}}, "joints does not apply to a [surface]"),
+        ({"solver": {"joints": "xpbd"}}, "joints 'xpbd' is not supported (a [surface] has nothing of the kind)"),
         ({"world": {"duration": 1.0, "linear_drag": 0.1}}, "does not model drag on a floor"),
     ],
 )

@@ -49,7 +49,7 @@ def test_no_pair_nearer_than_the_margin_is_lost(scene, margin):
     near = {
         pair_key(i, s)
         for i, (x, y) in enumerate(store.position)
-        for s, (ax, ay, bx, by, half) in enumerate(store.fixtures.segments)
+        for s, (ax, ay, bx, by, half) in enumerate(store.static_colliders.segments)
         if store.collision_mask[i]
         and circle_segment(x, y, store.radius[i], ax, ay, bx, by, half)[0] < margin * (1 - 1e-12)
     }
@@ -64,9 +64,9 @@ def test_contacts_are_the_overlapping_pairs(scene):
     contacts = CirclePipeline(store, "grid").overlaps(store.position)
     walls = contacts.second < 0
     expected = {
-        (i, -1 - int(store.fixtures.segment_collider[s]))
+        (i, -1 - int(store.static_colliders.segment_collider[s]))
         for i, (x, y) in enumerate(store.position)
-        for s, (ax, ay, bx, by, half) in enumerate(store.fixtures.segments)
+        for s, (ax, ay, bx, by, half) in enumerate(store.static_colliders.segments)
         if store.collision_mask[i] and circle_segment(x, y, store.radius[i], ax, ay, bx, by, half)[0] < 0
     }
     # A segment end is skipped where the next segment of the wall is nearer; the wall itself is never lost.
@@ -101,7 +101,7 @@ def test_segment_boxes_are_sorted_and_keep_their_segment_index():
     scene = scene_of(ball(9, 9), wall=[{"points": [[3, 0], [1, 2]], "thickness": 0.5}], post=[
         {"position": [0, 0], "radius": 2.0}
     ])  # fmt: skip
-    boxes = SegmentBoxes(body_store_of(scene).fixtures)
+    boxes = SegmentBoxes(body_store_of(scene).static_colliders)
     assert boxes.box.tolist() == [[-2.0, -2.0, 2.0, 2.0], [0.75, -0.25, 3.25, 2.25]]
     assert boxes.index.tolist() == [1, 0]
     assert (len(boxes), boxes.max_width) == (2, 4.0)

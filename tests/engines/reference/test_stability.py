@@ -107,8 +107,8 @@ def test_penalty_settings_are_refused_for_impulse(key):
     ("choice", "reason"),
     [
         ({"broad_phase": "oriented"}, "needs polygons, and the scene has none"),
-        ({"half_kick": True}, "half_kick applies to pymunk only"),
-        ({"persistence": 3}, "it keeps contacts for 1 substep"),
+        ({"half_kick": True}, "only pymunk has it"),
+        ({"persistence": 3}, r"persistence 3 is not supported \(only 1\)"),
     ],
 )
 def test_unsupported_settings_are_refused_with_a_reason(choice, reason):

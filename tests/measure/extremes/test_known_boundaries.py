@@ -75,7 +75,7 @@ def test_unknown_parameter_is_an_error() -> None:
     ("task", "words"),
     [
         (Task("drop", {"dt": 11.0}, "pymunk"), "invalid scene: "),
-        (Task("drop", {"dt": 0.01}, "pymunk", {"iterations": 0}), "invalid scene: iterations"),
+        (Task("drop", {"dt": 0.01}, "pymunk", {"iterations": 0}), "invalid scene: solver.iterations: must be"),
         (Task("two boxes", {}, "exact"), "it does not model polygons"),
         (Task("overlap", {"depth": 0.5}, "exact"), "overlap"),
         (Task("drop", {}, "pymunk", {"detection": "swept"}), "detection 'swept' is not supported"),

@@ -7,6 +7,7 @@ import pytest
 
 from sandbox.measure.metrics.invariants import joint_error, joint_errors, joint_scales
 from sandbox.measure.run.runner import run
+from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.scene.files.load import from_document, loads
 from tests.measure.metrics.test_energy import resting_run
 
@@ -73,26 +74,54 @@ def test_joint_of_a_retired_body_has_no_error() -> None:
 
 
 @pytest.mark.parametrize(
-    ("joint", "fraction"),
+    ("joint", "fraction", "size"),
     [
-        ('kind = "rod"', 1.0 / 3.0),
-        ('kind = "slide"\nmost = 2.0', 1.0),
-        ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', 1.0 / math.hypot(2.0, 0.2)),
+        ('kind = "rod"', 1.0 / 3.0, 1.0),
+        ('kind = "slide"\nmost = 2.0', 1.0, 2.0),
+        ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', 1.0 / math.hypot(2.0, 0.2), 1.0),
     ],
 )
-def test_largest_error_is_a_fraction_of_a_length(joint: str, fraction: float) -> None:
-    scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
+def test_largest_error_is_a_length_and_a_fraction_of_one(joint: str, fraction: float, size: float) -> None:
+    scene = loads(f'{TWO}[[joint]]\nname = "j"\nbetween = ["a", "b"]\n{joint}\n')
     moved = resting_run(scene).position
     moved[2, 1] = (4.0, 0.0)
-    # a few roundings
-    assert joint_error(resting_run(scene, position=moved), scene) == pytest.approx(fraction, rel=1e-14)
+    found = joint_error(resting_run(scene, position=moved), scene)
+    assert found is not None
+    assert (found.relative, found.error) == pytest.approx((fraction, size), rel=1e-14)  # a few roundings
+    assert (found.name, found.unit) == ("j", "m")
+
+
+def test_largest_error_of_an_angle_is_in_rad_beside_a_smaller_length() -> None:
+    joints = """[[joint]]
+name = "hinge"
+kind = "rotary_limit"
+between = ["a", "b"]
+least = -0.1
+most = 0.1
+[[joint]]
+name = "rod"
+kind = "rod"
+between = ["a", "b"]
+"""
+    scene = loads(TWO + joints)
+    turned, moved = resting_run(scene).angle, resting_run(scene).position
+    turned[1, 1], moved[1, 1] = 0.5, (3.01, 0.0)
+    run_ = resting_run(scene, angle=turned, position=moved)
+    found = joint_error(run_, scene)
+    assert found is not None
+    assert (found.name, found.unit) == ("hinge", "rad")
+    assert found.error == found.relative == pytest.approx(0.4, rel=1e-14)
+    context = EvaluationContext(scene, None, 1.0)
+    assert METRICS["joint_distance"].measure(run_, context) == pytest.approx(0.01, rel=1e-12)
 
 
 def test_diverged_joint_has_infinite_error() -> None:
     scene = loads(f'{TWO}[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n')
     position = resting_run(scene).position
     position[3, 1] = np.nan
-    assert joint_error(resting_run(scene, position=position), scene) == math.inf
+    found = joint_error(resting_run(scene, position=position), scene)
+    assert found is not None
+    assert (found.relative, found.error) == (math.inf, math.inf)
 
 
 def test_scene_without_joints_has_no_joint_error() -> None:

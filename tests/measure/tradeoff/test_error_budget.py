@@ -62,16 +62,16 @@ def test_error_of_euler_is_attributed_to_the_time_step(engine: str) -> None:
     assert found.substep_factor == 16
     assert found.time_step == pytest.approx(total * 15.0 / 16.0, rel=1e-9)  # a sixteenth of the step leaves 1/16 of it
     assert found.residual == pytest.approx(total / 16.0, rel=1e-9)
+    assert found.residual_before == pytest.approx(total / 8.0, rel=1e-9)
     assert found.solver == 0.0
-    assert found.model is None  # the residual still halves with the step
 
 
-def test_error_at_an_undetected_wall_is_attributed_to_the_model() -> None:
+def test_error_at_an_undetected_wall_is_left_at_the_finest_step() -> None:
     scene = scene_of(BULLET)
     found = error_budget(context_for(scene), "pymunk", scene.solver, 60.0)
-    assert found.model == found.residual
+    assert found.residual_before == found.residual
     # The bullet passes the wall by 1.05 m, where it should have stopped (restitution 0).
-    assert found.model == pytest.approx(1.05, abs=1e-3)
+    assert found.residual == pytest.approx(1.05, abs=1e-3)
     assert found.time_step == pytest.approx(0.0, abs=1e-12)  # straight flight, rounding
 
 

@@ -121,12 +121,26 @@ def test_search_ends_with_a_tolerance_of_zero(monkeypatch: pytest.MonkeyPatch, n
     assert needed <= steps(cheapest(search).configuration) <= max(needed * 9 / 8, needed)
 
 
-def test_refinement_ends_at_the_error_floor_of_the_model(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("needed", [100, 400])
+def test_errors_that_grow_before_they_fall_do_not_end_the_refinement(
+    monkeypatch: pytest.MonkeyPatch, needed: int
+) -> None:
+    """As where a contact is missed with any number of substeps below some hundred."""
+    search = search_landscape(
+        monkeypatch, Landscape(lambda v: 0.01 if steps(v) >= needed else 0.2 + steps(v) / 1e4), 0.1
+    )
+    assert needed <= steps(cheapest(search).configuration) <= needed * 9 / 8
+    assert search.limit is None
+
+
+@pytest.mark.parametrize(("most", "effort", "limit"), [(60, 1e6, "points"), (150, 0.05, "effort"), (150, 1e6, None)])
+def test_search_without_an_answer_says_what_ended_it(
+    monkeypatch: pytest.MonkeyPatch, most: int, effort: float, limit: str | None
+) -> None:
     landscape = Landscape(order(1.0, floor=0.5))
-    search = search_landscape(monkeypatch, landscape, 0.1)
+    search = search_landscape(monkeypatch, landscape, 0.1, most=most, effort=effort)
     assert not [t for t in search.evaluations.values() if t.ranking_error <= 0.1]
-    # 64 substeps leave 0.97 of the error of 32: no further refinement.
-    assert max(map(steps, landscape.evaluated)) == 64.0
+    assert search.limit == limit
 
 
 def test_two_helpful_options_and_finer_steps_are_combined(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,6 +152,15 @@ def test_two_helpful_options_and_finer_steps_are_combined(monkeypatch: pytest.Mo
     search = search_landscape(monkeypatch, Landscape(error), 0.5e-4, engines=("reference",), most=80)
     assert dict(cheapest(search).configuration.options) == {"detection": "swept", "integrator": "velocity_verlet"}
     assert steps(cheapest(search).configuration) == 2.0
+
+
+def test_iterations_are_traded_for_substeps_where_that_is_cheaper(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Substeps count twice for the error, as for a stack, and iterations cost more than the rest."""
+    landscape = Landscape(lambda v: 400.0 / steps(v) ** 2 / v.iterations, lambda v: 1.0 + v.iterations)
+    found = cheapest(search_landscape(monkeypatch, landscape, 1.0, most=30, scene=scene_of(SWING)))
+    pairs = ((s, k) for s in range(1, 65) for k in range(1, 65) if s * s * k >= 400)
+    best = min(s * (1.0 + k / 20.0) * (1.0 + k) for s, k in pairs)
+    assert found.counted_seconds <= 1.15e-3 * best  # the bisection ends within an eighth
 
 
 def test_smallest_sufficient_number_of_iterations_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

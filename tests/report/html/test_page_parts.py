@@ -128,7 +128,6 @@ def test_every_point_of_a_trade_off_is_drawn_including_failures() -> None:
     html = tradeoff_page(tradeoff_document()).html()
     assert len(re.findall(r'data-point="\d"', html)) == 6
     assert len(re.findall(r'aria-label="pymunk; dt 0.1 s, 1 substep; diverged', html)) == 1
-    assert "pymunk: error limit at any step" in html
 
 
 def test_warnings_for_recommended_settings_are_below_their_answers() -> None:
@@ -181,9 +180,9 @@ def test_settings_text_is_a_valid_solver_table_of_a_scene() -> None:
     assert (solver.dt, solver.substeps, solver.half_kick, solver.integrator) == (1e-4, 2, True, "rk4")
 
 
-def row(model: float | None, time_step: float, left: float) -> dict[str, Any]:
+def row(time_step: float, left: float) -> dict[str, Any]:
     """Return a row of the key `split` of a trade-off."""
-    return {"engine": "pymunk", "total": 1.0, "solver": 0.0, "time_step": time_step, "model": model, "left": left}
+    return {"engine": "pymunk", "total": 1.0, "solver": 0.0, "time_step": time_step, "left": left}
 
 
 def fractions(parts: dict[str, Any]) -> dict[str, float]:
@@ -193,18 +192,14 @@ def fractions(parts: dict[str, Any]) -> dict[str, float]:
     return {key: float(width) / total for width, key in bars}
 
 
-def test_error_at_the_finest_step_is_that_of_the_model() -> None:
+def test_bar_has_the_parts_of_an_error() -> None:
     # Widths are written to six digits.
-    assert fractions(row(0.25, 0.75, 0.25)) == pytest.approx({"model": 0.25, "time_step": 0.75}, rel=1e-6)
-
-
-def test_error_at_the_finest_step_is_shown_if_the_model_is_unknown() -> None:
-    assert fractions(row(None, 0.75, 0.25)) == pytest.approx({"left": 0.25, "time_step": 0.75}, rel=1e-6)
+    assert fractions(row(0.75, 0.25)) == pytest.approx({"left": 0.25, "time_step": 0.75}, rel=1e-6)
 
 
 def test_zero_error_has_an_empty_bar() -> None:
-    assert fractions(row(0.0, 0.0, 0.0)) == {}
+    assert fractions(row(0.0, 0.0)) == {}
 
 
 def test_lengths_are_in_metres() -> None:
-    assert "error, m" in error_budget([row(None, 0.75, 0.25)])
+    assert "error, m" in error_budget([row(0.75, 0.25)])

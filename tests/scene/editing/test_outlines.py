@@ -82,6 +82,45 @@ def test_generators_taken_apart_start_as_before() -> None:
     assert {box.friction for box in after.boxes} == {0.8}
 
 
+WALLS = """
+[[wall]]
+name = "fence"  # kept
+points = [[0, 0], [1, 0], [1, 1]]
+closed = true
+one_way = true
+[[wall]]
+points = [[0, 5], [1, 5], [2, 6], [3, 6]]
+friction = 0.5
+thickness = 0.1
+[[wall]]
+name = "fence 2"
+points = [[7, 7], [8, 8]]
+"""
+
+
+def test_walls_are_divided_at_their_corners_and_keep_all_else() -> None:
+    before = loads(WALLS)
+    text = with_changes(WALLS, taking_apart(before, [ElementKey("wall", 0), ElementKey("wall", 1)]))
+    after = loads(text)
+    assert 'name = "fence"  # kept' in text
+    assert [(wall.name, wall.points) for wall in after.walls] == [
+        ("fence", ((0, 0), (1, 0))),
+        (None, ((0, 5), (1, 5))),
+        ("fence 2", ((7, 7), (8, 8))),
+        ("fence 3", ((1, 0), (1, 1))),
+        ("fence 4", ((1, 1), (0, 0))),
+        ("wall", ((1, 5), (2, 6))),
+        ("wall 2", ((2, 6), (3, 6))),
+    ]
+    assert not any(wall.closed for wall in after.walls)
+    for k in (0, 3, 4):
+        assert after.walls[k].one_way and after.walls[k].friction is None
+    for k in (1, 5, 6):
+        assert (after.walls[k].friction, after.walls[k].thickness) == (0.5, 0.1)
+    with pytest.raises(TakeApartError, match="two points"):
+        taking_apart(before, [ElementKey("wall", 2)])
+
+
 def test_other_elements_cannot_be_taken_apart() -> None:
     scene = loads(TEXT + '[[ball]]\nname = "a"\nposition = [9, 9]\nradius = 1\n')
     with pytest.raises(TakeApartError, match="cannot be taken apart"):

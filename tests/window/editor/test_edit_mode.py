@@ -49,11 +49,11 @@ duration = 2.4
 name = "ground"
 point = [0, 0]
 normal = [0, 1]
-friction = 0.5
+friction = 0.7071
 restitution = 0.5
 """
         + "".join(
-            f'[[ball]]\nname = "{name}"\nposition = [{x}, 1]\nradius = 0.5\nrestitution = 1\n{more}'
+            f'[[ball]]\nname = "{name}"\nposition = [{x}, 1]\nradius = 0.5\nrestitution = 1\nfriction = 0.7071\n{more}'
             for name, x, more in (("ball", -1, "velocity = [-2, 0]\n"), ("ball 2", 0, ""), ("ball 3", 1, ""))
         )
         + "".join(
@@ -463,3 +463,47 @@ def test_cursor_shows_what_a_press_does(open_on: OpenOn, monkeypatch: pytest.Mon
     assert cursor_at(*ball) == pygame.SYSTEM_CURSOR_CROSSHAIR
     assert cursor_at(SIZE[0] - 50, 100) == pygame.SYSTEM_CURSOR_ARROW  # the panel
     assert cursor_at(*hand.view.toolbar.rect_of("ball").center) == pygame.SYSTEM_CURSOR_ARROW
+
+
+def test_bodies_keep_their_colours_while_others_come_and_go_also_when_the_scene_runs(open_on: OpenOn) -> None:
+    apart = BALL.replace("[0.0, 2.0]", "[-5.0, 2.0]").replace("[2.0, 2.0]", "[5.0, 2.0]")
+    hand = open_on("[world]\ngravity = [0.0, 0.0]\n" + apart)
+    off = 0.2  # m from the centre, where the handles of a selection do not cover the body
+
+    def colours() -> dict[str, tuple[int, ...]]:
+        if hand.window.editing is not None:
+            hand.editor.selection = []
+        hand.frame(move(5.0, 5.0))
+        view, found = hand.window.app_state.view, dict[str, tuple[int, ...]]()
+        assert view is not None
+        bodies = (view.scene if hand.window.editing is None else hand.scene).bodies
+        for name, (x, y) in zip(bodies.names, bodies.position.tolist(), strict=True):
+            pixel = hand.pixel((x + off, y + off))
+            found[name] = tuple(hand.window.context.surface.get_at((round(pixel[0]), round(pixel[1]))))
+        return found
+
+    def check(count: int) -> None:
+        now = colours()
+        assert len(now) == count
+        for name, colour in now.items():
+            assert known.setdefault(name, colour) == colour, name
+
+    known = colours()
+    assert len(set(known.values())) == 2
+    for number, (tool, place) in enumerate(
+        [(pygame.K_x, -3.0), (pygame.K_b, -1.0), (pygame.K_x, 1.0), (pygame.K_c, 3.0)]
+    ):
+        hand.key(tool)
+        hand.drag((place - 0.5, 1.5), (place + 0.5, 2.5))
+        hand.key(pygame.K_v)
+        check(3 + number)
+    hand.click((-5.0, 2.0))
+    hand.key(pygame.K_DELETE)
+    check(5)
+    hand.key(pygame.K_SPACE)
+    assert hand.window.editing is None
+    hand.key(pygame.K_p)
+    check(5)
+    hand.key(pygame.K_e, CTRL)
+    hand.key(pygame.K_z, CTRL)
+    check(6)

@@ -11,11 +11,12 @@ from sandbox.action import Drive
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
-from sandbox.scene.description.joints import Gear, Groove, Slide
+from sandbox.scene.description.joints import Gear, Groove, Pivot, Slide
 from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
-from tests.window.editor.hand import BALL, CTRL, Hand, OpenOn
+from sandbox.window.editor.edit_keys import HELP_GROUPS
+from tests.window.editor.hand import BALL, CTRL, SHIFT, Hand, OpenOn
 from tests.window.pressing import press, release
 
 pytestmark = pytest.mark.fail_slow(60)  # a window
@@ -80,6 +81,92 @@ def test_gears_mesh_or_are_joined_by_a_belt(open_on: OpenOn, x: float, sign: flo
     rates = found.angular_velocity[-1]
     assert math.isclose(rates[0], gear.ratio * rates[1], rel_tol=1e-3)  # the error of the first step has decayed
     assert abs(rates[1]) > 0.1
+
+
+def test_selected_wall_is_divided_undone_and_named_in_the_history(open_on: OpenOn) -> None:
+    hand = open_on(BALL + '[[wall]]\nname = "ramp"\npoints = [[-1, 1], [0, 0.5], [3, 0.3]]\n')
+    before = hand.view.draft.text
+    hand.click((-0.5, 0.75))
+    assert hand.editor.selection == [ElementKey("wall", 0)]
+    hand.key(pygame.K_x, CTRL | SHIFT)
+    assert [(wall.name, len(wall.points)) for wall in hand.scene.walls] == [("ramp", 2), ("ramp 2", 2)]
+    assert hand.view.draft.undo_label == "divide a wall" and "2 walls of two points" in hand.messages()
+    hand.key(pygame.K_z, CTRL)
+    assert hand.view.draft.text == before
+    hand.click((1.5, 0.4))
+    hand.key(pygame.K_x, CTRL | SHIFT)
+    hand.click((1.5, 0.4))
+    hand.key(pygame.K_x, CTRL | SHIFT)
+    assert "has one side" in hand.warnings()[-1] and len(hand.scene.walls) == 2
+    assert any("divide walls" in text for group in HELP_GROUPS for _, text in group.lines)
+
+
+CAR = """[world]
+gravity = [0, -9.81]
+[[plane]]
+name = "ground"
+point = [0, 0]
+normal = [0, 1]
+friction = 0.8
+[[box]]
+name = "chassis"
+position = [0.0, 0.7]
+size = [2.0, 0.4]
+[[ball]]
+name = "wheel"
+position = [-0.7, 0.4]  # below the lower side of the chassis, which it overlaps by 0.3 m
+radius = 0.4
+friction = 0.8
+[[ball]]
+name = "load"
+position = [0.5, 1.2]  # rests on the chassis
+radius = 0.3
+"""
+
+
+@pytest.mark.parametrize("key", [pygame.K_2, pygame.K_5])
+@pytest.mark.parametrize("point", [(-0.7, 0.4), (-0.72, 0.42), (-0.7, 0.1), (-0.5, 0.6), (-0.95, 0.65)])
+def test_wheel_is_joined_at_its_centre_to_the_chassis_that_it_overlaps(
+    open_on: OpenOn, key: int, point: tuple[float, float]
+) -> None:
+    hand = open_on(CAR)
+    hand.key(key)
+    hand.click(point)
+    pivot = hand.scene.joints[0]
+    assert isinstance(pivot, Pivot)
+    assert (pivot.between, pivot.at) == (("chassis", "wheel"), (-0.7, 0.4))
+    assert "to the world" not in hand.messages()
+    assert all(joint.between == pivot.between for joint in hand.scene.joints)
+    if key == pygame.K_5:
+        found = run(lasting(hand.scene, 1.0), "pymunk")
+        wheel, chassis = (hand.scene.bodies.number_of[name] for name in ("wheel", "chassis"))
+        cos, sin = math.cos(found.angle[-1, chassis]), math.sin(found.angle[-1, chassis])
+        axle = np.array((-0.7 * cos + 0.3 * sin, -0.7 * sin - 0.3 * cos)) + found.position[-1, chassis]
+        assert math.dist(axle, found.position[-1, wheel]) < 0.01  # the error of the iterated joint
+        assert found.position[-1, wheel, 0] - found.position[0, wheel, 0] > 0.5  # it drives
+
+
+@pytest.mark.parametrize(
+    ("point", "mod", "between", "at"),
+    [
+        ((0.5, 1.3), 0, ("load",), (0.5, 1.2)),  # a ball that only touches the chassis
+        ((0.8, 0.7), 0, ("chassis",), (0.8, 0.7 - 0.1)),  # on the grid of 0.2 m
+        ((-0.7, 0.3), CTRL, ("wheel",), (-0.7, 0.3)),
+        ((-0.7, 0.7), CTRL, ("chassis", "wheel"), (-0.7, 0.7)),
+    ],
+)
+def test_pivot_with_the_world_says_so_and_ctrl_takes_what_lies_at_the_click(
+    open_on: OpenOn, point: tuple[float, float], mod: int, between: tuple[str, ...], at: tuple[float, float]
+) -> None:
+    hand = open_on(CAR)
+    hand.key(pygame.K_2)
+    pygame.key.set_mods(mod)
+    hand.click(point)
+    (pivot,) = hand.scene.joints
+    assert isinstance(pivot, Pivot)
+    assert pivot.between == between
+    assert pivot.at == pytest.approx(at, abs=0.02)  # a pixel and a half
+    assert (f"joins {between[0]} to the world" in hand.messages()) == (len(between) == 1)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,6 @@ from sandbox.scene.editing.fields import fields_of
 from sandbox.window.editor import property_panel
 from sandbox.window.editor.property_panel import PropertyPanel
 from sandbox.window.editor.property_rows import PropertyRow, PropertySection
-from sandbox.window.editor.text_edit import TextEdit
 from sandbox.window.render.palette import WARNING
 from sandbox.window.ui.panel import SidePanel
 from tests.window.pressing import FOCUS_LOST, key, move, press, release, wheel
@@ -451,26 +450,6 @@ def test_picture_depends_on_values_mixture_and_note() -> None:
         edited.panel.show((each,), note)
         pictures.add(edited.picture())
     assert len(pictures) == len(shown) + 1
-
-
-def test_caret_and_selection_of_a_text() -> None:
-    edit = TextEdit("abc")
-    edit.select_all()
-    edit.press(pygame.K_LEFT, 0)
-    assert (edit.caret, edit.selection) == (0, (0, 0))
-    edit.press(pygame.K_RIGHT, 0)
-    edit.press(pygame.K_END, pygame.KMOD_SHIFT)
-    assert edit.selection == (1, 3)
-    edit.insert("x\n\x00")
-    assert (edit.text, edit.caret) == ("ax", 2)
-    edit.press(pygame.K_DELETE, 0)
-    edit.press(pygame.K_BACKSPACE, 0)
-    edit.press(pygame.K_HOME, 0)
-    edit.press(pygame.K_BACKSPACE, 0)
-    assert (edit.text, edit.caret) == ("a", 0)
-    edit.press(pygame.K_DELETE, 0)
-    assert edit.text == ""
-    assert not edit.press(pygame.K_a, 0)
 
 
 KEYS = (

@@ -62,6 +62,23 @@ def presses_of(live: LiveView) -> list[tuple[str, float]]:
     return [(press.control, press.value) for press in live.session.game.presses]
 
 
+def test_letters_and_signs_of_a_game_are_pressed_and_released_on_a_russian_keyboard(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The release is that of the same key, even if the layout has changed meanwhile."""
+    controls = (Control("kick", "kick it", ("z",)), Control("aim", "how far", ("/",), analogue=True))
+    monkeypatch.setattr(Buttons, "controls", controls)
+    with open_window(TOY, tmp_path, (1000, 640)) as window:
+        window.app_state.start_game()
+        for code, name, letter, other in ((pygame.KSCAN_Z, "kick", "я", "z"), (pygame.KSCAN_SLASH, "aim", ".", "/")):
+            for released in (letter, other):
+                live = run_frame(window, key(ord(letter), unicode=letter, scancode=code))
+                assert presses_of(live)[-1] == (name, 1.0)
+                live = run_frame(window, key_up(ord(released), code))
+                assert presses_of(live)[-1] == (name, 0.0)
+        assert not window.app_state.paused
+
+
 def host_of(window: App) -> GameHost:
     assert window.app_state.host is not None
     return window.app_state.host

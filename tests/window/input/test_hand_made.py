@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 import pytest
 
-from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run.sessions import rerun
 from sandbox.scene.description.discs import Ball
@@ -21,7 +21,7 @@ from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.playback.parameters import turned as parameter_actions
 from sandbox.window.playback.session import Session
 from tests.toml_text import toml
-from tests.window.pressing import key, key_up, move
+from tests.window.pressing import key, key_up, move, press, release
 from tests.window.windowed import open_window, run_frame
 
 pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
@@ -54,8 +54,8 @@ def test_consecutive_actions_of_one_kind_count_as_one_change() -> None:
         SetParameter(time=0.0, path="world.gravity", value=[0.0, -2.0]),
         Remove(time=0.0, body="a"),
     ]
-    assert count_changes(actions) == 5
-    assert count_changes(actions, moved_by_keys="a") == 4
+    assert count_changes(actions) == 6  # the impulse is a nudge
+    assert count_changes(actions, moved_by_keys="a") == 5
     assert count_changes([]) == 0
 
 
@@ -238,3 +238,55 @@ def test_invalid_parameter_of_a_spawned_body_is_refused(path: str, value: float)
     assert session.frame.state_hash() == before
     assert len(session.actions) == 1
     session.close()
+
+
+def pull(body: str, x: float | None) -> Pull:
+    return Pull(time=0.0, body=body, target=None if x is None else (x, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("actions", "count"),
+    [
+        ([pull("a", 0.0)], 1),
+        ([pull("a", 0.0), pull("a", 1.0), pull("a", None)], 1),
+        ([pull("a", 0.0), pull("a", None), pull("a", 0.0), pull("a", None)], 2),
+        ([pull("a", 0.0), pull("a", None), pull("b", 0.0)], 2),
+        ([pull("a", None)], 0),
+    ],
+)
+def test_each_pull_from_grip_to_release_is_one_change(actions: list[Action], count: int) -> None:
+    assert count_changes(actions) == count
+
+
+def test_restart_after_a_pull_asks_and_can_be_undone(window: App) -> None:
+    x, y = window.context.camera.to_screen(np.asarray((0.0, 0.0))).tolist()
+    run_frame(window, move(x, y), press(x, y))
+    for by in (10, 40, 80):
+        run_frame(window, move(x + by, y, held=True))
+    run_frame(window, release(x + 80, y))
+    live = window.app_state.live
+    assert live is not None
+    moved = live.frame.state_hash()
+    tap(window, pygame.K_p)
+    moved = live.session.recording().state_hash
+    tap(window, R)
+    assert window.app_state.question is not None
+    assert window.app_state.question.startswith("1 hand-made change")
+    tap(window, R)
+    assert window.app_state.live is not live
+    tap(window, pygame.K_z, pygame.KMOD_CTRL)
+    assert window.app_state.live is not None
+    window.app_state.live.finish_seek()
+    assert window.app_state.live.session.recording().state_hash == moved
+
+
+def test_question_of_a_restart_names_the_settings_that_stay(window: App) -> None:
+    window.commands._store_parameter("gravity", -3.0, True)
+    run_frame(window)
+    tap(window, B)
+    tap(window, R)
+    assert window.app_state.question is not None
+    assert window.app_state.question.startswith("1 hand-made change will be lost (1 setting stays)")
+    tap(window, ESCAPE)
+    assert window.app_state.question is not None
+    assert window.app_state.question.startswith("2 hand-made changes will be lost:")

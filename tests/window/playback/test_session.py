@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,15 @@ from hypothesis import strategies as st
 from sandbox.action import Action, ActionError, Impulse, Pull, Remove, SetParameter, Spawn, Strike, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run.sessions import rerun
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording, ReplayCheck
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Frame
+from sandbox.window.playback import follower as follower_module
 from sandbox.window.playback import history as history_module
+from sandbox.window.playback.follower import Follower
 from sandbox.window.playback.history import Keyframe
 from sandbox.window.playback.live import switch_engine
 from sandbox.window.playback.session import ReplayMismatchError, Session
@@ -172,6 +175,21 @@ def test_recorded_action_that_fails_ends_the_session_with_its_reason() -> None:
     assert session.ended is None
     session.apply(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     assert session.advance(50) == 50
+
+
+def test_saved_replay_of_a_game_keeps_what_the_recording_lacks() -> None:
+    """Also a session that was changed lacks it; but the end of the program is that of the whole recording only."""
+    impulse = Impulse(time=0.1, body="ball", impulse=(1.0, 0.0))
+    played = step_times(Session(SCENES["bounce"], actions=(impulse,)), 30).recording()
+    game = RecordedGame(("a joint",), ("a callback",), {"ball": (0.0,) * 6}, "hash", ReplayCheck(is_equal=True))
+    session = Session.of_recording(replace(played, game=game), None)
+    rest = replace(game, end={}, state_hash=None, replay=None)
+    assert step_times(session, 29).recording().game == rest
+    assert step_times(session, 1).recording() == replace(played, game=game)
+    assert step_times(session, 1).recording().game == rest
+    seek(session, 30)
+    session.apply(impulse)
+    assert session.recording().game == rest
 
 
 def test_checkpoints_are_made_only_without_contacts() -> None:
@@ -431,6 +449,7 @@ operations = st.one_of(
     st.tuples(st.just("to"), st.integers(0, 150)),
     st.tuples(st.just("act"), st.integers(0, 5)),
     st.tuples(st.just("part"), st.integers(0, 150)),
+    st.tuples(st.just("follow"), st.integers(1, 40)),
 )
 ACTIONS: list[Action] = [
     Impulse(time=0.0, body="a", impulse=(0.1, 0.4)),
@@ -450,6 +469,7 @@ TWO = scene_of(
 @pytest.mark.parametrize("engine", ENGINES)
 @given(plan=st.lists(operations, max_size=12))
 # Step 62 of this example reveals that step 47 was unconfirmed.
+@example(plan=[("on", 60), ("act", 0), ("on", 20), ("follow", 5), ("to", 79), ("act", 1), ("on", 9), ("to", 85)])
 @example(plan=[("on", 1), ("on", 29), ("to", 29), ("to", 111), ("to", 47), ("on", 15)])
 def test_confirmed_steps_are_unchanged_by_any_order_of_operations(engine: str, plan: list[tuple[str, int]]) -> None:
     session = Session(TWO, engine)
@@ -467,6 +487,12 @@ def test_confirmed_steps_are_unchanged_by_any_order_of_operations(engine: str, p
                 assert session.step_number == number
             case "part":
                 next(session.seek(number), None)
+            case "follow":
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setattr(follower_module, "MIN_FOLLOWED", 1)
+                    patch.setattr(Follower, "lag", number)
+                    for _ in range(2):  # the follower starts, and moves
+                        session.follow(perf_counter() + 1e9, is_idle=True)
             case _:
                 try:
                     session.apply(ACTIONS[number])

@@ -215,3 +215,15 @@ def test_plunger_is_drawn_as_a_line_of_its_travel_without_a_hinge():
     assert found[:, 1].max() < 0.2
     assert -2.2 < found[:, 1].min() < -1.95
     assert (np.histogram(found[:, 1], 20, (-2.0, 0.0))[0] > 0).all()  # from end to end
+
+
+@pytest.mark.parametrize("kind", ["rod", "slide", "spring"])
+@pytest.mark.parametrize("at", [(-2.0, 1.0), (1.0, -1.0)])
+def test_end_at_the_world_has_a_support(kind: str, at: tuple[float, float]) -> None:
+    """The mark is wider than the joint, whose end is then seen at any zoom."""
+    held = {key: value for key, value in KINDS[kind].items() if key != "between"}
+    anchored = scene_with(held | {"between": ["a"], "anchors": [[0, 0], list(at)]})
+    picture, bare = render(snapshot(anchored)), render(snapshot(scene_with()))
+    column, row = CAMERA.to_screen(np.asarray(at)).astype(int)
+    near = changed_pixels(picture, bare)[column - 14 : column + 15, row + 2 : row + 12]
+    assert near.any(axis=1).sum() >= 20

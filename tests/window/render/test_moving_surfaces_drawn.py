@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.scene.files.load import from_document
+from sandbox.window.render import moving_surfaces
 from tests.window.render.drawn import changed_pixels, frame, render, snapshot
 
 OBJECTS: dict[str, dict[str, Any]] = {
@@ -55,3 +56,20 @@ def test_surfaces_far_away_are_not_drawn() -> None:
     far, bare = {"wall": [{"points": [[1e9, 0.0], [1e9, 1.0]], "surface_speed": 1.0}]}, {"title": "bare"}
     pictures = [render(snapshot(from_document(document))) for document in (far, bare)]
     assert not changed_pixels(*pictures).any()
+
+
+def test_elements_are_asked_once_and_not_in_each_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+    has_moving_surface = moving_surfaces._has_moving_surface
+    monkeypatch.setattr(
+        moving_surfaces, "_has_moving_surface", lambda element: asked.append(element) or has_moving_surface(element)
+    )
+    balls = [{"position": [0.1 * k, 0.0], "radius": 0.05} for k in range(20)]
+    model, other = (
+        from_document({"ball": [*balls, {"position": [0.0, 0.0], "radius": 2.0, **more}]})
+        for more in ({}, {"surface_speed": 1.0})
+    )
+    for _ in range(3):
+        plain, moving = render(snapshot(model)), render(snapshot(other))
+    assert len(asked) == 42
+    assert changed_pixels(plain, moving).any()

@@ -3,14 +3,16 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pygame
 import pytest
 
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window import app_state
 from sandbox.window.playback.parameters import SessionParameters
-from sandbox.window.ui import gui
+from sandbox.window.ui import gui, hud
 from sandbox.window.ui.panel import SidePanel
+from sandbox.window.view_bounds import field_rect
 from tests.toml_text import toml
 from tests.window.pressing import press, release
 from tests.window.windowed import open_window, run_frame
@@ -91,3 +93,45 @@ def test_widget_shows_the_current_value_after_a_refused_change(tmp_path: Path) -
         x, y = gravity.rect.left + window.context.gui.area.width + 5, gravity.rect.centery
         run_frame(window, press(x, y), release(x, y))
         assert gravity.value == gravity.parameter.value  # type: ignore[attr-defined]  # it has a parameter
+
+
+def test_film_shows_the_scene_without_panel_state_and_messages(tmp_path: Path) -> None:
+    with open_window(ROOM, tmp_path, (800, 600)) as window:
+        gui, state = window.context.gui, window.app_state
+        window.run_frame(0.0)
+
+        def picture() -> np.ndarray:
+            film = gui.film_picture(window.context.camera, state)
+            assert film is not None
+            assert film.get_size() == gui.area.size
+            return pygame.surfarray.array3d(film)
+
+        before = picture()
+        state.messages.add("a message", "warning")
+        state.question, state.paused = "a question?", True
+        window.run_frame(0.0)
+        seen = pygame.surfarray.array3d(window.context.surface)[: gui.area.width, : gui.area.height]
+        after = picture()
+        assert (after == before).all()
+        assert (seen != after).any(axis=2).sum() > 500  # the state, the message and the question
+
+
+@pytest.mark.parametrize("name", ["classic", "full", "landing"])
+@pytest.mark.parametrize("size", [(1000, 700), (640, 480)])
+def test_start_of_a_game_is_announced_on_its_field_with_its_keys(
+    tmp_path: Path, name: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notices: list[tuple[str, pygame.Rect, str]] = []
+    monkeypatch.setattr(
+        hud, "draw_notice", lambda surface, text, area, size, edge, detail="": notices.append((text, area, detail))
+    )
+    with open_window(find(name), tmp_path, size) as window:
+        state = window.app_state
+        window.run_frame(0.0)
+        assert state.waits_for_start
+        text, area, keys = notices[-1]
+        assert state.view is not None
+        assert text == "Press Space to start"
+        assert field_rect(state.view.scene, window.context.camera).collidepoint(area.center)
+        assert ":" in keys
+        assert ("flippers" in keys) == (state.view.scene.play.game == "pinball")

@@ -87,6 +87,24 @@ def test_dialog_does_not_open_for_the_eleventh_best_score() -> None:
     assert dialog_at_end().entry is None
 
 
+def test_initials_are_typed_on_a_layout_without_latin_letters_and_edited_by_ctrl() -> None:
+    pygame.display.init()
+    pygame.display.set_mode((64, 64))
+    dialog = dialog_at_end()
+    for letter, code in (("ф", pygame.KSCAN_A), ("и", pygame.KSCAN_B)):
+        event = pygame.event.Event(pygame.KEYDOWN, key=ord(letter), unicode=letter, mod=0, scancode=code)
+        assert dialog.handle_event(event)
+    entry = dialog.entry
+    assert entry is not None and entry.letters == "AB"
+    for key, letters in (("z", ""), ("y", "AB"), ("a", "AB"), ("x", ""), ("v", "AB"), ("c", "AB"), ("v", "ABA")):
+        event = pygame.event.Event(pygame.KEYDOWN, key=ord(key), unicode="", mod=pygame.KMOD_LCTRL)
+        assert dialog.handle_event(event)
+        assert entry.letters == letters
+    assert not dialog.handle_event(
+        pygame.event.Event(pygame.KEYDOWN, key=pygame.K_s, unicode="", mod=pygame.KMOD_LCTRL)
+    )
+
+
 def test_new_row_is_shown_at_its_rank() -> None:
     for score in (9_000, 1_000):
         opened().enter(TABLE, "abc", score)
@@ -157,3 +175,20 @@ def test_score_file_is_read_on_opening_and_not_on_drawing(monkeypatch: pytest.Mo
             dialog.draw(surface, surface.get_rect(), 1.0)
         assert not reads
         press(dialog, "a", pygame.K_RETURN)
+
+
+@pytest.mark.parametrize("has_text", [True, False])
+def test_all_keys_of_characters_are_consumed_while_initials_are_typed(has_text: bool) -> None:
+    """R would start a new game, also where an input method gives no text."""
+    for code in (*range(pygame.K_a, pygame.K_z + 1), *range(pygame.K_0, pygame.K_9 + 1), pygame.K_SPACE, 1088):
+        dialog = dialog_at_end()
+        assert dialog.is_typing
+        assert press(dialog, chr(code) if has_text else code) == [True]
+    assert press(dialog_at_end(), pygame.K_F1) == [False]
+
+
+@pytest.mark.parametrize("is_ranked", [True, False])
+def test_score_that_the_rules_do_not_rank_opens_no_dialog(is_ranked: bool) -> None:
+    host = FakeHost()
+    host.is_ranked = is_ranked  # type: ignore[attr-defined]
+    assert (dialog_at_end(host).entry is not None) is is_ranked

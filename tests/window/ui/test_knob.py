@@ -6,7 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.window.playback.parameters import Parameter
+from sandbox.scene.files.load import from_document
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.parameters import Parameter, SessionParameters
+from sandbox.window.playback.session import Session
 
 GRAVITY = Parameter("gravity", "gravity", -30, 30, -9.81, step=0.01, unit="m/s²")
 STEP = Parameter("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s")
@@ -86,3 +89,44 @@ def test_value_that_is_not_finite_is_at_the_low_end() -> None:
     assert STEP.fraction(math.nan) == 0.0
     assert STEP.stepped(math.inf, 1) == STEP.low
     assert Parameter("flat", "flat", 1.0, 1.0, 1.0).at(0.7) == 1.0
+
+
+GROUND, WALL = {"point": [0, 0], "normal": [0, 1]}, {"points": [[9, 0], [9, 1]]}
+
+
+@pytest.mark.parametrize("key", ["restitution", "friction"])
+@pytest.mark.parametrize(
+    ("of_ball", "of_material", "of_ground", "of_wall", "shown"),
+    [
+        (None, None, 0.5, None, 0.5),
+        (None, None, 0.2, 0.6, 0.6),
+        (None, None, None, None, 0.0),
+        (None, 0.3, 0.5, None, 0.3),
+        (0.4, 0.3, 0.5, None, 0.4),
+        (0.0, None, 0.5, None, 0.0),
+    ],
+)
+def test_slider_shows_the_coefficient_that_acts(
+    key: str,
+    of_ball: float | None,
+    of_material: float | None,
+    of_ground: float | None,
+    of_wall: float | None,
+    shown: float,
+) -> None:
+    def stating(value: float | None) -> dict[str, float]:
+        return {} if value is None else {key: value}
+
+    scene = from_document(
+        {
+            "material": [{"name": "m", **stating(of_material)}],
+            "ball": [{"position": [0, 2], "radius": 0.5, "material": "m", **stating(of_ball)}],
+            "plane": [{**GROUND, **stating(of_ground)}],
+            "wall": [{**WALL, **stating(of_wall)}],
+        }
+    )
+    live = LiveView(Session(scene))
+    for picked in (None, 0):
+        values = {each.key: each for each in SessionParameters().of(live, scene, picked)}
+        assert values[key].value == shown
+    live.close()

@@ -97,6 +97,18 @@ def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> Non
     assert len(picker.shown) == len(files)
 
 
+def test_filter_is_cut_pasted_and_undone(files: list[tuple[str, Path]]) -> None:
+    pygame.display.init()
+    pygame.display.set_mode((64, 64))
+    picker = draw_picker(files)
+    type_text(picker, "odd")
+    for code, typed in (("z", ""), ("y", "odd"), ("a", "odd"), ("x", ""), ("v", "odd"), ("v", "oddodd")):
+        picker.handle_event(key(ord(code), pygame.KMOD_CTRL))
+        assert picker.typed == typed
+    picker.handle_event(key(pygame.K_BACKSPACE, pygame.KMOD_CTRL))
+    assert picker.typed == "" and len(picker.shown) == len(files)
+
+
 @pytest.mark.parametrize("text", ["s1", "Mine/S1", "scene 1"])
 def test_exact_match_of_name_or_title_comes_first(files: list[tuple[str, Path]], text: str) -> None:
     picker = draw_picker([files[10], files[11], files[1]])

@@ -168,6 +168,6 @@ class EventDrivenBodies(BodyStore):
             raise ActionError(overlap_message(name, self.bodies.names[overlapping[0]], float(depth[overlapping[0]])))
         if fixed:
             return
-        found = overlapping_collider(position[None, :], np.array([radius]), self.fixtures)
+        found = overlapping_collider(position[None, :], np.array([radius]), self.static_colliders)
         if found is not None:
             raise ActionError(overlap_message(name, self.scene.fixed_names[found[1]], found[2]))

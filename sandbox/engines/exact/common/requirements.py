@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.base import library_settings_in
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
+from sandbox.engines.common.solver_settings import setting_faults
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.resource_limits import MEMORY, PAIRS
 from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, demands, on_floor, unmodelled
@@ -31,14 +31,17 @@ REASONS = {
 CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY, Demand.SURFACE_VELOCITY}
 """Demands that the engine models"""
 
-STEPS = ("integrator", "detection", "response", "impact", "broad_phase", "joints", "stretch")
-"""Settings of solvers with time steps."""
+STEPS = ("integrator", "detection", "response", "impact", "broad_phase", "joints", "stretch", "half_kick")
+"""Settings of solvers with time steps"""
 
-OVERLAP = ("slop", "bias", "persistence")
-"""Settings of solvers that detect overlaps and correct them."""
+OVERLAP = ("slop", "bias", "persistence", "stiffness", "damping")
+"""Settings of solvers that detect overlaps and correct them, or let penalty springs do so"""
 
-SPRINGS = ("stiffness", "damping")
-"""Settings of penalty springs."""
+ABSENT = {
+    **dict.fromkeys(STEPS, "it uses no time steps; remove it"),
+    **dict.fromkeys(OVERLAP, "it allows no overlap; remove it"),
+}
+"""Settings that the engine does not have, with the reason"""
 
 TOUCH_OVERLAP = 1e-9
 """m: bodies that overlap by no more than this touch."""
@@ -84,44 +87,42 @@ def overlapping_balls(
 
 
 def overlapping_collider(
-    position: FloatArray, radius: FloatArray, fixtures: StaticColliders
+    position: FloatArray, radius: FloatArray, static: StaticColliders
 ) -> tuple[int, int, float] | None:
     """Return the first static collider that a ball overlaps, as (ball, collider, depth in m); None if there is none.
 
     Args:
         position: (N, 2) m, of balls that can collide with it.
         radius: (N,) m.
-        fixtures: static colliders.
+        static: static colliders.
     """
     if not len(position):
         return None
-    for (px, py, nx, ny), collider in zip(fixtures.planes, fixtures.plane_collider.tolist(), strict=True):
+    for (px, py, nx, ny), collider in zip(static.planes, static.plane_collider.tolist(), strict=True):
         gap = (position[:, 0] - px) * nx + (position[:, 1] - py) * ny
         point = np.broadcast_to(np.array([px, py]), position.shape)
         overlapping = np.flatnonzero(radius - gap > touch_tolerance(position, point))
         if len(overlapping):
             return int(overlapping[0]), collider, float(radius[overlapping[0]] - gap[overlapping[0]])
-    for k, candidates in _near_segments(position, float(radius.max()), fixtures):
-        gap = _gap(position[candidates], fixtures.segments[k])
-        ends = np.broadcast_to(fixtures.segments[k, :4], (len(candidates), 4))
+    for k, candidates in _near_segments(position, float(radius.max()), static):
+        gap = _gap(position[candidates], static.segments[k])
+        ends = np.broadcast_to(static.segments[k, :4], (len(candidates), 4))
         overlapping = np.flatnonzero(radius[candidates] - gap > touch_tolerance(position[candidates], ends))
         if len(overlapping):
             ball = int(candidates[overlapping[0]])
-            return ball, int(fixtures.segment_collider[k]), float(radius[ball] - gap[overlapping[0]])
+            return ball, int(static.segment_collider[k]), float(radius[ball] - gap[overlapping[0]])
     return None
 
 
-def _near_segments(
-    position: FloatArray, max_radius: float, fixtures: StaticColliders
-) -> Iterator[tuple[int, IntArray]]:
+def _near_segments(position: FloatArray, max_radius: float, static: StaticColliders) -> Iterator[tuple[int, IntArray]]:
     """Yield each segment with the indices, ascending, of the balls near it in x, or in y if those are fewer.
 
     Args:
         position: (N, 2) m.
         max_radius: largest radius, m.
-        fixtures: static colliders.
+        static: static colliders.
     """
-    ends, extent = fixtures.segments[:, :4].reshape(-1, 2, 2), fixtures.segments[:, 4:] + max_radius
+    ends, extent = static.segments[:, :4].reshape(-1, 2, 2), static.segments[:, 4:] + max_radius
     slack = 1e-9 + 8.0 * ROUNDING * np.abs(ends).max(axis=(1, 2), initial=0.0)[:, None]
     low, high = ends.min(axis=1) - extent - slack, ends.max(axis=1) + extent + slack
     orders = [np.argsort(position[:, axis], kind="stable") for axis in range(2)]
@@ -150,16 +151,9 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     """Return each demand and setting of a scene that the engine does not support."""
-    missing = unmodelled(setup, CAPABILITIES) + library_settings_in(settings, "exact")
+    missing = unmodelled(setup, CAPABILITIES) + setting_faults(settings, "exact", {}, ABSENT)
     wanted = demands(setup)
     missing += [f"{demand}: {reason}" for demand, reason in REASONS.items() if demand in wanted]
-    for key in STEPS + OVERLAP + SPRINGS:
-        stated = getattr(settings, key)
-        if stated is not None:
-            reason = "uses no time steps" if key in STEPS else "allows no overlap"
-            missing.append(f"{key} {stated!r} is not supported (it {reason}; remove it)")
-    if settings.half_kick:
-        missing.append("half_kick is not supported (it uses no time steps; remove it)")
     if on_floor(setup):
         missing += unsupported_on_surface(setup)
     too_many = too_many_pairs(setup)

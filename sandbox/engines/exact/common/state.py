@@ -218,9 +218,9 @@ def vertices_of(scene: Scene) -> FloatArray:
 @derived_once
 def _derived_collider_arrays(setup: Setup) -> dict[str, Any]:
     scene = setup.scene
-    fixtures = static_colliders(scene, everything=True)
-    vertices, vertex_collider, ends = _vertices(fixtures)
-    lines, line_collider, line_vertices = _lines(fixtures, ends)
+    static = static_colliders(scene, everything=True)
+    vertices, vertex_collider, ends = _vertices(static)
+    lines, line_collider, line_vertices = _lines(static, ends)
     return {
         "lines": lines,
         "line_tags": np.column_stack((line_collider, line_collider, line_vertices)),
@@ -298,7 +298,7 @@ def _set_solid_and_kicks(data: EventState, scene: Scene) -> None:
             )
 
 
-def _vertices(fixtures: StaticColliders) -> tuple[FloatArray, IntArray, dict[tuple[float, float, float, int], int]]:
+def _vertices(static: StaticColliders) -> tuple[FloatArray, IntArray, dict[tuple[float, float, float, int], int]]:
     """Return the vertices: each post and segment end once.
 
     Returns:
@@ -306,7 +306,7 @@ def _vertices(fixtures: StaticColliders) -> tuple[FloatArray, IntArray, dict[tup
     """
     index: dict[tuple[float, float, float, int], int] = {}
     for (ax, ay, bx, by, half), collider in zip(
-        fixtures.segments.tolist(), fixtures.segment_collider.tolist(), strict=True
+        static.segments.tolist(), static.segment_collider.tolist(), strict=True
     ):
         index.setdefault((ax, ay, half, collider), len(index))
         index.setdefault((bx, by, half, collider), len(index))
@@ -317,7 +317,7 @@ def _vertices(fixtures: StaticColliders) -> tuple[FloatArray, IntArray, dict[tup
 
 
 def _lines(
-    fixtures: StaticColliders, ends: dict[tuple[float, float, float, int], int]
+    static: StaticColliders, ends: dict[tuple[float, float, float, int], int]
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the lines: planes, and both sides of every segment of non-zero length.
 
@@ -327,12 +327,12 @@ def _lines(
     rows: list[tuple[float, ...]] = []
     colliders: list[int] = []
     vertices: list[tuple[int, int]] = []
-    for (px, py, nx, ny), collider in zip(fixtures.planes.tolist(), fixtures.plane_collider.tolist(), strict=True):
+    for (px, py, nx, ny), collider in zip(static.planes.tolist(), static.plane_collider.tolist(), strict=True):
         rows.append((px, py, nx, ny, ny, -nx, np.inf, 0.0))
         colliders.append(collider)
         vertices.append((-1, -1))
     for (ax, ay, bx, by, half), collider in zip(
-        fixtures.segments.tolist(), fixtures.segment_collider.tolist(), strict=True
+        static.segments.tolist(), static.segment_collider.tolist(), strict=True
     ):
         dx, dy = bx - ax, by - ay
         length = float(np.hypot(dx, dy))

@@ -7,10 +7,11 @@ pocket. The times of impact of all pairs are kept in a matrix; an event updates 
 import math
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.common.body_store import ALL, NOTHING, first_beyond
+from sandbox.engines.common.body_store import ALL, NOTHING
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.kernel import inline_kernel
+from sandbox.engines.common.state_bounds import first_beyond
 from sandbox.engines.exact.common.roots import LONGEST_SPAN, MAX_OVERLAP, first_touch, gap_zero_time, return_time
 from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c

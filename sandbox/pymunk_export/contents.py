@@ -1,0 +1,381 @@
+"""Static colliders, bodies and joints of a scene as blocks of statements, in the engine's order."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, IntArray
+from sandbox.engines.common.colliders import wall_segments
+from sandbox.engines.common.collision_bits import COLLIDES_ALL, COLLIDES_FIXED, STATIC, bits_of_body, bits_of_static
+from sandbox.engines.common.pair_factors import factors, wrong_pairs
+from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, reach_of, shuffled
+from sandbox.engines.pymunk_adapter.contact_names import is_captured
+from sandbox.pymunk_export.loops import Block, comment
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BACKING, Point
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.shapes import geometry_of
+
+
+def literal(value: object) -> str:
+    """Return the source of a number, text, or tuple of these. `repr` of a float is exact; `INFINITY` is a constant."""
+    if isinstance(value, tuple | list):
+        inner = ", ".join(map(literal, value))
+        return f"({inner},)" if len(value) == 1 else f"({inner})"
+    if isinstance(value, float) and math.isinf(value):
+        return "INFINITY" if value > 0.0 else "-INFINITY"
+    if isinstance(value, str) and '"' not in value and "'" not in value:
+        return f'"{repr(value)[1:-1]}"'  # double quotes, as formatters write them
+    return repr(value)
+
+
+@dataclass(frozen=True)
+class PairRule:
+    """Coefficients of a pair of surfaces that the factors of its shapes cannot express."""
+
+    types: tuple[int, int]
+    """collision types of the shapes"""
+    restitution: float
+    friction: float
+    slip: float
+    """m/s, as in `PairTable.slip_target`"""
+
+
+class Surfaces:
+    """Elasticity, friction and surface velocity of shapes, and the pairs that need a callback."""
+
+    def __init__(self, setup: Setup) -> None:
+        matrix = contact_matrix(setup)
+        table, touching = matrix.surfaces, matrix.touching
+        self.of_shape, self.of_fixed = table.of_shape, table.of_fixed
+        elasticity = factors(table.restitution, touching, [each.restitution for each in table.surfaces])
+        friction = factors(table.friction, touching, [each.friction for each in table.surfaces])
+        slips = np.triu(touching & (table.slip_target != 0.0) & (table.friction > 0.0))
+        special = {
+            *wrong_pairs(table.restitution, touching, elasticity),
+            *wrong_pairs(table.friction, touching, friction),
+            *((a, b) for a, b in np.argwhere(slips).tolist()),
+        }
+        self.rules = [
+            PairRule(
+                (a + 1, b + 1), *(float(each[a, b]) for each in (table.restitution, table.friction, table.slip_target))
+            )
+            for a, b in sorted(special)
+        ]
+        """pairs that need a callback"""
+        typed = {surface for pair in special for surface in pair}
+        velocities = [each.velocity for each in table.surfaces]
+        self.has_velocities = any(map(any, velocities))
+        """whether shapes have surface velocities"""
+        self._values = [
+            (
+                elasticity[k],
+                friction[k],
+                *((velocities[k],) if self.has_velocities else ()),
+                *((k + 1 if k in typed else 0,) if special else ()),
+            )
+            for k in range(len(elasticity))
+        ]
+        self._names: dict[tuple[float | Point, ...], str] = {}
+        self._users: dict[str, dict[str, None]] = {}
+
+    def name(self, surface: int, user: str) -> str:
+        """Return the name of the constant for a surface of an object."""
+        name = self._names.setdefault(self._values[surface], f"MATERIAL_{len(self._names) + 1}")
+        self._users.setdefault(name, {})[user] = None
+        return name
+
+    @property
+    def attributes(self) -> list[str]:
+        """Attributes of a shape that a constant sets."""
+        velocity = ["surface_velocity"] if self.has_velocities else []
+        return ["elasticity", "friction", *velocity, *(["collision_type"] if self.rules else [])]
+
+    @property
+    def constants(self) -> list[str]:
+        """Definitions of the constants that are used."""
+        lines = []
+        for values, name in self._names.items():
+            first, *more = self._users[name]
+            lines += [*comment(f"{first} and {len(more):,} more" if more else first), f"{name} = {literal(values)}"]
+        return lines
+
+
+FILTER_NAMES = {
+    (STATIC, COLLIDES_ALL | COLLIDES_FIXED): "FIXED",
+    (COLLIDES_ALL, STATIC | COLLIDES_ALL): "MOVING",
+    (COLLIDES_FIXED, STATIC): "MOVING_AMONG_FIXED",
+}
+"""Names of the filters of scenes with one collision layer and no categories, by categories and mask."""
+
+
+@dataclass
+class Filters:
+    """Collision filters that are used, by their names."""
+
+    _names: dict[tuple[int, int, int], str] = field(default_factory=dict)
+
+    def name(self, categories: int, mask: int, group: int = 0) -> str:
+        """Return the name of the constant for a filter."""
+        known = FILTER_NAMES.get((categories, mask)) if group == 0 else None
+        return self._names.setdefault((group, categories, mask), known or f"FILTER_{len(self._names) + 1}")
+
+    @property
+    def constants(self) -> list[str]:
+        """Definitions of the constants that are used."""
+        lines = []
+        for (group, categories, mask), name in self._names.items():
+            first = f"group={group}, " if group else ""
+            lines.append(f"{name} = pymunk.ShapeFilter({first}categories=0b{categories:b}, mask=0b{mask:b})")
+        return lines
+
+
+class Contents:
+    """Blocks of a scene. The names of surfaces and filters are collected while blocks are made."""
+
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        self.setup, self.has_sleep = setup, bool(settings.sleeping)
+        self.surfaces, self.filters = Surfaces(setup), Filters()
+        self._matrix = contact_matrix(setup)
+        bodies = setup.bodies
+        self._thrusts = _thrusts_by_body(setup)
+        pushed = np.asarray([name in self._thrusts for name in bodies.names], np.bool_)
+        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic | self.has_sleep)
+        collides = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element]
+        self._has_shapes: BoolArray = self._is_in_space & (self._matrix.touches | (bodies.fixed & collides))
+        self.hidden: IntArray = np.flatnonzero(~self._has_shapes)
+        """bodies whose shapes are outside the space, because nothing can touch them"""
+
+    @property
+    def has_thrusts(self) -> bool:
+        """Whether a thrust acts on a body."""
+        return bool(self._thrusts)
+
+    @property
+    def static_order(self) -> list[int] | None:
+        """Order in which the engine adds static shapes; None if it is theirs."""
+        fixed = self.setup.scene.fixed
+        count = sum(len(wall_segments(each)) if isinstance(each, Wall) else 1 for each in fixed)
+        order = shuffled(count)
+        return None if order == list(range(count)) else order
+
+    def colliders(self) -> Iterator[Block]:
+        """Yield the static colliders: each is a static body of its own, so that contacts identify it."""
+        setup, scene = self.setup, self.setup.scene
+        centre, reach = reach_of(setup.bodies.position[~setup.bodies.fixed])
+        add = "space.add" if self.static_order is None else "static_shapes.append"
+        static = ("body = pymunk.Body(body_type=pymunk.Body.STATIC)", "space.add(body)")
+        surfaces = self.surfaces.of_fixed.tolist()
+        for collider, name, surface in zip(scene.fixed, scene.fixed_names, surfaces, strict=False):
+            title, chosen = literal(name), self.filters.name(*bits_of_static(scene, collider))
+            added = f"{add}(with_surface(shape, {self.surfaces.name(surface, title)}, {chosen}))"
+            match collider:
+                case Plane():
+                    a, b = half_plane_ends(collider, centre, reach)
+                    values = {"a": literal(a), "b": literal(b), "radius": literal(BACKING)}
+                    yield Block("half-planes", title, (*static, SEGMENT, added), values)
+                case Wall():
+                    yield from _wall_blocks(collider, title, static, added)
+                case Post():
+                    values = {"position": literal(collider.position), "radius": literal(collider.radius)}
+                    circle = "shape = pymunk.Circle(body, {radius}, {position})"
+                    yield Block("posts", title, (*static, circle, added), values)
+
+    def bodies(self) -> Iterator[Block]:
+        """Yield the bodies in the order in which the engine adds them; those outside its space come last."""
+        inside, outside = np.flatnonzero(self._is_in_space), np.flatnonzero(~self._is_in_space)
+        order, indices = shuffled(len(inside)), list(range(len(self.setup.bodies)))
+        if order != list(range(len(inside))):
+            indices = [*inside[order].tolist(), *outside.tolist()]
+        for index in indices:
+            yield self._body(index)
+
+    def _body(self, index: int) -> Block:
+        bodies, name = self.setup.bodies, self.setup.bodies.names[index]
+        values = {
+            "name": literal(name),
+            "position": literal(tuple(bodies.position[index].tolist())),
+            "angle": literal(float(bodies.angle[index])),
+        }
+        state = ["body.position = {position}", "body.angle = {angle}"]
+        kind = "balls" if bodies.round[index] else "bodies"
+        if bodies.fixed[index]:
+            kind = f"fixed {kind}"
+            new = "body = pymunk.Body(body_type=pymunk.Body.STATIC)"
+        elif bodies.kinematic[index]:
+            kind = f"kinematic {kind}"
+            new = "body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)"
+        else:
+            new = "body = pymunk.Body({mass}, {moment})"
+            moment = float(bodies.moment[index])
+            is_turnable = self._matrix.turnable[index] or self.has_sleep
+            values |= {
+                "mass": literal(float(bodies.mass[index])),
+                "moment": literal(moment if is_turnable else math.inf),
+            }
+        if not bodies.fixed[index]:
+            values |= {
+                "velocity": literal(tuple(bodies.velocity[index].tolist())),
+                "angular_velocity": literal(float(bodies.angular_velocity[index])),
+            }
+            state += ["body.velocity = {velocity}", "body.angular_velocity = {angular_velocity}"]
+        if name in self._thrusts:
+            values["thrust"] = literal(self._thrusts[name])
+            state.append("body.thrust = {thrust}")
+        shapes, columns = self._shapes(index)
+        lines = (new, *state, "space.add(body)", *shapes, "bodies[{name}] = body")
+        return Block(kind, literal(name), lines, values | columns)
+
+    def _shapes(self, index: int) -> tuple[list[str], dict[str, str]]:
+        """Return the statements that create a body's shapes, and their columns."""
+        bodies = self.setup.bodies
+        if bodies.all_round:
+            circle = self._shape("pymunk.Circle(body, {radius})", index, index)
+            return circle, {"radius": literal(float(bodies.radius[index]))}
+        pieces = bodies.shapes
+        first, last = np.searchsorted(pieces.body, (index, index + 1)).tolist()
+        lines: list[str] = []
+        values: dict[str, str] = {}
+        for number, piece in enumerate(range(first, last), start=1):
+            corners = [tuple(each) for each in pieces.corner[pieces.first[piece] : pieces.first[piece + 1]].tolist()]
+            shape, columns = _shape_of(corners, float(pieces.radius[piece]), "" if last - first == 1 else f"_{number}")
+            created = self._shape(shape, index, piece)
+            element = bodies.elements[bodies.element[index]]
+            if is_captured(element) and len(created) == 2 and len(corners) > 2:
+                (outline,) = (name for name in columns if name.startswith("corners"))
+                created.insert(1, f"shape.unsafe_set_vertices({{{outline}}})  # starts at their first corner")
+            lines += created
+            values |= columns
+        return lines, values
+
+    def _shape(self, shape: str, index: int, piece: int) -> list[str]:
+        """Return the statements that create one shape, and add it if its body can touch something."""
+        if not self._has_shapes[index]:  # outside the space it costs no time
+            return [f"{shape}  # only drawn"]
+        bodies = self.setup.bodies
+        bits = bits_of_body(self.setup.scene, bodies, index, int(bodies.layer[index]))
+        chosen = self.filters.name(*bits, int(bodies.group[index]))
+        material = self.surfaces.name(int(self.surfaces.of_shape[piece]), literal(bodies.names[index]))
+        return [f"shape = {shape}", f"space.add(with_surface(shape, {material}, {chosen}))"]
+
+    def joints(self) -> Iterator[Block]:
+        """Yield the joints."""
+        links = self.setup.links
+        for k in range(len(links)):
+            kind = LinkKind(int(links.kind[k]))
+            values = _joint_values(links, k, self.setup.bodies.names)
+            first = "space.static_body" if int(links.a[k]) == WORLD else "bodies[{a}]"
+            lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
+            columns = {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
+            limits = {"max_force": links.max_force[k], "max_bias": links.max_bias[k], "error_bias": links.bias[k]}
+            columns |= {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
+            stated = "".join(f", {key}={{{key}}}" for key in limits if key in columns)
+            lines.append(f"add_joint(space, joint, collide_bodies={bool(links.collide[k])}{stated})")
+            title = literal(links.names[k]) if links.names[k] else f"joint {k + 1}"
+            yield Block(f"{kind.name.lower().replace('_', ' ')} joints", title, tuple(lines), columns)
+
+
+SEGMENT = "shape = pymunk.Segment(body, {a}, {b}, {radius})"
+
+
+def _wall_blocks(wall: Wall, title: str, static: tuple[str, ...], added: str) -> Iterator[Block]:
+    """Yield the body of a wall and its segments; a wall of one segment is one block."""
+    parts, radius = wall_segments(wall), literal(wall.thickness / 2.0)
+    if len(parts) == 1:
+        values = {"a": literal(parts[0].a), "b": literal(parts[0].b), "radius": radius}
+        yield Block("walls", title, (*static, SEGMENT, added), values)
+        return
+    yield Block("polylines", f"{title}: neighbours make its joints smooth, so that balls do not bump there", static)
+    for number, part in enumerate(parts, start=1):
+        ends = {"a": part.a, "b": part.b, "before": part.before or part.a, "after": part.after or part.b}
+        values = {key: literal(end) for key, end in ends.items()} | {"radius": radius}
+        yield Block("segments", str(number), (SEGMENT, "shape.set_neighbors({before}, {after})", added), values)
+
+
+def _shape_of(corners: list[tuple[float, ...]], radius: float, ending: str) -> tuple[str, dict[str, str]]:
+    """Return the expression of a convex piece and its columns, whose names get an ending."""
+    values = {f"radius{ending}": literal(radius)}
+    rounding = f"{{radius{ending}}}"
+    match corners:
+        case [centre]:
+            if literal(centre) == "(0.0, 0.0)":  # pymunk's default
+                return f"pymunk.Circle(body, {rounding})", values
+            values[f"offset{ending}"] = literal(centre)
+            return f"pymunk.Circle(body, {rounding}, {{offset{ending}}})", values
+        case [a, b]:
+            values |= {f"a{ending}": literal(a), f"b{ending}": literal(b)}
+            return f"pymunk.Segment(body, {{a{ending}}}, {{b{ending}}}, {rounding})", values
+        case _:
+            values[f"corners{ending}"] = literal(corners)
+            return f"pymunk.Poly(body, {{corners{ending}}}, radius={rounding})", values
+
+
+def _thrusts_by_body(setup: Setup) -> dict[str, tuple[float, float, float]]:
+    """Return the sum of the thrusts on each body: force (x, y), N, in the body's frame, and torque, N·m."""
+    bodies, loads = setup.bodies, dict[str, tuple[float, float, float]]()
+    for thrust in setup.scene.thrusts:
+        centre = geometry_of(bodies.elements[bodies.element[bodies.number_of[thrust.body]]]).centre
+        arm = thrust.point[0] - centre[0], thrust.point[1] - centre[1]
+        x, y, torque = loads.get(thrust.body, (0.0, 0.0, 0.0))
+        fx, fy = thrust.force
+        loads[thrust.body] = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
+    return loads
+
+
+JOINT_LINES: dict[LinkKind, tuple[str, ...]] = {
+    LinkKind.ROD: (
+        "joint = pymunk.PinJoint(<a>, <b>, {anchor_a}, {anchor_b})",
+        "joint.distance = {length}",
+    ),
+    LinkKind.PIVOT: ("joint = pymunk.PivotJoint(<a>, <b>, {anchor_a}, {anchor_b})",),
+    LinkKind.SLIDE: ("joint = pymunk.SlideJoint(<a>, <b>, {anchor_a}, {anchor_b}, {least}, {most})",),
+    LinkKind.GROOVE: ("joint = pymunk.GrooveJoint(<a>, <b>, {anchor_a}, {far_end}, {anchor_b})",),
+    LinkKind.ROTARY_LIMIT: ("joint = pymunk.RotaryLimitJoint(<a>, <b>, {least}, {most})",),
+    LinkKind.MOTOR: ("joint = pymunk.SimpleMotor(<a>, <b>, {rate})",),
+    LinkKind.RATCHET: (
+        "joint = pymunk.RatchetJoint(<a>, <b>, {offset}, {ratchet})",
+        "joint.angle = {click}",
+    ),
+    LinkKind.GEAR: ("joint = pymunk.GearJoint(<a>, <b>, {phase}, {ratio})",),
+    LinkKind.SPRING: (
+        "joint = pymunk.DampedSpring(<a>, <b>, {anchor_a}, {anchor_b}, {rest_length}, {stiffness}, {damping})",
+    ),
+    LinkKind.ROTARY_SPRING: ("joint = pymunk.DampedRotarySpring(<a>, <b>, {rest_angle}, {stiffness}, {damping})",),
+}
+"""Statements that create each kind of joint; <a> and <b> stand for its bodies."""
+
+
+def _joint_values(links: JointArrays, k: int, names: Sequence[str]) -> dict[str, str]:
+    """Return the expressions of all columns of joint k, by the figures of `LinkKind`.
+
+    Rates and angles of pymunk's motors and rotary springs are those of the first body relative to the second, so that
+    their signs are opposite.
+    """
+    x, y, z = map(literal, links.figures[k].tolist())
+    opposite = literal(-float(links.figures[k, 0]))
+    a = int(links.a[k])
+    return {
+        "a": literal("" if a == WORLD else names[a]),
+        "b": literal(names[int(links.b[k])]),
+        "anchor_a": literal(tuple(links.anchor_a[k].tolist())),
+        "anchor_b": literal(tuple(links.anchor_b[k].tolist())),
+        "length": x,
+        "least": x,
+        "most": y,
+        "far_end": f"({x}, {y})",
+        "rate": opposite,
+        "click": x,
+        "offset": y,
+        "ratchet": z,
+        "phase": x,
+        "ratio": y,
+        "rest_length": x,
+        "rest_angle": opposite,
+        "stiffness": y,
+        "damping": z,
+    }
