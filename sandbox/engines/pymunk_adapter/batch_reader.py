@@ -10,21 +10,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
-from pymunk.batch import Buffer
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart
+from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_BODY, LIST_CONTACT, WORD, Listing
 from sandbox.engines.pymunk_adapter.reader import (
-    LIST,
     SECOND_FLAGS,
     STATE,
     STATE_BY_ID,
     STATE_WIDTH,
+    TOUCH,
     TOUCH_FLAGS,
     VECTORS,
     VECTORS_OF_TWO_POINTS,
-    WORD,
-    listing_into,
 )
 
 OrderOf = Callable[[bytes], IntArray | None]
@@ -41,9 +39,6 @@ MAX_WORDS = 3 << 16
 
 MAX_CONTACTS = (MAX_WORDS // 3) * 2
 """Upper bound of the contacts in a batch, while a substep has no more than half of them."""
-
-LIST_BODY = ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched")
-"""Function that writes the state of a body into a buffer."""
 
 
 class Batch(NamedTuple):
@@ -70,12 +65,8 @@ class BatchReader:
             order_of: `SpaceReader.order_of` if bodies may fall asleep, else None.
         """
         self._space, self._order_of = space, order_of
-        # A buffer leaks its first memory, and its memory moves when it grows: there is one of each kind, and that of
-        # the bodies is owned by numpy and never grows.
-        self._bodies, self._arbiters = Buffer(), Buffer()
-        self._states: FloatArray = np.empty(0)
-        self._body_list, self._contact_list = listing_into(self._bodies), listing_into(self._arbiters)
-        self._body_list.fields = (STATE if order_of is None else STATE_BY_ID).value
+        self._bodies, self._contacts = Listing(STATE if order_of is None else STATE_BY_ID), Listing(TOUCH)
+        self._states: FloatArray = np.empty(0)  # memory of the list of bodies, which never grows
 
     def max_rows(self, bodies: int) -> int:
         """Return how many lists of a number of bodies fit into a batch, at least 1."""
@@ -116,12 +107,12 @@ class BatchReader:
         """
         width = STATE_WIDTH * bodies
         rows = self._prepare(steps * (substeps if lists_substeps else 1), width)
-        arbiters = self._arbiters
-        arbiters.clear()
-        self._contact_list.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
-        words, ends, warm_starts = arbiters._int_arr, [], {}
+        contacts = self._contacts
+        contacts.clear()
+        contacts.data.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
+        words, ends, warm_starts = contacts.integers, [], {}
         each_body, each_contact, step = lib.cpSpaceEachBody, lib.cpSpaceEachCachedArbiter, lib.cpSpaceStep
-        space, body_list, contact_list = self._space._space, self._body_list, self._contact_list
+        space, body_list, contact_list = self._space._space, self._bodies.data, contacts.data
         row = made = substep = 0
         is_checked = False
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
@@ -139,7 +130,7 @@ class BatchReader:
                             self._put_in_order(rows[row], self._order_of)
                         row += 1
                     if lists_contacts:
-                        each_contact(space, LIST, contact_list)
+                        each_contact(space, LIST_CONTACT, contact_list)
                         ends.append(words.num)
                         if warm_start is not None and (found := warm_start()) is not None:
                             warm_starts[substep] = found
@@ -148,30 +139,25 @@ class BatchReader:
                 is_checked = needs_check(rows[row - 1])
                 if words.num > (0 if until_contact else MAX_WORDS):
                     break
-        contacts = None
+        lists = None
         if lists_contacts:
-            contacts = ContactLists(
-                ffi.buffer(words.arr, words.num * WORD) if words.num else b"",
-                ends,
-                np.frombuffer(arbiters.float_buf(), np.complex128) if words.num else np.empty(0, np.complex128),
-                VECTORS_OF_TWO_POINTS if polygons else VECTORS,
-                warm_starts,
-            )
-        return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], contacts, is_checked)
+            width = VECTORS_OF_TWO_POINTS if polygons else VECTORS
+            memory = ffi.buffer(words.arr, words.num * WORD) if words.num else b""
+            lists = ContactLists(memory, ends, contacts.numbers(np.complex128), width, warm_starts)
+        return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], lists, is_checked)
 
     def _put_in_order(self, row: FloatArray, order_of: OrderOf) -> None:
         """Bring the last list of bodies, (6·R,), into the order of the reader, and drop its ids."""
-        ids = self._bodies._int_arr
-        order = order_of(ffi.buffer(ids.arr, ids.num * WORD)[:])
+        order = order_of(self._bodies.words())
         if order is not None:
             row[:] = row.reshape(-1, STATE_WIDTH)[order].reshape(-1)
-        ids.num = 0
+        self._bodies.integers.num = 0
 
     def _prepare(self, rows: int, width: int) -> FloatArray:
         """Return memory for lists of bodies, (rows, width), into which they will be written."""
         size = (rows + 1) * width  # one row more than needed: a full array would grow
         if len(self._states) < size:
             self._states = np.empty(size)
-        self._bodies.set_float_buf(self._states)
+        self._bodies.buffer.set_float_buf(self._states)
         self._bodies.clear()
         return self._states[: rows * width].reshape(rows, width)

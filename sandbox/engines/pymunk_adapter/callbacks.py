@@ -32,7 +32,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.common.colliders import LEAN, WallSegment
 from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, rebound
-from sandbox.engines.pymunk_adapter.reader import address_of
+from sandbox.engines.pymunk_adapter.munk2d_memory import address_of
 from sandbox.scene.compile.contacts import PairTable
 from sandbox.scene.description.world import Kick
 from sandbox.scene.geometry.vectors import is_left_of_bend

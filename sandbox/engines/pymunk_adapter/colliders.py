@@ -312,15 +312,14 @@ class StaticShapes:
             self._setter.one_way_walls.walls.update(shapes)
         return shapes
 
-    def reshape(self, before: Scene, after: Scene) -> bool:
-        """Change the points of walls to those of another scene; return whether some changed. `rebuild` must follow."""
+    def reshape(self, before: Scene, after: Scene) -> None:
+        """Change the points of walls to those of another scene. `rebuild` must follow."""
         if not self._is_created or before.walls == after.walls:
-            return False
-        first, changed = len(before.planes), False
+            return
+        first = len(before.planes)
         for index, (old, new) in enumerate(zip(before.walls, after.walls, strict=True), first):
             if old.points == new.points:
                 continue
-            changed = True
             body, shapes = self._colliders[index]
             self._space.remove(*shapes)
             for shape in shapes:
@@ -330,7 +329,6 @@ class StaticShapes:
             shapes[:] = self._shapes(new, body, np.zeros(2), self.reach)  # centre and reach matter for planes only
             for k in shuffled(len(shapes)):
                 self._space.add(shapes[k])
-        return changed
 
     def rebuild(self, scene: Scene, surface: IntArray) -> None:
         """Update the surfaces (F,) and filters of the static colliders."""

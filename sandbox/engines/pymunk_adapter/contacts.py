@@ -3,102 +3,87 @@
 Munk2D caches the contact of two shapes that separate for `persistence` substeps. If they touch again by then, it starts
 each point that it recognises by its hash at the impulse accumulated there (`cpArbiterUpdate`), without applying it
 (`cpArbiterApplyCachedImpulse` skips first contacts). The total impulse that it then reports contains the old impulse a
-second time. Without it, the impulses of a run add up to its change of momentum, to rounding.
-
-`WarmStartCorrection` reads the impulse with which a contact begins, in a callback. That works for every shape: for
-polygons, of whose two points one may be recognised and the other new, and for bodies of several shapes, of which one
-separates while another stays.
-
-`CachedContactCorrection` computes the same correction from the lists of contacts, without callbacks. It needs pairs
-with at most one contact point. The impulse with which such a pair begins again is its last one, in the frame of the
-normal: with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning would
-take a sixth of the step of a pile.
+second time. Without it, the impulses of a run add up to its change of momentum, to rounding. `WarmStarts` lists the
+impulse with which each contact begins, in a callback; this works for every shape.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pymunk
+from pymunk._chipmunk_cffi import lib
+from pymunk.batch import ArbiterFields
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
-from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, PairIndex
+from sandbox.engines.common.contact_log import ContactBatch
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, kick_works
 from sandbox.engines.pymunk_adapter.joint_impulses import JointImpulses
-from sandbox.engines.pymunk_adapter.reader import (
-    ARMS,
-    IMPULSES,
-    WIDTH,
-    WORD,
-    SpaceReader,
-    address_of,
-    impulses_of,
-    points_of,
-)
+from sandbox.engines.pymunk_adapter.munk2d_memory import CONTACT_POINT, WORD, Listing, address_of, points_of
+from sandbox.engines.pymunk_adapter.reader import SpaceReader
 
-WarmStart = tuple[IntArray, FloatArray]
-"""Ids (K, 2) of two bodies each, and the impulses (K, 2), N·s, on the first with which their contacts began."""
+WarmStart = tuple[IntArray, ComplexArray]
+"""Ids (K, 2) of two bodies each, and the impulses (K,), N·s, on the first with which their contacts began."""
+
+BEGINNING = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.TOTAL_IMPULSE
 
 
-class WarmStartCorrection:
+class WarmStarts:
     """Impulses with which contacts of the last substep began, and which had been applied before they separated."""
 
     def __init__(self, space: pymunk.Space) -> None:
-        self._ids: list[tuple[int, int]] = []
-        self._impulses: list[tuple[float, float]] = []
-        self.pairs = False
-        """whether to collect them by pair"""
-        self.points: dict[int, FloatArray] | None = None
-        """the same point by point, (C, 2) by the address of the arbiter; filled if it is a dict"""
+        self.lists_pairs = False
+        """whether to list them by pair, for `take`"""
+        self.points: dict[int, npt.NDArray[Any]] | None = None
+        """`CONTACT_POINT`s of contacts that began, (C,) by the address of the arbiter; filled if it is a dict"""
+        self._began = Listing(BEGINNING)
         space.on_collision(begin=self._begin)
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
-        x, y = arbiter.total_impulse
-        if not (x or y):
-            return
+        if self.lists_pairs:
+            lib.pmSpaceArbiterIteratorFuncBatched(arbiter._arbiter, self._began.data)
         if self.points is not None:
-            address, impulses = impulses_of(arbiter)
-            self.points[address] = impulses
-        if self.pairs:
-            a, b = arbiter.shapes
-            if a.body is not None and b.body is not None:
-                self._ids.append((a.body.id, b.body.id))
-                self._impulses.append((x, y))
+            self.points[address_of(arbiter._arbiter)] = points_of(arbiter._arbiter)
 
-    @property
-    def found(self) -> bool:
-        """Whether impulses have been collected."""
-        return bool(self._ids)
-
-    def take(self) -> WarmStart:
-        """Return and clear the impulses."""
-        ids, impulses = np.asarray(self._ids, np.int64).reshape(-1, 2), np.asarray(self._impulses).reshape(-1, 2)
-        self._ids, self._impulses = [], []
-        return ids, impulses
+    def take(self) -> WarmStart | None:
+        """Return and clear the impulses; None if all contacts of the last substep began at 0."""
+        if not self._began.integers.num:
+            return None
+        impulses = self._began.numbers(np.complex128)
+        started = np.flatnonzero(impulses)
+        ids = np.frombuffer(self._began.words(), np.int64).reshape(-1, 2)
+        self._began.clear()
+        return (ids[started], impulses[started]) if len(started) else None
 
 
-def subtract_impulses(touching: ContactBatch, pair: IntArray, impulse: FloatArray) -> ContactBatch:
+def subtract_impulses(touching: ContactBatch, pair: IntArray, impulse: ComplexArray) -> ContactBatch:
     """Return contacts without impulses that are counted twice.
 
     Args:
         touching: contacts as pymunk reports them.
-        pair: (K, 2) body indices; if the two have several contacts, it does not matter which is corrected.
-        impulse: (K, 2) on the first of each, N·s.
+        pair: (K, 2) body indices, in either order; if the two have several contacts, it does not matter which is
+            corrected.
+        impulse: (K,) on the first of each, N·s.
     """
-    if not len(pair) or not len(touching.a):
+    key, pair_key = _pair_key(touching.a, touching.b), _pair_key(*pair.T)
+    began = np.sort(pair_key)
+    rows = np.flatnonzero(began[np.minimum(np.searchsorted(began, key), len(began) - 1)] == key)
+    if not len(rows):
         return touching
-    lowest = int(min(touching.a.min(), touching.b.min(), pair.min()))
-    span = int(max(touching.a.max(), touching.b.max(), pair.max())) - lowest + 1
-    key = (touching.a - lowest) * span + touching.b - lowest
-    order = np.argsort(key, kind="stable")
+    rows = rows[np.argsort(key[rows], kind="stable")]
+    row = rows[np.minimum(np.searchsorted(key[rows], pair_key), len(rows) - 1)]
+    found = np.flatnonzero(key[row] == pair_key)
+    row = row[found]
+    sign = np.where(touching.a[row] == pair[found, 0], 1.0, -1.0)
     corrected = touching.impulse.copy()
-    impulse_vector = impulse[:, 0] + 1j * impulse[:, 1]
-    for first, second, sign in ((0, 1, 1.0), (1, 0, -1.0)):
-        pair_key = (pair[:, first] - lowest) * span + pair[:, second] - lowest
-        row = order[np.minimum(np.searchsorted(key, pair_key, sorter=order), len(key) - 1)]
-        found = key[row] == pair_key
-        np.subtract.at(corrected, row[found], sign * impulse_vector[found])
-        pair, impulse_vector = pair[~found], impulse_vector[~found]  # some may be listed in the other order
+    np.subtract.at(corrected, row, sign * impulse[found])
     return touching._replace(impulse=corrected)
+
+
+def _pair_key(a: IntArray, b: IntArray) -> IntArray:
+    """Return a number for each pair of indices that does not depend on their order."""
+    key: IntArray = (np.minimum(a, b) << 32) + np.maximum(a, b)
+    return key
 
 
 NO_IMPULSES: ComplexArray = np.empty((0, 0), np.complex128)
@@ -150,9 +135,9 @@ class ContactPoints(NamedTuple):
 class ContactPointReader:
     """Reads the contact points of a space after each substep."""
 
-    def __init__(self, space: pymunk.Space, warm_start: WarmStartCorrection, pair_callbacks: PairCallbacks) -> None:
-        self._space, self._warm_start, self._pair_callbacks = space, warm_start, pair_callbacks
-        warm_start.points, pair_callbacks.recorded_kicks = {}, {}
+    def __init__(self, space: pymunk.Space, warm_starts: WarmStarts, pair_callbacks: PairCallbacks) -> None:
+        self._space, self._warm_starts, self._pair_callbacks = space, warm_starts, pair_callbacks
+        warm_starts.points, pair_callbacks.recorded_kicks = {}, {}
 
     def read(self, index: dict[Any, int]) -> ContactPoints:
         """Return the points of the last substep, with the impulses applied in it.
@@ -160,22 +145,21 @@ class ContactPointReader:
         Args:
             index: body index of each `cpBody` that moves; all others are static.
         """
-        warm_start = self._warm_start.points
+        began = self._warm_starts.points
         first: list[int] = []
         second: list[int] = []
         normal: list[tuple[float, float]] = []
         slip_target: list[float] = []
-        records: list[FloatArray] = []
+        records: list[npt.NDArray[Any]] = []
         addresses: list[int] = []
         kicks = self._pair_callbacks.recorded_kicks
         for arbiter in self._space._get_arbiters():
             if arbiter.state >= NOT_TOUCHING:
                 continue
             record = points_of(arbiter)
-            if warm_start:
-                applied_before = warm_start.get(address_of(arbiter))
-                if applied_before is not None:
-                    record[:, IMPULSES] -= applied_before  # applied before they separated
+            if began and (applied_before := began.get(address_of(arbiter))) is not None:
+                for impulse in ("jnAcc", "jtAcc"):
+                    record[impulse] -= applied_before[impulse]
             records.append(record)
             if kicks:
                 addresses.append(address_of(arbiter))
@@ -187,82 +171,17 @@ class ContactPointReader:
                 second.append(b)
                 normal.append(n)
                 slip_target.append(target)
-        if warm_start:
-            warm_start.clear()
+        if began:
+            began.clear()
         kick = np.zeros(len(first))
         if kicks:
             kick = kick_works(kicks, addresses, [len(record) for record in records])
             kicks.clear()
-        table = np.concatenate(records) if records else np.empty((0, WIDTH))
-        arms, impulses = table[:, ARMS], table[:, IMPULSES]
+        table = np.concatenate(records) if records else np.empty(0, CONTACT_POINT)
         indices = np.asarray(first, np.int64), np.asarray(second, np.int64)
         normals = np.asarray(normal, np.float64).reshape(-1, 2)
-        points = arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1]
+        points = table["r1"], table["r2"], normals, table["jnAcc"], table["jtAcc"]
         return ContactPoints(*indices, *points, kick, np.asarray(slip_target, np.float64))
-
-
-ColliderPair = tuple[int, int]
-"""Indices of two bodies or static colliders, the lower first."""
-
-
-class CachedContactCorrection:
-    """Pairs that have separated and that pymunk still caches."""
-
-    def __init__(self, reader: SpaceReader, collider_count: int) -> None:
-        """Start after a first reading without cached pairs.
-
-        Args:
-            reader: of the space; from now on it keeps each listing for one more reading.
-            collider_count: number of static colliders.
-        """
-        self._reader, self._collider_count = reader, collider_count
-        self._rows = PairIndex()
-        self._last = NO_CONTACTS
-        self._separated: dict[ColliderPair, complex] = {}
-        """pair → last impulse, N·s, in the frame of its normal"""
-        reader.keep_last = True
-
-    def correct(self, contacts: ContactBatch) -> ContactBatch:
-        """Return contacts that differ from the last ones, without impulses that are counted twice."""
-        last = self._last
-        # pymunk lists either body first.
-        lower, higher = np.minimum(contacts.a, contacts.b), np.maximum(contacts.a, contacts.b)
-        row, new = self._rows.find(lower + self._collider_count, higher + self._collider_count)
-        self._rows.keep(np.arange(len(contacts.a)))
-        self._last = contacts
-        ended = np.ones(len(last.a), np.bool_)
-        lasting = np.ones(len(contacts.a), np.bool_)
-        lasting[new] = False
-        ended[row[lasting]] = False
-        ended_rows = np.flatnonzero(ended)
-        if len(ended_rows):
-            impulse, normal = self._reader.last_vectors(ended_rows)
-            for pair, last_impulse in zip(_pairs(last, ended_rows), (impulse / normal).tolist(), strict=True):
-                self._separated[pair] = last_impulse
-        if not self._separated:
-            return contacts
-        reopened = [
-            (k, self._separated.pop(pair))
-            for k, pair in zip(new.tolist(), _pairs(contacts, new), strict=True)
-            if pair in self._separated
-        ]
-        if self._separated:  # a pair that pymunk no longer caches begins at 0
-            cached = set(map(_pair, *self._reader.cached().T.tolist()))
-            self._separated = {pair: last_impulse for pair, last_impulse in self._separated.items() if pair in cached}
-        if not reopened:
-            return contacts
-        impulse = contacts.impulse.copy()
-        for k, last_impulse in reopened:
-            impulse[k] -= last_impulse * contacts.normal[k]
-        return contacts._replace(impulse=impulse)
-
-
-def _pairs(touching: ContactBatch, rows: IntArray) -> list[ColliderPair]:
-    return list(map(_pair, touching.a[rows].tolist(), touching.b[rows].tolist()))
-
-
-def _pair(a: int, b: int) -> ColliderPair:
-    return (a, b) if a < b else (b, a)
 
 
 class ContactLists:
@@ -316,40 +235,27 @@ class ContactLists:
 
 
 class ContactReader:
-    """Contacts of a space. Nothing is read before the first call."""
+    """Contacts of a space. Nothing is read before the first call; from then on impulses are corrected."""
 
-    def __init__(
-        self, space: pymunk.Space, reader: SpaceReader, pair_callbacks: PairCallbacks, collider_count: int
-    ) -> None:
-        self._space, self._reader, self._pair_callbacks, self._collider_count = (
-            space,
-            reader,
-            pair_callbacks,
-            collider_count,
-        )
-        self._warm_start: WarmStartCorrection | None = None
-        self._cached_correction: CachedContactCorrection | None = None
+    def __init__(self, space: pymunk.Space, reader: SpaceReader, pair_callbacks: PairCallbacks) -> None:
+        self._space, self._reader, self._pair_callbacks = space, reader, pair_callbacks
+        self._warm_starts: WarmStarts | None = None
         self._points: ContactPointReader | None = None
 
-    def touching(self, polygons: bool, single: bool, impulses_suffice: bool) -> ContactBatch | ComplexArray:
-        """Return the present contacts; from the first call on, their impulses are corrected.
+    def touching(self, polygons: bool, impulses_suffice: bool) -> ContactBatch | ComplexArray:
+        """Return the present contacts.
 
         Args:
             polygons: whether there are polygons, which may touch in two points.
-            single: whether two bodies have at most one contact.
             impulses_suffice: whether impulses alone suffice if the contacts are those of the last call, in that order.
         """
-        return self._corrected(self._reader.read_contacts(polygons), single, impulses_suffice, self.take_warm_start())
+        is_same = self._reader.read_contacts(polygons) and self.is_started
+        self._start().lists_pairs = True
+        return self._corrected(is_same and impulses_suffice, self.take_warm_start())
 
     def take_warm_start(self) -> WarmStart | None:
         """Return and clear the impulses with which contacts of the last substep began; None if there are none."""
-        warm_start = self._warm_start
-        return warm_start.take() if warm_start is not None and warm_start.pairs and warm_start.found else None
-
-    @property
-    def has_warm_starts(self) -> bool:
-        """Whether impulses with which contacts begin are collected by callbacks."""
-        return self._warm_start is not None and self._warm_start.pairs
+        return None if self._warm_starts is None else self._warm_starts.take()
 
     @property
     def is_listed(self) -> bool:
@@ -358,15 +264,15 @@ class ContactReader:
 
     @property
     def is_started(self) -> bool:
-        """Whether contacts have been read, so that the kind of correction is known."""
-        return self.has_warm_starts or self._cached_correction is not None
+        """Whether contacts have been read, so that impulses with which they begin are listed."""
+        return self._warm_starts is not None and self._warm_starts.lists_pairs
 
     def touching_in(
-        self, lists: ContactLists, k: int, polygons: bool, single: bool, impulses_suffice: bool
+        self, lists: ContactLists, k: int, polygons: bool, impulses_suffice: bool
     ) -> ContactBatch | ComplexArray:
         """Return the contacts of a substep of a batch, as `touching` would have done after it."""
-        same = self._reader.use_list(lists.words(k), lists.vectors(k), polygons)
-        return self._corrected(same, single, impulses_suffice, lists.warm_starts.get(k))
+        is_same = self._reader.use_list(lists.words(k), lists.vectors(k), polygons)
+        return self._corrected(is_same and impulses_suffice, lists.warm_starts.get(k))
 
     def impulses_in(self, lists: ContactLists, begin: int, polygons: bool) -> ComplexArray:
         """Return the impulses (S, K), N·s, of substeps from `begin` on with the same contacts as the last one read.
@@ -380,42 +286,23 @@ class ContactReader:
         reader.use_list(reader.id_words, lists.vectors(end - 1), polygons)
         return lists.stack(begin, end)[:, reader.impulse_columns()]
 
-    def _corrected(
-        self, same: bool, single: bool, impulses_suffice: bool, warm_start: WarmStart | None
-    ) -> ContactBatch | ComplexArray:
-        """Return the contacts of the present list of the reader; `same` as `SpaceReader.read_contacts` returns."""
-        if single and self._are_listings_enough():
-            if same and impulses_suffice and self._cached_correction is not None:
-                return self._reader.impulses()
-            found = self._reader.touching()
-            if self._cached_correction is None:
-                self._cached_correction = CachedContactCorrection(self._reader, self._collider_count)
-            elif same:
-                return found
-            return self._cached_correction.correct(found)
-        if same and impulses_suffice and self.has_warm_starts and warm_start is None:
+    def _corrected(self, impulses_suffice: bool, warm_start: WarmStart | None) -> ContactBatch | ComplexArray:
+        """Return the contacts of the present list of the reader, without impulses that are counted twice."""
+        if impulses_suffice and warm_start is None:
             return self._reader.impulses()
-        self._start_warm_start_correction().pairs = True
         found = self._reader.touching()
-        return (
-            found
-            if warm_start is None
-            else subtract_impulses(found, self._reader.indices(warm_start[0]), warm_start[1])
-        )
+        if warm_start is None:
+            return found
+        ids, impulses = warm_start
+        return subtract_impulses(found, self._reader.indices(ids), impulses)
 
-    def _are_listings_enough(self) -> bool:
-        """Return whether listings suffice: no pair was cached before the first, and no callback is in use."""
-        if self._warm_start is not None and self._warm_start.pairs:
-            return False
-        return self._cached_correction is not None or not len(self._reader.cached())
-
-    def _start_warm_start_correction(self) -> WarmStartCorrection:
-        if self._warm_start is None:
-            self._warm_start = WarmStartCorrection(self._space)
-        return self._warm_start
+    def _start(self) -> WarmStarts:
+        if self._warm_starts is None:
+            self._warm_starts = WarmStarts(self._space)
+        return self._warm_starts
 
     def points(self) -> ContactPoints:
         """Return the contact points of the last substep; from the first call on, their impulses are corrected."""
         if self._points is None:
-            self._points = ContactPointReader(self._space, self._start_warm_start_correction(), self._pair_callbacks)
+            self._points = ContactPointReader(self._space, self._start(), self._pair_callbacks)
         return self._points.read(self._reader.records)

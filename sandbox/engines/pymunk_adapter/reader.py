@@ -1,20 +1,15 @@
-"""Bulk reads from Munk2D: bodies, arbiters, and the indices of pymunk's bodies.
-
-Of the contact of two shapes, pymunk's public calls return the impulse of the pair, which does not determine the angular
-impulse of polygons that touch in two points. `points_of` reads the contact points from Munk2D's arbiters, as pymunk
-does to pickle a space.
-"""
+"""Bulk reads from Munk2D: bodies, arbiters, and the indices of pymunk's bodies."""
 
 from typing import Any
 
 import numpy as np
 import pymunk
-from pymunk import Arbiter
-from pymunk._chipmunk_cffi import ffi, lib
+from pymunk._chipmunk_cffi import lib
 from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies, set_space_bodies
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
+from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_CONTACT, Listing
 
 LARGEST_TABLE = 1 << 22
 """Slots; 32 MB. If addresses are more scattered than that, ids are searched instead."""
@@ -76,13 +71,6 @@ VECTORS, VECTORS_OF_TWO_POINTS = 4, 6
 
 NO_VECTORS: ComplexArray = np.empty(0, np.complex128)
 
-WORD = ffi.sizeof("uintptr_t")
-"""bytes of an integer in a buffer"""
-
-LIST = ffi.addressof(lib, "pmSpaceArbiterIteratorFuncBatched")
-"""Function that writes an arbiter into a buffer. `get_space_arbiters` looks it up at each call, which takes as long as
-the call itself."""
-
 
 class SpaceReader:
     """Reads bodies and arbiters of one space.
@@ -90,9 +78,6 @@ class SpaceReader:
     pymunk lists bodies in its own order, which changes when a body is removed, so rows are identified by body id. A
     body that falls asleep or wakes changes the order too: with `can_sleep`, each list is brought into the order in
     which ids were read.
-
-    The memory of a buffer moves when it grows, and each new buffer leaks. Hence there is one buffer of each kind, and
-    only copies of its contents are returned.
     """
 
     def __init__(self, space: pymunk.Space, can_sleep: bool = False) -> None:
@@ -101,14 +86,9 @@ class SpaceReader:
         self._ids: IntArray = np.empty(0, np.int64)  # of all bodies, in the order of rows
         self._rank = self._ids  # rank of each of these ids
         self._reordered: tuple[bytes, IntArray] = b"", self._ids  # ids of a list in another order, and its sorted rows
-        self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
-        self._listing = listing_into(self._arbiters)
-        self.keep_last = False
-        """whether the vectors of the previous list of contacts are kept; set once, after a `read_contacts`"""
-        self._spare: tuple[Buffer, Any] | None = None  # buffer and listing of the list before the present one
-        # vectors of the previous list, and the first vector of each of its contacts
-        self._last: tuple[ComplexArray, IntArray] = NO_VECTORS, np.empty(0, np.int64)
-        self._vectors = NO_VECTORS  # of the present list
+        self._bodies, self._pairs, self._forces = Buffer(), Buffer(), Buffer()
+        self._contacts = Listing(TOUCH)
+        self._vectors = NO_VECTORS  # of the present list of contacts
         self._index_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
         self._id_words, self._width = b"", VECTORS  # ids of the present list, and number of vectors of a contact
@@ -196,9 +176,9 @@ class SpaceReader:
 
     def pairs(self) -> IntArray:
         """Return the indices (K, 2) of bodies in contact. A pair is listed once for each two shapes that touch."""
-        self._arbiters.clear()
-        get_space_arbiters(self._space, PAIR_FIELDS, self._arbiters)
-        words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
+        self._pairs.clear()
+        get_space_arbiters(self._space, PAIR_FIELDS, self._pairs)
+        words = np.frombuffer(self._pairs.int_buf(), np.int64).reshape(-1, 3)
         if not len(words):
             return np.empty((0, 2), np.int64)
         touching = words[words[:, 2] > 0]
@@ -210,26 +190,20 @@ class SpaceReader:
         If the same ids are listed in the same order as at the last call, the contacts are the same, and only their
         impulses are new.
         """
-        if self.keep_last:
-            self._swap_buffers()
-        self._arbiters.clear()
-        self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
-        lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
-        int_array = self._arbiters._int_arr  # the memory behind `int_buf`
-        if not int_array.num:
-            return self.use_list(b"", NO_VECTORS, polygons)
-        words = ffi.buffer(int_array.arr, int_array.num * WORD)[:]
-        return self.use_list(words, np.frombuffer(self._arbiters.float_buf(), np.complex128), polygons)
+        contacts = self._contacts
+        contacts.clear()
+        contacts.data.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
+        lib.cpSpaceEachCachedArbiter(self._space._space, LIST_CONTACT, contacts.data)
+        return self.use_list(contacts.words(), contacts.numbers(np.complex128), polygons)
 
     def use_list(self, words: bytes, vectors: ComplexArray, polygons: bool) -> bool:
         """Take a list of contacts as the present one; return as `read_contacts` does.
 
         Args:
             words: two ids and the number of points of each contact.
-            vectors: of all contacts. They must stay as they are until the next list but one.
+            vectors: of all contacts. They must stay as they are until the next list.
             polygons: whether contacts have up to two points.
         """
-        self._last = self._vectors, self._first_vectors
         self._vectors = vectors
         width = VECTORS_OF_TWO_POINTS if polygons else VECTORS
         same = words == self._id_words and width == self._width
@@ -262,30 +236,6 @@ class SpaceReader:
         """The ids of the present list."""
         return self._id_words
 
-    def own_list(self) -> None:
-        """Copy the present list, so that its memory may change."""
-        self._vectors = self._vectors.copy()
-
-    def _swap_buffers(self) -> None:
-        """Reuse the buffer of the previous list, and keep that of the present one."""
-        if self._spare is None:
-            spare = Buffer()
-            self._spare = spare, listing_into(spare)
-        spare, listing = self._spare
-        self._spare = self._arbiters, self._listing
-        self._arbiters, self._listing = spare, listing
-
-    def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the impulses, N·s, and normals (K,) of some rows of the previous list."""
-        vectors, firsts = self._last
-        return vectors[firsts[rows]], vectors[firsts[rows] + 1]
-
-    def cached(self) -> IntArray:
-        """Return the body indices (C, 2) of contacts that have ended and that Munk2D still caches."""
-        words = np.frombuffer(self._id_words, np.int64).reshape(-1, 3)
-        ended = words[words[:, 2] == 0]
-        return np.column_stack([self._index_of.indices(ended[:, k]) for k in (0, 1)])
-
     def impulses(self) -> ComplexArray:
         """Return the impulses (K,), N·s, of the present contacts, on the first body of each."""
         if not len(self._touching_rows):
@@ -309,33 +259,3 @@ class SpaceReader:
             twice = words[:, 2].take(rows) > 1
             point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
         return ContactBatch(a, b, vectors[:, 0], vectors[:, 1], point)
-
-
-def listing_into(buffer: Buffer) -> Any:
-    """Return the struct by which Munk2D lists into a buffer; pymunk's own functions create one at each call."""
-    listing = ffi.new("pmBatchedData *")
-    listing.floatArray, listing.intArray = buffer._float_arr, buffer._int_arr
-    return listing
-
-
-WIDTH = 12
-"""Doubles of a contact point (`cpContact`): two arms, two effective masses, bounce, impulses along the normal and to
-its left, three more, hash."""
-
-ARMS, IMPULSES = slice(0, 4), slice(7, 9)
-
-
-def points_of(arbiter: Any) -> FloatArray:
-    """Return the contact points of a `cpArbiter`, (C, 12)."""
-    size = 8 * WIDTH * arbiter.count
-    return np.frombuffer(ffi.buffer(arbiter.contacts, size)[:]).reshape(-1, WIDTH).copy()
-
-
-def address_of(arbiter: Any) -> int:
-    """Return the address of a `cpArbiter`."""
-    return int(ffi.cast("uintptr_t", arbiter))
-
-
-def impulses_of(arbiter: Arbiter) -> tuple[int, FloatArray]:
-    """Return the address of an arbiter, and the present impulses (C, 2) of its points, N·s."""
-    return address_of(arbiter._arbiter), points_of(arbiter._arbiter)[:, IMPULSES]

@@ -58,12 +58,9 @@ class SpaceBodies(SpaceBodyTable):
         """(N,) collision layer of each body"""
         self.joints = SpaceJoints(self._space)
         self._polygons, self._skipped_numbers = False, 0
-        self._has_single_contacts = False  # two bodies have at most one contact
         self._by_name: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
-        self.contact_reader = ContactReader(
-            self._space, self._reader, self._surface_setter.pair_callbacks, len(scene.fixed_names)
-        )
+        self.contact_reader = ContactReader(self._space, self._reader, self._surface_setter.pair_callbacks)
         """reads the contacts of the space"""
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.drives = SpaceDrives(setup, self._space, settings.h)
@@ -101,9 +98,6 @@ class SpaceBodies(SpaceBodyTable):
         for index, state in zip(indices[order].tolist(), states[order].tolist(), strict=True):
             self._add(index, bodies, state)
         self._register()
-        self._has_single_contacts = not (
-            self._polygons or self.can_repeat_pairs or self._surface_setter.one_way_walls.walls
-        )
         self.drives.add_callbacks(self._collision_types)
         if self._setup.time and self._surface_setter.one_way_walls.walls:
             walls = {index: each for each, index in self._static_shapes.ids.items()}
@@ -238,8 +232,7 @@ class SpaceBodies(SpaceBodyTable):
 
     def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's coefficients, walls, surfaces or world."""
-        if self._static_shapes.reshape(self._scene, scene):
-            self._has_single_contacts = False  # contacts with the removed shapes vanish without being listed as ended
+        self._static_shapes.reshape(self._scene, scene)
         self.rebuild_world(scene)
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch = matrix.touches
@@ -346,7 +339,7 @@ class SpaceBodies(SpaceBodyTable):
             lists_contacts=lists_contacts,
             polygons=self._polygons,
             until_contact=until_contact,
-            warm_start=contacts.take_warm_start if contacts.has_warm_starts else None,
+            warm_start=contacts.take_warm_start if lists_contacts else None,
             before_substep=before_substep if self.thrusts or self.constant_forces else None,
             needs_check=self._state_check(),
         )
@@ -418,7 +411,7 @@ class SpaceBodies(SpaceBodyTable):
         Yields:
             After each substep, or after several with the same pairs: the number of the next substep, and of contacts.
         """
-        reader, polygons, single = self.contact_reader, self._polygons, self._has_single_contacts
+        reader, polygons = self.contact_reader, self._polygons
         k = 0
         while k < len(lists):
             impulses = reader.impulses_in(lists, k, polygons) if log.has_distinct_rows else NO_IMPULSES
@@ -426,7 +419,7 @@ class SpaceBodies(SpaceBodyTable):
                 log.add_impulse_rows(impulses)
                 k, count = k + len(impulses), impulses.size
             else:
-                contacts = reader.touching_in(lists, k, polygons, single, log.has_distinct_rows)
+                contacts = reader.touching_in(lists, k, polygons, log.has_distinct_rows)
                 if isinstance(contacts, ContactBatch):
                     log.record(float(times[k]), contacts)
                     count = len(contacts.a)
@@ -435,7 +428,6 @@ class SpaceBodies(SpaceBodyTable):
                     count = len(contacts)
                 k += 1
             yield k, count
-        self._reader.own_list()
 
     def _apply_drag(self, indices: IntArray, state: FloatArray) -> None:
         """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene with drag."""
@@ -485,7 +477,7 @@ class SpaceBodies(SpaceBodyTable):
         """Return the present contacts, as `ContactReader.touching` does."""
         if not self._moving:
             return NO_CONTACTS
-        return self.contact_reader.touching(self._polygons, self._has_single_contacts, impulses_suffice)
+        return self.contact_reader.touching(self._polygons, impulses_suffice)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or out of bounds, and a description; else None.
