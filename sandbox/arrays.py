@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,9 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 ComplexArray = npt.NDArray[np.complex128]
 """2-vectors as complex numbers"""
+
+Number = TypeVar("Number", float, FloatArray)
+"""A number, or an array of them"""
 
 
 def state_hash(time: float, arrays: Iterable[npt.NDArray[Any]]) -> str:

@@ -13,7 +13,7 @@ from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.pymunk_adapter.colliders import jointed_surfaces
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.demands import on_floor
+from sandbox.scene.compile.demands import Demand, demands, on_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Wall
@@ -66,6 +66,8 @@ def _world(setup: Setup, settings: Settings) -> Iterator[Obstacle]:
         if getattr(scene.world, key):
             message = "pymunk has no drag with wind (space.damping slows spins too); set it to 0"
             yield Obstacle(f"world.{key}", message)
+    if Demand.LIFT in demands(setup):
+        yield Obstacle("", "pymunk has no lift of spinning bodies; set it to 0")
 
 
 def _forces(setup: Setup) -> Iterator[Obstacle]:

@@ -87,6 +87,7 @@ FEATURES: dict[str, Document] = {
         "wall": [{**_WALL, "layers": ["ramp"]}],
     },
     "bounds": {"world": {"bounds": [[-9.0, 2.9], [9.0, 9.0]]}},
+    "lift": {"ball": [_ball("c", -2.0, lift=0.1, angular_velocity=3.0, velocity=[1.0, 0.0])]},
     "air": {"world": {"linear_drag": 0.5, "quadratic_drag": 0.5, "wind": [1.0, 0.0]}},
     "damping": {"world": {"damping": 0.5}},
     "materials": {

@@ -146,6 +146,8 @@ PROOFS: dict[Demand, Proof] = {
     Demand.ROTATION: Proof(scene(ball=[ball(angular_velocity=2.0)]), angle(2.0)),
     Demand.GRAVITY: Proof(scene(world=GRAVITY, ball=[ball(vx=1.0)]), position(1.0, -5.0)),
     Demand.DRAG: Proof(scene(world={"linear_drag": 2.0}, ball=[ball(vx=1.0)]), velocity(math.exp(-2.0), 0.0)),
+    # in a second, lift turns the velocity by s·ω = π/2
+    Demand.LIFT: Proof(scene(ball=[ball(vx=1.0, angular_velocity=5.0, lift=0.1 * math.pi)]), velocity(0.0, 1.0)),
     # velocity and spin keep a quarter of their values
     Demand.DAMPING: Proof(
         scene(world={"damping": 0.25}, ball=[ball(vx=1.0, angular_velocity=1.0)]), both(velocity(0.25, 0.0), spin(0.25))

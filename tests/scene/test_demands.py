@@ -63,6 +63,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.DRAG, False, {"world": {"wind": [5, 0]}, "ball": [BALL]}, "no drag"),
     (Demand.DAMPING, True, {"world": {"damping": 0.9}, "ball": [BALL]}, "0.9"),
     (Demand.DAMPING, False, {"world": {"damping": 1.0}, "ball": [BALL]}, "no damping"),
+    (Demand.LIFT, True, {"ball": [{**BALL, "lift": 0.1}]}, "1 body has lift"),
+    (Demand.LIFT, False, {"ball": [BALL]}, "no body has lift"),
     (Demand.BALL_BALL, True, {"ball": [BALL, BALL]}, "can collide"),
     (Demand.BALL_BALL, True, {"ball": [{**BALL, "collides": "fixed"}, ROCK]}, "can collide"),
     (Demand.BALL_BALL, False, {"ball": [BALL, GHOST]}, "2 of 2 cannot collide"),

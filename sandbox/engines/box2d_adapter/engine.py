@@ -45,6 +45,7 @@ ABSENT = {
 OWN = frozenset(
     {
         Demand.DAMPING,
+        Demand.LIFT,
         Demand.POLYGONS,
         Demand.PASSABLE,
         Demand.SURFACE_SPEED,

@@ -17,9 +17,10 @@ from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import HasBodyStore
 from sandbox.engines.common.contact_log import ContactLog, join_batches
-from sandbox.engines.common.force_field import ForceField
 from sandbox.engines.contract import Divergence, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.forces.air import ALL, Air, mean_acceleration
+from sandbox.engines.forces.field import ForceField
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -85,16 +86,21 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         return {"substeps": self.substeps}
 
     def _set_air(self, scene: Scene) -> None:
-        """Apply gravity, drag and damping of a scene; what Box2D lacks are forces, constant during a substep."""
-        air = scene.world
-        self._world.set_gravity(air.gravity)
-        self._world.set_damping(air.linear_drag + air.damping_rate, air.damping_rate)
-        self._has_wind = bool(air.quadratic_drag or (air.linear_drag and any(air.wind)))
+        """Apply gravity, drag and damping of a scene.
+
+        Box2D has drag in still air, and damping. With wind, quadratic drag or lift, the air is a force, constant during
+        a substep.
+        """
+        self._air = air = Air.of(scene.world, self._store.bodies)
+        self._world.set_gravity(scene.world.gravity)
+        is_still = air.is_linear and not any(scene.world.wind)
+        self._has_air_forces = air.flows and not is_still
+        self._world.set_damping(air.linear_drag * is_still + air.damping_rate, air.damping_rate)
 
     @property
     def _has_varying_forces(self) -> bool:
         """Whether each substep has to be a step of Box2D: forces depend on the state, or there are drives or zones."""
-        forces = self._has_wind or self._joints.has_springs or not self._field.empty
+        forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
         return forces or self._drives is not None or self._zoned is not None
 
     @property
@@ -102,22 +108,17 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         store = self._store
         return self._has_varying_forces or bool(store.force.any() or store.torque.any())
 
-    def _apply_forces(self, time: float) -> None:
-        """Apply the forces of a step of Box2D that starts at a time, s.
+    def _apply_forces(self, time: float, length: float) -> None:
+        """Apply the forces of a step of Box2D that starts at a time, s, and takes a length, s.
 
-        They are constant forces, wind, quadratic drag, attraction, thrusts and springs.
+        They are constant forces, attraction, thrusts and springs, and the air.
         """
-        store, air = self._store, self._store.scene.world
+        store, air = self._store, self._air
         force, torque = store.force.copy(), store.torque.copy()
         mass, moving = store.bodies.mass, store.moving & ~store.kinematic
         gravity = store.gravity
         if gravity.ndim == 2:  # some bodies have that of a zone
-            force += np.where(moving[:, None], mass[:, None] * (gravity - np.asarray(air.gravity)), 0.0)
-        if self._has_wind:
-            relative = store.velocity - np.asarray(air.wind)
-            speed = np.hypot(relative[:, 0], relative[:, 1])[:, None]
-            drag = air.linear_drag * np.asarray(air.wind) - air.quadratic_drag * speed * relative
-            force += np.where(moving[:, None], mass[:, None] * drag, 0.0)
+            force += np.where(moving[:, None], mass[:, None] * (gravity - np.asarray(store.scene.world.gravity)), 0.0)
         if not self._field.empty:
             x = np.zeros((2, len(mass), 3))
             x[0, :, :2], x[0, :, 2] = store.position, store.angle
@@ -126,6 +127,11 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             torque += np.where(moving, store.bodies.moment * acceleration[:, 2], 0.0)
         if self._joints.has_springs:
             self._joints.add_spring_forces(force, torque)
+        if self._has_air_forces:
+            world_gravity, applied = store.scene.world.gravity, force / mass[:, None]
+            state = store.velocity, store.angular_velocity
+            mean = mean_acceleration(air, ALL, world_gravity, *state, applied, length)
+            force = np.where(moving[:, None], mass[:, None] * (mean - np.asarray(world_gravity)), 0.0)
         for index in np.flatnonzero((force.any(axis=1) | (torque != 0.0)) & moving).tolist():
             self._world.push(index, force[index], float(torque[index]))
 
@@ -144,7 +150,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         store, world = self._store, self._world
         start = store.position.copy() if self._observer is not None else None
         if self._has_forces:
-            self._apply_forces(time)
+            self._apply_forces(time, length)
         if self._drives is not None:
             self._drives.plan(length)
         rows = world.raw_rows(1)

@@ -16,6 +16,7 @@ from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.requirements import combination_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.demands import Demand, demands, demands_of_body
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides
 from sandbox.scene.description.world import Settings
@@ -68,7 +69,7 @@ class PymunkBodies(BodyStore):
         super().__init__(setup, settings.h)
         self.velocity[~self.bodies.fixed] += self.ahead
         self.space_bodies.layer = self.layer
-        self.space_bodies.rebuild(self.scene, self.contact_matrix)
+        self.space_bodies.rebuild(self.scene, self.bodies, self.contact_matrix)
         self.distribute(np.arange(len(self.bodies)))
 
     def _derive_solver_arrays(self) -> None:
@@ -142,7 +143,7 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.change`, or the settings or pymunk do not support the change.
         """
-        if faults := combination_faults(setup.scene, self._settings, bool(self.bodies.kinematic.any())):
+        if faults := combination_faults(setup.scene, self._settings, self._demands(setup)):
             raise ActionError(faults[0])
         has_new_bodies = spawned is not None or not has_same_bodies(setup.scene, self.scene)
         self.refresh()
@@ -155,10 +156,15 @@ class PymunkBodies(BodyStore):
         self.particles.world = setup.scene.world
         self.particles.rebuild()
         if has_new_bodies:
-            self.space_bodies.rebuild(setup.scene, self.contact_matrix)
+            self.space_bodies.rebuild(setup.scene, self.bodies, self.contact_matrix)
         else:
-            self.space_bodies.rebuild_world(setup.scene)
+            self.space_bodies.rebuild_world(setup.scene, self.bodies)
         self.space_bodies.joints.update(setup.links)
+
+    def _demands(self, setup: Setup) -> frozenset[Demand]:
+        """Return the demands of a setup, and of the bodies that actions have added."""
+        added = [e for e in self.bodies.elements[len(self.setup.bodies.elements) :] if isinstance(e, BodySpec)]
+        return demands(setup).union(*map(demands_of_body, added))
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body and return its index, as `BodyStore.add`.
@@ -166,14 +172,14 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.add`, or pymunk does not support the body in the scene.
         """
-        has_kinematic = bool(self.bodies.kinematic.any()) or single.kinematic
-        if faults := combination_faults(self.scene, self._settings, has_kinematic):
+        wanted = self._demands(self.setup) | demands_of_body(single)
+        if faults := combination_faults(self.scene, self._settings, wanted):
             raise ActionError(f"pymunk: {faults[0]}")
         self.refresh()
         index = super().add(single, name)
         self.velocity[index] += np.zeros(2) if single.fixed else self.ahead
         self.space_bodies.layer = self.layer
-        self.space_bodies.rebuild(self.scene, self.contact_matrix)
+        self.space_bodies.rebuild(self.scene, self.bodies, self.contact_matrix)
         self.space_bodies.add_missing_shapes(self.bodies)
         touching = np.flatnonzero(self.present & ~self.contact_matrix.free).tolist()
         outside = [n for n in touching if n != index and not self.space_bodies.holds(n)]

@@ -8,9 +8,9 @@ import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.pymunk_adapter.forces import acceleration
+from sandbox.engines.forces.air import Air, mean_acceleration
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
-from sandbox.scene.description.world import World
+from sandbox.scene.description.base import Point
 
 
 class SpaceBody(NamedTuple):
@@ -175,7 +175,7 @@ class ConstantForces:
         return self._total
 
     def apply(self, members: Mapping[int, SpaceBody]) -> None:
-        """Set forces and torques for the next step, in a scene without drag."""
+        """Set forces and torques for the next step, in a scene without air."""
         if self._prepared is None:
             self._prepared = [
                 (members[index].body._body, ffi.new("cpVect *", force.tolist())[0], torque)
@@ -186,17 +186,18 @@ class ConstantForces:
             if torque:  # pymunk resets it to 0 after each step
                 lib.cpBodySetTorque(record, torque)
 
-    def apply_with_drag(
+    def apply_with_air(
         self,
         members: Mapping[int, SpaceBody],
         loads: Mapping[int, tuple[float, float, float]],
         reader: SpaceReader,
         state: tuple[IntArray, FloatArray],
         springs: FloatArray | None,
-        world: World,
+        air: Air,
+        gravity: Point,
         h: float,
     ) -> None:
-        """Set forces and torques for the next step of h, s, in a scene with drag.
+        """Set forces and torques for the next step of h, s, in a scene whose air acts.
 
         Args:
             members: bodies by index.
@@ -204,7 +205,8 @@ class ConstantForces:
             reader: of the space; it sets the forces on all bodies at once.
             state: body indices (R,), and position, angle, velocity, spin (R, 6).
             springs: (R, 2) N, which pymunk itself adds in that step, or None. Drag reduces their effect.
-            world: drag and wind.
+            air: its coefficients.
+            gravity: m/s².
             h: substep, s.
         """
         indices, values = state
@@ -216,13 +218,11 @@ class ConstantForces:
                 constant = self._total[index][0] if index in self._total else 0.0
                 thrust = loads[index][0:2] if index in loads else 0.0
                 applied[row] = np.add(constant, thrust) * (1.0 / mass[row])
-        if springs is None:
-            reader.set_forces(mass * acceleration(world, values[:, 3:5], applied, h))
-        else:
+        if springs is not None:
             spring_acceleration = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
-            reader.set_forces(
-                mass * (acceleration(world, values[:, 3:5], applied + spring_acceleration, h) - spring_acceleration)
-            )
+            applied += spring_acceleration
+        mean = mean_acceleration(air, indices, gravity, values[:, 3:5], values[:, 5], applied, h)
+        reader.set_forces(mass * (mean if springs is None else mean - spring_acceleration))
         torques = {index: torque for index, (_, torque) in self._total.items()}
         for index, load in loads.items():
             torques[index] = torques.get(index, 0.0) + load[2]

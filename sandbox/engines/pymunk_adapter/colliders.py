@@ -23,6 +23,7 @@ from sandbox.engines.common.colliders import straightened, wall_segments
 from sandbox.engines.common.collision_bits import bits_of_static
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.common.restitution import segment_fractions
+from sandbox.engines.forces.air import Air
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayWalls
 from sandbox.engines.pymunk_adapter.contact_names import is_captured
 from sandbox.scene.compile.bodies import Bodies
@@ -30,7 +31,7 @@ from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, World
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 """m; pymunk's half-planes are segments, whose rounding error grows with their length: 3e-13 m at a reach of 5e3, a
@@ -41,7 +42,7 @@ def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     """Return an empty space with every parameter set. `settings` must be resolved."""
     assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
     space = pymunk.Space(threaded=False)  # with two threads, runs are not repeatable
-    space.gravity = gravity_of(scene)
+    space.gravity = gravity_of(scene.world, Air.of(scene.world, scene.bodies))
     space.damping = scene.world.damping
     space.iterations = settings.iterations
     space.collision_slop = settings.slop
@@ -62,9 +63,9 @@ def skip_numbers(space: pymunk.Space, count: int) -> None:
         space.remove(unused)
 
 
-def gravity_of(scene: Scene) -> tuple[float, float]:
-    """Return the gravity of the space: 0 in a scene with drag, whose forces then include gravity."""
-    return (0.0, 0.0) if scene.world.has_drag else scene.world.gravity
+def gravity_of(world: World, air: Air) -> tuple[float, float]:
+    """Return the gravity of the space: 0 where air acts, whose forces then include gravity."""
+    return (0.0, 0.0) if air.flows else world.gravity
 
 
 @cache

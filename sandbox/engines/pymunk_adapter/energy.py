@@ -11,10 +11,11 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.forces.air import ALL, mean_acceleration
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactPoints
 from sandbox.engines.pymunk_adapter.drives import SpaceDrivenBody, SpaceHingeMotor, SpacePlunger
-from sandbox.engines.pymunk_adapter.forces import acceleration, damping_factor
+from sandbox.engines.pymunk_adapter.forces import damping_factor
 from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpulses, motors, set_unknown_sums, springs
 from sandbox.engines.pymunk_adapter.joints import spring_forces
 from sandbox.scene.compile.bodies import Bodies
@@ -45,7 +46,7 @@ class AppliedImpulses(NamedTuple):
     angular: FloatArray
     """(N,) by constant torques and thrusts, N·m·s"""
     drag: FloatArray
-    """(N, 2) by drag, including its reduction of other forces, and by damping"""
+    """(N, 2) by air, including its change of other forces, and by damping"""
     angular_drag: FloatArray
     """(N,) by damping, N·m·s"""
 
@@ -67,10 +68,11 @@ def applied_impulses(
     constant, torque = _constant_forces(store)
     attraction, (thrust, thrust_torque) = _attraction(store), _thrusts(store)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
-    if world.has_drag:
+    air = store.space_bodies.air
+    if air.flows:
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
-        drag_acceleration = acceleration(world, before.velocity, applied, store.h) - np.asarray(world.gravity) - applied
-        drag = mass * drag_acceleration * h
+        mean = mean_acceleration(air, ALL, world.gravity, before.velocity, before.spin, applied, store.h)
+        drag = mass * (mean - np.asarray(world.gravity) - applied) * h
     if world.has_damping:
         lost = (damping_factor(world.damping, store.h) - 1.0) * (h / store.h)
         drag = lost * mass * before.velocity

@@ -9,7 +9,7 @@ from sandbox.engines.common.solver_settings import BIAS, setting_faults, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.pymunk_adapter.requirements import combination_faults, size_faults
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
-from sandbox.scene.compile.demands import BALLS, FLOOR, JOINT_LIMITS, JOINTS, SURFACES, Demand, unmodelled
+from sandbox.scene.compile.demands import BALLS, FLOOR, JOINT_LIMITS, JOINTS, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -35,6 +35,7 @@ OWN = frozenset(
         *JOINTS - {Demand.PULLEYS},
         *JOINT_LIMITS,
         Demand.DAMPING,
+        Demand.LIFT,
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
@@ -120,7 +121,7 @@ class PymunkEngine:
                 for key in ("sleep_time", "idle_speed")
                 if getattr(settings, key) is not None
             ]
-        missing += combination_faults(scene, settings, bool(setup.bodies.kinematic.any()))
+        missing += combination_faults(scene, settings, demands(setup))
         if on_floor(setup):
             missing += unsupported_by_steppers(setup)
         return (*missing, *overload(setup, settings), *size_faults(setup))

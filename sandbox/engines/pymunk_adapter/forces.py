@@ -1,4 +1,4 @@
-"""Drag, damping, attraction and thrust on bodies.
+"""Air, damping, attraction and thrust on bodies.
 
 `AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
 position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
@@ -7,10 +7,10 @@ Euler and gains energy. In the velocity update the scheme is semi-implicit, whos
 `Thrusts` evaluates thrusts before a step, at the angle to which the step turns the body. The same direction would
 result in the velocity update, but for overlap corrections; a callback from Munk2D takes ten times as long.
 
-Drag is the acceleration of one explicit step. With a drag rate κ, a force F adds φ·(F/m)·h to the velocity of a mass m,
-φ = (1 − e^(−κh))/(κh), and not (F/m)·h. So forces that balance each other, springs, thrusts and attraction among them,
-balance exactly at any h, also with drag. Spin has no drag, and torques act unchanged. Where a joint turns a force into
-a torque, as on a lever held by a rotary spring, the two differ by the factor φ.
+The air gives the acceleration `air.mean_acceleration` of one step. A force F adds φ·(F/m)·h to the velocity of a
+mass m, φ being the mean fraction, and not (F/m)·h, so forces that balance each other balance at any h. Spin has no
+drag, and torques act unchanged. Where a joint turns a force into a torque, as on a lever held by a rotary spring, the
+two differ by the factor φ.
 
 Damping is pymunk's own: in a step it multiplies velocities and spins by a factor before it adds forces.
 """
@@ -24,10 +24,11 @@ import pymunk
 from pymunk._chipmunk_cffi import lib
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.forces.attraction import pull
+from sandbox.engines.forces.thrust import load
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
-from sandbox.scene.description.world import World
 from sandbox.scene.geometry.shapes import geometry_of
 
 
@@ -36,8 +37,8 @@ class AttractionField:
 
     def __init__(self, setup: Setup) -> None:
         scene = setup.scene
-        self.fractions: dict[str, float] = {}
-        """fraction of the accelerations that acts on each body in the coming substep: below 1 with drag. The velocities
+        self.fractions: dict[str, complex] = {}
+        """complex fraction of the accelerations that acts on each body in the coming substep, with air. The velocities
         that determine it cannot be read in the velocity update, because springs have changed them by then."""
         self.applied: dict[str, Point] | None = None
         """last acceleration, m/s², of each body in the space; recorded if it is a dict"""
@@ -59,13 +60,12 @@ class AttractionField:
         total = np.zeros_like(position)
         for attraction in self._attracting_points:
             offset = position - np.asarray(attraction.toward, dtype=np.float64)
-            square = (offset * offset).sum(axis=1)
-            denominator = (square + attraction.softening**2) * np.sqrt(square)
+            distance = np.sqrt((offset * offset).sum(axis=1))
+            is_apart = distance * distance > 0.0
             with np.errstate(over="ignore"):  # next to the point; such a body leaves the bounds
-                rate = np.divide(
-                    attraction.strength, denominator, out=np.zeros_like(denominator), where=denominator > 0
-                )
-                total -= offset * rate[:, None]
+                distance = np.where(is_apart, distance, 1.0)
+                rate = pull(attraction.strength, attraction.softening, distance) / distance
+                total -= offset * np.where(is_apart, rate, 0.0)[:, None]
         return total
 
     def apply_to(self, name: str, body: pymunk.Body, bodies: dict[str, pymunk.Body]) -> None:
@@ -77,8 +77,8 @@ class AttractionField:
             if self.applied is not None:
                 self.applied[name] = ax, ay
             if self.fractions:
-                fraction = self.fractions[name]
-                ax, ay = ax * fraction, ay * fraction
+                reduced = complex(ax, ay) * self.fractions[name]
+                ax, ay = reduced.real, reduced.imag
             pymunk.Body.update_velocity(body, (gravity[0] + ax, gravity[1] + ay), damping, dt)
 
         body.velocity_func = update_velocity
@@ -112,9 +112,10 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
 
     It never raises: pymunk would only print an exception of a callback and continue.
     """
-    square = dx * dx + dy * dy
-    denominator = (square + attraction.softening**2) * math.sqrt(square)
-    return attraction.strength / denominator if denominator > 0.0 else 0.0
+    distance = math.sqrt(dx * dx + dy * dy)
+    if distance * distance == 0.0:
+        return 0.0
+    return pull(attraction.strength, attraction.softening, distance) / distance
 
 
 class BodyThrusts:
@@ -159,8 +160,8 @@ class BodyThrusts:
         for k, thrust, arm in self._thrusts:
             level = levels[k]
             if level and thrust.begin <= time and (thrust.end is None or time < thrust.end):
-                fx, fy = thrust.force[0] * level, thrust.force[1] * level
-                x, y, torque = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
+                fx, fy, turning = load(level, *thrust.force, *arm)
+                x, y, torque = x + fx, y + fy, torque + turning
         return x, y, torque
 
 
@@ -229,29 +230,6 @@ class Thrusts:
             self.loads[index] = each.load(self._levels, self._began + time, h)
 
 
-def acceleration(world: World, velocity: FloatArray, applied: FloatArray | None, h: float) -> FloatArray:
-    """Return the mean acceleration (N, 2), m/s², of the next substep under gravity, drag and a constant force.
-
-    With κ = k + c|u|, u = v − wind, held over the step, v̇ = g + a_f − κu is solved exactly:
-    a = (g + a_f − κu)·(1 − e^(−κh))/(κh), the exponential Euler step (Hochbruck & Ostermann 2010, eq. 2.1). It is
-    exact in velocity for linear drag, first order for quadratic; the terminal velocity is exact, and it is stable at
-    any h.
-
-    Args:
-        world: gravity, wind and drag.
-        velocity: (N, 2) m/s.
-        applied: (N, 2) m/s², the acceleration a_f by other forces, or None.
-        h: substep, s.
-    """
-    relative = velocity - np.asarray(world.wind)
-    rate = rates(world, velocity)
-    fraction = mean_fraction(rate, h)
-    total = np.asarray(world.gravity) - rate[:, None] * relative
-    if applied is not None:
-        total += applied
-    return np.asarray(total * fraction[:, None])
-
-
 @cache
 def damping_factor(damping: float, h: float) -> float:
     """Return the factor by which a step of h, s, multiplies velocities: `damping ** h`, with Munk2D's own rounding."""
@@ -262,16 +240,3 @@ def damping_factor(damping: float, h: float) -> float:
     space.add(body)
     space.step(h)
     return body.velocity.x
-
-
-def rates(world: World, velocity: FloatArray) -> FloatArray:
-    """Return κ, the rates of drag at velocities (N, 2) m/s, (N,) 1/s."""
-    relative = velocity - np.asarray(world.wind)
-    return np.asarray(world.linear_drag + world.quadratic_drag * np.hypot(relative[:, 0], relative[:, 1]))
-
-
-def mean_fraction(rate: FloatArray, h: float) -> FloatArray:
-    """Return (1 − e^(−κh))/(κh) for rates κ (N,), 1/s: a substep's mean acceleration as a fraction of its first."""
-    z = rate * h
-    # expm1 avoids cancellation near 0; where z is 0 the fraction is 1.
-    return np.asarray(np.divide(-np.expm1(-z), z, out=np.ones_like(z), where=z > 0))

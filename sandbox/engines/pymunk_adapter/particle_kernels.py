@@ -65,7 +65,7 @@ def drift(
     fraction: float,
     substeps: int,
 ) -> None:
-    """Advance bodies under gravity and linear drag, as `forces.acceleration` does.
+    """Advance bodies under gravity and linear drag, as `air.mean_acceleration` does.
 
     Args:
         position: (2N,) m.

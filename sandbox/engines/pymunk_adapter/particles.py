@@ -11,13 +11,8 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.pymunk_adapter.forces import (
-    AttractionField,
-    acceleration,
-    damping_factor,
-    mean_fraction,
-    rates,
-)
+from sandbox.engines.forces.air import Air, mean_acceleration, mean_fraction, rates, scaled
+from sandbox.engines.pymunk_adapter.forces import AttractionField, damping_factor
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
 
@@ -67,7 +62,7 @@ class Particles:
         """Use these arrays of all N bodies from now on; each must be contiguous."""
         self._position, self._velocity, self._angle, self._spin = position, velocity, angle, angular_velocity
         self._flat = position.reshape(-1), velocity.reshape(-1)
-        self._mass, self._moment = bodies.mass, bodies.moment
+        self._bodies, self._mass, self._moment = bodies, bodies.mass, bodies.moment
 
     def join(self, indices: IntArray) -> None:
         """Add bodies, (M,) indices, that are no particles yet."""
@@ -95,7 +90,7 @@ class Particles:
     @property
     def has_only_gravity(self) -> bool:
         """Whether only gravity acts."""
-        is_slowed = self._has_drag or self.world.has_damping
+        is_slowed = self._air.flows or self.world.has_damping
         return self._field is None and not (self._has_force or self._has_torque or is_slowed)
 
     @property
@@ -108,7 +103,7 @@ class Particles:
         world = self.world
         self._has_force = any(force.any() for force, _ in self._forces.values())
         self._has_torque = any(torque for _, torque in self._forces.values())
-        self._has_drag = world.has_drag
+        self._air = Air.of(world, self._bodies)
         self._damping_factor = damping_factor(world.damping, self._h) if world.has_damping else 1.0
         self.can_turn = bool(self._spin[self.indices].any()) or self._has_torque
         self._kick: FloatArray = (np.asarray(world.gravity) + 0.0) * self._h
@@ -117,9 +112,9 @@ class Particles:
         from sandbox.engines.pymunk_adapter.particle_kernels import tile_of
 
         self._kick_tile = tile_of(self._kick)
-        if self._has_drag:
+        if self._air.flows:
             fraction = float(mean_fraction(np.asarray([world.linear_drag]), self._h)[0])
-            self._air = np.repeat(self._mass, 2), tile_of(world.gravity), tile_of(world.wind)
+            self._drift = np.repeat(self._mass, 2), tile_of(world.gravity), tile_of(world.wind)
             self._drag = world.linear_drag, fraction
 
     def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
@@ -154,7 +149,7 @@ class Particles:
 
         Under gravity alone nothing is checked: every valid start stays finite for the largest number of steps.
         """
-        if not (self._has_force or self._has_torque or self._has_drag or self._field is not None):
+        if not (self._has_force or self._has_torque or self._air.flows or self._field is not None):
             return None
         # Quick test: if both coordinates are below half a bound, the length is below the bound.
         if self._compiled and not self._has_torque:
@@ -179,12 +174,16 @@ class Particles:
         """Advance by some substeps: in each, positions by the old velocity, then velocities."""
         if not len(self.indices):
             return
+        if substeps > 1 and self._has_torque and self._air.depends_on_spin:  # which changes from substep to substep
+            for _ in range(substeps):
+                self.step()
+            return
         compiled = self._compiled and not self.world.has_damping
-        has_forces = self._has_force or self._field is not None or self.world.quadratic_drag > 0
+        has_forces = self._has_force or self._field is not None or not self._air.is_linear
         if compiled and not has_forces:
             self._step_compiled(substeps)
         else:
-            self._step_with_numpy(substeps, has_forces or self._has_drag)
+            self._step_with_numpy(substeps, has_forces or self._air.flows)
         if self._has_torque:
             for _ in range(substeps):
                 self._turn_with_torques()
@@ -200,10 +199,10 @@ class Particles:
     def _step_compiled(self, substeps: int) -> None:
         from sandbox.engines.pymunk_adapter.particle_kernels import drift, fall
 
-        if not self._has_drag:
+        if not self._air.flows:
             fall(*self._flat, self._runs, self._h, self._kick_tile, substeps)
         else:
-            mass, gravity, wind = self._air
+            mass, gravity, wind = self._drift
             drift(*self._flat, self._runs, self._h, mass, gravity, wind, *self._drag, substeps)
 
     def _step_with_numpy(self, substeps: int, has_forces: bool) -> None:
@@ -217,7 +216,7 @@ class Particles:
             for _ in range(substeps):
                 np.multiply(velocity, self._h, out=displacement)
                 position += displacement
-                kick = self._forced_kick(position, velocity, mass, force) if has_forces else uniform_kick
+                kick = self._forced_kick(piece, position, velocity, mass, force) if has_forces else uniform_kick
                 if self.world.has_damping:
                     velocity *= self._damping_factor
                 velocity += kick
@@ -255,15 +254,22 @@ class Particles:
             self._spin[piece] *= self._damping_factor
 
     def _forced_kick(
-        self, position: FloatArray, velocity: FloatArray, mass: FloatArray, force: FloatArray | None
+        self,
+        piece: slice | IntArray,
+        position: FloatArray,
+        velocity: FloatArray,
+        mass: FloatArray,
+        force: FloatArray | None,
     ) -> FloatArray:
-        """Return (g + a + f/m)·h, a the attraction; with drag, whose force includes gravity, g is 0."""
+        """Return (g + a + f/m)·h of some rows, a the attraction; with air, whose force includes gravity, g is 0."""
         inverse = 1.0 / mass
-        if self._has_drag:
+        if self._air.flows:
             acceleration_by_force = None if force is None else force * inverse
-            kick = (mass * acceleration(self.world, velocity, acceleration_by_force, self._h)) * inverse
+            air, spin = self._air, self._spin[piece]
+            mean = mean_acceleration(air, piece, self.world.gravity, velocity, spin, acceleration_by_force, self._h)
+            kick = (mass * mean) * inverse
             if self._field is not None:
-                kick += self._field.at(position) * mean_fraction(rates(self.world, velocity), self._h)[:, None]
+                kick += scaled(self._field.at(position), mean_fraction(rates(air, piece, velocity, spin), self._h))
             return kick * self._h
         gravity = np.asarray(self.world.gravity)
         acceleration_sum = gravity if self._field is None else gravity + self._field.at(position)

@@ -5,24 +5,24 @@ from collections.abc import Iterator
 from sandbox.engines.tabletop.requirements import on_floor
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import AIR, Demand
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 
 
-def combination_faults(scene: Scene, settings: Settings, has_kinematic: bool) -> list[str]:
+def combination_faults(scene: Scene, settings: Settings, wanted: frozenset[Demand]) -> list[str]:
     """Return the parts and settings of a scene that pymunk does not support together.
 
     Args:
         scene: the scene.
         settings: of the run.
-        has_kinematic: whether a body is kinematic, of the scene or added by an action.
+        wanted: demands of the scene, and of a body that an action adds.
     """
-    world, half_kick, found = scene.world, settings.half_kick, []
-    if half_kick and world.has_drag:
-        found.append("half_kick does not support drag")
-    if half_kick and world.has_damping:
-        found.append("half_kick does not support damping")
+    half_kick, found, air = settings.half_kick, [], sorted(wanted & AIR)
+    has_damping, has_kinematic = Demand.DAMPING in wanted, Demand.KINEMATIC in wanted
+    if half_kick:
+        found += [f"half_kick does not support {demand}" for demand in air]
     if half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
         found.append("half_kick supports gravity only, and the scene has other forces")
     if half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
@@ -30,23 +30,23 @@ def combination_faults(scene: Scene, settings: Settings, has_kinematic: bool) ->
     if half_kick and has_kinematic:
         found.append("half_kick does not support kinematic bodies")
     for first, second, together in (
-        ("drag", "damping", world.has_drag and world.has_damping),
-        ("drives", "damping", scene.drives and world.has_damping),
+        *((str(demand), "damping", has_damping) for demand in air if demand is not Demand.DAMPING),
+        ("drives", "damping", scene.drives and has_damping),
         ("attraction", "drives", scene.attractions and scene.drives),
         ("attraction", "kinematic bodies", scene.attractions and has_kinematic),
     ):
         if together:
             found.append(f"it does not model {first} and {second} together")
     if settings.sleeping:
-        found += [f"sleeping does not support {each}" for each in _unsupported_by_sleep(scene, settings)]
+        found += [f"sleeping does not support {each}" for each in _unsupported_by_sleep(scene, settings, wanted)]
     return found
 
 
-def _unsupported_by_sleep(scene: Scene, settings: Settings) -> Iterator[str]:
+def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[Demand]) -> Iterator[str]:
     """Yield the parts and settings that need every body, awake or not, in each substep."""
     for name, has in (
         ("half_kick", settings.half_kick),
-        ("drag", scene.world.has_drag),
+        *((str(demand), True) for demand in sorted(wanted & AIR - {Demand.DAMPING})),
         ("attraction", scene.attractions),
         ("thrusts", scene.thrusts),
         ("drives", scene.drives),

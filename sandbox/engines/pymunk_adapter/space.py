@@ -10,6 +10,7 @@ from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
+from sandbox.engines.forces.air import Air, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader
 from sandbox.engines.pymunk_adapter.body_table import ConstantForces, SpaceBody, SpaceBodyTable
 from sandbox.engines.pymunk_adapter.colliders import (
@@ -26,7 +27,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
-from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
 from sandbox.scene.compile.bodies import Bodies
@@ -45,7 +46,9 @@ class SpaceBodies(SpaceBodyTable):
         """Create an empty space; the settings are resolved."""
         scene = setup.scene
         self._setup, self._scene, self._settings = setup, scene, settings
-        self._h, self._dragged = settings.h, scene.world.has_drag
+        self._h = settings.h
+        self.air = Air.of(scene.world, setup.bodies)
+        """forces that depend on velocity"""
         super().__init__(new_space(scene, settings))
         self._reader = SpaceReader(self._space, bool(settings.sleeping))
         self._batch_reader = BatchReader(self._space, self._reader.order_of if settings.sleeping else None)
@@ -64,7 +67,7 @@ class SpaceBodies(SpaceBodyTable):
         """reads the contacts of the space"""
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.drives = SpaceDrives(setup, self._space, settings.h)
-        self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
+        self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
@@ -230,10 +233,10 @@ class SpaceBodies(SpaceBodyTable):
             len(member.shapes) > 1 for member in self._members.values()
         )
 
-    def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
-        """Update after a change of the scene's coefficients, walls, surfaces or world."""
+    def rebuild(self, scene: Scene, bodies: Bodies, matrix: ContactMatrix) -> None:
+        """Update after a change of the scene's coefficients, walls, surfaces, bodies or world."""
         self._static_shapes.reshape(self._scene, scene)
-        self.rebuild_world(scene)
+        self.rebuild_world(scene, bodies)
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch = matrix.touches
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
@@ -248,16 +251,17 @@ class SpaceBodies(SpaceBodyTable):
             self.drives.add_callbacks(self._collision_types)
         self._static_shapes.rebuild(scene, self._surface_of_fixed)
 
-    def rebuild_world(self, scene: Scene) -> None:
-        """Update after a change of the scene's gravity, drag, damping or wind."""
+    def rebuild_world(self, scene: Scene, bodies: Bodies) -> None:
+        """Update after a change of the scene's gravity or air, or of its bodies."""
         self._scene, self._needs_check = scene, None
-        self._dragged = scene.world.has_drag
+        self.air = Air.of(scene.world, bodies)
         self.field.fractions.clear()
-        if self._space.gravity != gravity_of(scene):  # to set it wakes bodies
-            self._space.gravity = gravity_of(scene)
+        gravity = gravity_of(scene.world, self.air)
+        if self._space.gravity != gravity:  # to set it wakes bodies
+            self._space.gravity = gravity
         self._space.damping = scene.world.damping
         if self.drives.driven_bodies:
-            self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
+            self.drives.set_gravity(scene.world.gravity, gravity)
 
     def step(self, time: float) -> None:
         """Advance by one substep, from a time, s."""
@@ -275,10 +279,10 @@ class SpaceBodies(SpaceBodyTable):
         self._state = None
 
     def _set_forces(self, time: float) -> None:
-        """Set the forces of a substep that starts at a time, s: constant forces, thrusts and drag."""
-        if self._dragged:
+        """Set the forces of a substep that starts at a time, s: constant forces, thrusts and those of the air."""
+        if self.air.flows:
             self.thrusts.update_loads(time, self._h)
-            self._apply_drag(*self._read())
+            self._apply_air(*self._read())
             return
         if self.constant_forces:
             self.constant_forces.apply(self._members)
@@ -290,7 +294,7 @@ class SpaceBodies(SpaceBodyTable):
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
-            or self._dragged
+            or self.air.flows
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
@@ -429,14 +433,14 @@ class SpaceBodies(SpaceBodyTable):
                 k += 1
             yield k, count
 
-    def _apply_drag(self, indices: IntArray, state: FloatArray) -> None:
-        """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene with drag."""
-        world, springs, loads = self._scene.world, self._springs(indices, state), self.thrusts.loads
-        self.constant_forces.apply_with_drag(
-            self._members, loads, self._reader, (indices, state), springs, world, self._h
+    def _apply_air(self, indices: IntArray, state: FloatArray) -> None:
+        """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene whose air acts."""
+        springs, loads = self._springs(indices, state), self.thrusts.loads
+        self.constant_forces.apply_with_air(
+            self._members, loads, self._reader, (indices, state), springs, self.air, self._scene.world.gravity, self._h
         )
         if self.field.attracts:
-            fractions = mean_fraction(rates(world, state[:, 3:5]), self._h).tolist()
+            fractions = mean_fraction(rates(self.air, indices, state[:, 3:5], state[:, 5]), self._h).tolist()
             self.field.fractions = {self._name_of[n]: each for n, each in zip(indices.tolist(), fractions, strict=True)}
 
     def _springs(self, indices: IntArray, state: FloatArray) -> FloatArray | None:

@@ -88,7 +88,7 @@ class CompiledStepper:
         assert settings.integrator and settings.broad_phase and settings.slop is not None and settings.bias is not None
         self._world, self._pipeline, self.forces, self._store = world, pipeline, world.forces, store
         self._substeps = settings.substeps
-        h, forces, boxes, matrix = settings.h, world.forces, pipeline.segment_boxes, store.contact_matrix
+        h, boxes, matrix = settings.h, pipeline.segment_boxes, store.contact_matrix
         bounds = store.scene.world.bounds
         low, high = ((-math.inf, -math.inf), (math.inf, math.inf)) if bounds is None else bounds
         has_pieces = isinstance(pipeline, ConvexPipeline)
@@ -103,11 +103,6 @@ class CompiledStepper:
             slop=settings.slop,
             bias=settings.bias,
             correction=solver.correction_rate(h),
-            linear_drag=forces.linear_drag,
-            quadratic_drag=forces.quadratic_drag,
-            damping_rate=forces.damping_rate,
-            wind_x=forces.wind[0],
-            wind_y=forces.wind[1],
             broad_phase=BROAD_PHASE_CODES[settings.broad_phase] if has_pairs else NO_PAIRS,
             max_tests=pipeline.max_pairs,
             max_contacts=solver.max_contacts,
@@ -287,7 +282,7 @@ def _own(array: npt.NDArray[Cell]) -> npt.NDArray[Cell]:
 
 
 def _body_columns(world: WorldState, store: BodyStore) -> BodyColumns:
-    forces, thrusts = world.forces, world.field
+    forces = world.forces
     turning = forces.constant[:, 2] if forces.constant.shape[1] == 3 else np.zeros(len(store.radius))
     return BodyColumns(
         constant=np.column_stack((forces.constant[:, :2], turning)),
@@ -297,11 +292,8 @@ def _body_columns(world: WorldState, store: BodyStore) -> BodyColumns:
         inverse_moment=_own(store.inverse_moment),
         restitution=_own(store.restitution.ravel()),
         tangential=_own(store.tangential),
-        thrust_body=_own(thrusts.thrust_bodies),
-        thrust_point=_own(thrusts.thrust_points),
-        thrust_force=_own(thrusts.thrust_forces),
-        thrust_begin=_own(thrusts.thrust_begins),
-        thrust_end=_own(thrusts.thrust_ends),
+        air=forces.air,
+        thrusts=world.field.thrusts,
     )
 
 

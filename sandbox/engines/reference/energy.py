@@ -21,6 +21,7 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.forces.air import air_accelerations
 from sandbox.engines.reference.drives import Drives, DriveWork
 from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.manifold import Manifolds
@@ -191,12 +192,8 @@ class StepEnergyLedger:
     def _powers(self, time: float, x: State) -> Iterator[tuple[Cause, float]]:
         """Yield the power, W, of each cause in a state."""
         u, store, rate = self._forces, self._store, x[1]
-        if u.has_drag:
-            wind = rate[:, :2] - u.wind
-            fraction = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
-            yield Cause.DRAG, -float((self._inertia[:, :1] * fraction * wind * rate[:, :2]).sum())
-        if u.damping_rate > 0.0:
-            yield Cause.DRAG, -u.damping_rate * self._product(rate, rate)
+        if u.air.acts:
+            yield Cause.DRAG, self._product(air_accelerations(u.air, rate), rate)
         if u.damped_forces and self._joints is not None:
             yield Cause.DAMPING, self._joints.damper_power(x)
         if store.force.any() or store.torque.any():
@@ -205,7 +202,7 @@ class StepEnergyLedger:
         if self._zone_weight.any():  # gravity of zones in excess of the world's
             yield Cause.DRIVES, float((self._zone_weight * rate[:, :2]).sum())
         if self._field.thrusting:
-            yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
+            yield Cause.DRIVES, self._product(self._field.by_thrusts(time, x), rate)
         if self._penalty is not None:
             normal, tangential = self._penalty.losses(x)
             yield Cause.RESTITUTION, normal

@@ -107,6 +107,7 @@ class ReferenceEngine:
         *JOINTS - {Demand.RATCHETS},
         Demand.MAX_FORCE,
         Demand.DAMPING,
+        Demand.LIFT,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,

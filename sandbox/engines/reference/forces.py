@@ -1,4 +1,4 @@
-"""External forces: gravity, drag, damping, attraction, thrust and springs, as inputs of the integrators."""
+"""External forces: gravity, air, attraction, thrust and springs, as inputs of the integrators."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.common.force_field import ForceField
+from sandbox.engines.forces.air import Air
+from sandbox.engines.forces.field import ForceField
 from sandbox.engines.reference.integrators import Inputs, State
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.scene.compile.joint_arrays import LinkKind
@@ -21,7 +22,6 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         joints: solver of the joints, if there are any.
         coordinates: D of a state: 2, or 3 if a body turns.
     """
-    world = store.scene.world
     moving = store.moving[:, None]
     if store.has_driven:  # drives apply the forces on their bodies
         moving = moving & ~store.driven[:, None]
@@ -35,11 +35,8 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         forces.append(joints.forces_at)
     return Inputs(
         constant,
-        world.linear_drag,
-        world.quadratic_drag,
-        world.wind,
+        Air.of(store.scene.world, store.bodies),
         moving.astype(np.float64),
         forces=tuple(forces),
         damped_forces=bool(springs.figures[:, 2].any()),
-        damping_rate=world.damping_rate,
     )

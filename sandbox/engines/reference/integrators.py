@@ -12,7 +12,7 @@ frequency ω:
 | rk4 | exact | loses (ωh)⁶/72 of its energy a step, ωh < 2√2 |
 
 x is an array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) if nothing turns, else 3 (x, y, angle). u
-contains the external forces: gravity, drag, damping, constant forces, and penalty contacts with `response = "penalty"`.
+contains the external forces: gravity, air, constant forces, and penalty contacts with `response = "penalty"`.
 """
 
 from collections.abc import Callable
@@ -21,6 +21,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.forces.air import Air, air_accelerations
 
 State: TypeAlias = FloatArray
 """(2, N, D) poses, m and rad, and rates, m/s and rad/s"""
@@ -34,32 +35,21 @@ class Inputs(NamedTuple):
 
     constant: FloatArray
     """(N, D) acceleration by gravity, constant forces and torques, m/s² and rad/s²; 0 for fixed bodies"""
-    linear_drag: float = 0.0
-    """1/s"""
-    quadratic_drag: float = 0.0
-    """1/m"""
-    wind: tuple[float, float] = (0.0, 0.0)
-    """m/s"""
+    air: Air = Air()
+    """forces that depend on velocity"""
     mobile: FloatArray = _ALL
-    """(N, 1) or (1, 1): 1 for bodies with drag and damping, 0 for fixed or removed ones"""
+    """(N, 1) or (1, 1): 1 for bodies that the air affects, 0 for fixed or removed ones"""
     contacts: Callable[[State], FloatArray] | None = None
     """penalty contacts: acceleration (N, D) in a state"""
     forces: tuple[Callable[[float, State], FloatArray], ...] = ()
     """springs, attraction and thrusts: acceleration (N, D) of each as a function of time and state"""
     damped_forces: bool = False
     """whether one of these forces depends on velocity"""
-    damping_rate: float = 0.0
-    """λ, 1/s: damping of rates"""
-
-    @property
-    def has_drag(self) -> bool:
-        """Whether there is drag."""
-        return self.linear_drag > 0.0 or self.quadratic_drag > 0.0
 
     @property
     def damped(self) -> bool:
         """Whether acceleration depends on velocity, so that a scheme has to evaluate it at the right velocity."""
-        return self.has_drag or self.damping_rate > 0.0 or self.damped_forces or self.contacts is not None
+        return self.air.acts or self.damped_forces or self.contacts is not None
 
 
 Transition: TypeAlias = Callable[[float, State, Inputs], State]
@@ -67,7 +57,7 @@ Transition: TypeAlias = Callable[[float, State, Inputs], State]
 
 
 def transition(t: float, x: State, u: Inputs) -> State:
-    """Return ẋ: the rates, and the accelerations a = g + F/m − k w − c |w| w − λ v + Σ f(t, x), w = v − wind.
+    """Return ẋ: the rates, and the accelerations by constant forces, air, other forces and penalty contacts.
 
     Args:
         t: s.
@@ -80,12 +70,8 @@ def transition(t: float, x: State, u: Inputs) -> State:
     derivative = np.empty_like(x)
     derivative[0] = x[1]
     derivative[1] = u.constant
-    if u.has_drag:
-        wind = x[1, :, :2] - u.wind
-        rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)
-        derivative[1, :, :2] -= u.mobile * rate * wind
-    if u.damping_rate > 0.0:
-        derivative[1] -= u.mobile * u.damping_rate * x[1]
+    if u.air.acts:
+        derivative[1] += u.mobile * air_accelerations(u.air, x[1])
     for force in u.forces:
         derivative[1] += force(t, x)
     if u.contacts is not None:

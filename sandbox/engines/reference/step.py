@@ -18,7 +18,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.common.force_field import ForceField
+from sandbox.engines.forces.field import ForceField
 from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
 from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
 from sandbox.engines.reference.filtering import CollisionFilter, OneWayWalls

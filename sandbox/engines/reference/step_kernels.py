@@ -12,8 +12,10 @@ from typing import NamedTuple
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
-from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import inline_kernel
+from sandbox.engines.forces.air import Air, air_law
+from sandbox.engines.forces.field import thrust_on_body
+from sandbox.engines.forces.thrust import ThrustColumns
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.joint_data import JointData
 from sandbox.engines.reference.joint_rows import VelocityConstraints, prepare, solve_joints_once, warm_start_joints
@@ -64,15 +66,6 @@ class StepConstants(NamedTuple):
     """fraction of a joint's error that remains after one second"""
     correction: float
     """1/s, target separation rate for each metre of overlap beyond the slop, negative"""
-    linear_drag: float
-    """1/s"""
-    quadratic_drag: float
-    """1/m"""
-    damping_rate: float
-    """1/s"""
-    wind_x: float
-    """m/s"""
-    wind_y: float
     broad_phase: int
     """code of the broad phase; `NO_PAIRS` if bodies cannot touch each other"""
     max_tests: int
@@ -93,12 +86,12 @@ class StepConstants(NamedTuple):
 
 
 class BodyColumns(NamedTuple):
-    """Arrays of N bodies, S surfaces and T thrusts that do not change from step to step."""
+    """Arrays of N bodies and S surfaces, and the forces on them, that do not change from step to step."""
 
     constant: FloatArray
     """(N, 3) acceleration, m/s² and rad/s²"""
     mobile: FloatArray
-    """(N,) 1 for bodies with drag and damping, 0 for others"""
+    """(N,) 1 for bodies that the air affects, 0 for others"""
     can_leave: BoolArray
     """(N,) bodies that are removed when they are out of bounds"""
     inverse_mass: FloatArray
@@ -107,16 +100,8 @@ class BodyColumns(NamedTuple):
     """(S·S,)"""
     tangential: FloatArray
     """(S, S, 4), as in `BodyStore`"""
-    thrust_body: IntArray
-    """(T,) index of the body that each thrust acts on"""
-    thrust_point: FloatArray
-    """(T, 2) m, in the body's frame about its centre of mass"""
-    thrust_force: FloatArray
-    """(T, 2) N, in that frame, at full level"""
-    thrust_begin: FloatArray
-    """(T,) s"""
-    thrust_end: FloatArray
-    """(T,) s"""
+    air: Air
+    thrusts: ThrustColumns
 
 
 class CompiledJoints(NamedTuple):
@@ -285,6 +270,15 @@ def write_frame(
     return written + 1
 
 
+_air_law = inline_kernel(air_law)
+
+
+@inline_kernel
+def air_acts(air: Air) -> bool:
+    """Return `Air.acts`, in a kernel."""
+    return air.linear_drag > 0.0 or air.quadratic_drag > 0.0 or air.damping_rate > 0.0 or air.depends_on_spin
+
+
 @inline_kernel
 def acceleration(
     number: StepConstants,
@@ -297,7 +291,7 @@ def acceleration(
     vy: float,
     spin: float,
 ) -> tuple[float, float, float]:
-    """Return the acceleration of a body by constant forces, drag, damping and thrusts, as `integrators.transition`.
+    """Return the acceleration of a body by constant forces, air and thrusts, as `integrators.transition`.
 
     Args:
         number: numbers.
@@ -311,24 +305,20 @@ def acceleration(
         spin: rad/s.
     """
     ax, ay, alpha = bodies.constant[i, 0], bodies.constant[i, 1], bodies.constant[i, 2]
-    if bodies.mobile[i] != 0.0 and (number.linear_drag > 0.0 or number.quadratic_drag > 0.0):
-        wx, wy = vx - number.wind_x, vy - number.wind_y
-        rate = number.linear_drag + number.quadratic_drag * math.sqrt(wx * wx + wy * wy)
-        ax, ay = ax - rate * wx, ay - rate * wy
-    if bodies.mobile[i] != 0.0 and number.damping_rate > 0.0:
-        rate = number.damping_rate
-        ax, ay, alpha = ax - rate * vx, ay - rate * vy, alpha - rate * spin
-    if len(bodies.thrust_body) > 0:
-        fx, fy, torque, now = 0.0, 0.0, 0.0, number.began + time
-        for k in range(len(bodies.thrust_body)):
-            if bodies.thrust_body[k] == i:
-                is_on = 1.0 if bodies.thrust_begin[k] <= now < bodies.thrust_end[k] else 0.0
-                x, y = level[k] * is_on * bodies.thrust_force[k, 0], level[k] * is_on * bodies.thrust_force[k, 1]
-                world_x, world_y = rotate(x, y, math.cos(angle), math.sin(angle))
-                fx += bodies.inverse_mass[i] * world_x
-                fy += bodies.inverse_mass[i] * world_y
-                torque += bodies.inverse_moment[i] * (bodies.thrust_point[k, 0] * y - bodies.thrust_point[k, 1] * x)
-        ax, ay, alpha = ax + fx, ay + fy, alpha + torque
+    if bodies.mobile[i] != 0.0 and air_acts(bodies.air):
+        wx, wy = vx - bodies.air.wind_x, vy - bodies.air.wind_y
+        speed = math.sqrt(wx * wx + wy * wy)
+        ax_air, ay_air, alpha_air = _air_law(bodies.air, i, wx, wy, speed, vx, vy, spin)
+        ax, ay, alpha = ax + ax_air, ay + ay_air, alpha + alpha_air
+    if len(bodies.thrusts.body) > 0:
+        ax_thrust, ay_thrust, alpha_thrust = 0.0, 0.0, 0.0
+        for k in range(len(bodies.thrusts.body)):
+            if bodies.thrusts.body[k] == i:
+                fx, fy, torque = thrust_on_body(bodies.thrusts, k, level[k], number.began + time, angle)
+                ax_thrust += bodies.inverse_mass[i] * fx
+                ay_thrust += bodies.inverse_mass[i] * fy
+                alpha_thrust += bodies.inverse_moment[i] * torque
+        ax, ay, alpha = ax + ax_thrust, ay + ay_thrust, alpha + alpha_thrust
     return ax, ay, alpha
 
 
@@ -341,7 +331,7 @@ def move_bodies(
     The integrators are those of `integrators`, with the same operations in the same order.
     """
     h, method, x, placed, level = number.h, number.integrator, state.x, scratch.placed, state.thrust_level
-    damped = number.linear_drag > 0.0 or number.quadratic_drag > 0.0 or number.damping_rate > 0.0
+    damped = air_acts(bodies.air)
     for i in range(len(bodies.mobile)):
         px, py, angle, vx, vy, spin = x[0, i, 0], x[0, i, 1], x[0, i, 2], x[1, i, 0], x[1, i, 1], x[1, i, 2]
         if method == LEAPFROG:

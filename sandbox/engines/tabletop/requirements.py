@@ -6,7 +6,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import SURFACES, demands
+from sandbox.scene.compile.demands import AIR, SURFACES, demands
 from sandbox.scene.compile.demands import on_floor as has_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -50,12 +50,9 @@ def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) 
     """Yield the features that no time-step solver supports on a surface, with the scene's bodies or with given ones."""
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
-    world = scene.world
     yield from unsupported_on_surface(setup, bodies)
-    if world.has_drag:
-        yield "it does not model drag on a floor"
-    if world.has_damping:
-        yield "it does not model damping on a floor"
+    for demand in sorted(demands(setup) & AIR):
+        yield f"it does not model {demand} on a floor"
     if len(setup.links) or scene.attractions or scene.thrusts or scene.drives:
         yield "it does not model joints, attraction, thrusts or drives on a floor"
     if not bodies.round.all():

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.forces.air import Air, air_law
 from sandbox.engines.reference.integrators import Inputs
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.terrain import Ground
@@ -71,7 +72,7 @@ IMPACT_TIME_TOLERANCE = 1e-13
 def inputs_of(world: World, count: int) -> Inputs:
     """Return the accelerations, drag coefficients and damping rate for a number of shells."""
     gravity = np.tile(world.gravity, (count, 1))
-    return Inputs(gravity, world.linear_drag, world.quadratic_drag, world.wind, damping_rate=world.damping_rate)
+    return Inputs(gravity, Air.of(world))
 
 
 def rk4(world: World, knot: Knot, h: float) -> Knot:
@@ -79,15 +80,14 @@ def rk4(world: World, knot: Knot, h: float) -> Knot:
 
     Same method as `rk4` of the engine `reference`, but in plain floats, which is about ten times as fast for one shell.
     """
-    (gx, gy), (wind_x, wind_y), linear, quadratic = world.gravity, world.wind, world.linear_drag, world.quadratic_drag
-    damping = world.damping_rate
+    (gx, gy), air = world.gravity, Air.of(world)
     x, y, vx, vy = knot
     sum_x = sum_y = sum_vx = sum_vy = ax = ay = 0.0
     for weight, fraction in ((1.0, 0.0), (2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):
         stage_vx, stage_vy = vx + fraction * h * ax, vy + fraction * h * ay
-        air_vx, air_vy = stage_vx - wind_x, stage_vy - wind_y
-        drag = linear + quadratic * math.sqrt(air_vx * air_vx + air_vy * air_vy)
-        ax, ay = gx - drag * air_vx - damping * stage_vx, gy - drag * air_vy - damping * stage_vy
+        wx, wy = stage_vx - air.wind_x, stage_vy - air.wind_y
+        ax, ay, _ = air_law(air, 0, wx, wy, math.sqrt(wx * wx + wy * wy), stage_vx, stage_vy, 0.0)
+        ax, ay = gx + ax, gy + ay
         sum_x, sum_y = sum_x + weight * stage_vx, sum_y + weight * stage_vy
         sum_vx, sum_vy = sum_vx + weight * ax, sum_vy + weight * ay
     sixth = h / 6.0

@@ -102,7 +102,7 @@ def ballistic_collisions(facts: SceneFacts) -> BallisticCollisions | None:
         return None
     if len(facts.links) or scene.attractions or scene.thrusts or scene.drives or facts.matrix.moving_surfaces:
         return None
-    if not facts.has_no_drag or scene.world.bounds is not None:
+    if not facts.has_no_air or scene.world.bounds is not None:
         return None
     if np.isfinite(bodies.lifetime).any() or any(element.collides != "all" for element in bodies.elements):
         return None

@@ -167,7 +167,7 @@ def bouncing(facts: SceneFacts, number: int) -> Bouncing | None:
     collides = bodies.elements[bodies.element[number]].collides
     if not bodies.round[number] or facts.scene.attractions or facts.matrix.held[number] or facts.thrust[number]:
         return None
-    if len(planes) != 1 or not facts.has_no_drag or collides == "none" or facts.matrix.moving_surfaces:
+    if len(planes) != 1 or not facts.has_no_air or collides == "none" or facts.matrix.moving_surfaces:
         return None
     normal, pull = normal_of(planes[0]), facts.gravity
     start, velocity = bodies.position[number], bodies.velocity[number]

@@ -136,7 +136,7 @@ def incline_motion(facts: SceneFacts, number: int) -> InclineMotion | None:
     bodies, plane = facts.bodies, facts.only_plane()
     if plane is None or not facts.matrix.touches[number] or facts.matrix.held[number] or facts.thrust[number]:
         return None
-    if bodies.fixed[number] or facts.scene.attractions or not facts.has_no_drag:
+    if bodies.fixed[number] or facts.scene.attractions or not facts.has_no_air:
         return None
     normal = normal_of(plane)
     along, point = perpendicular(normal), np.asarray(plane.point)

@@ -89,7 +89,7 @@ def kepler(facts: SceneFacts, number: int) -> Kepler | None:
     if not facts.moves_freely(number) or facts.matrix.held[number] or len(scene.attractions) != 1:
         return None
     sun = scene.attractions[0]
-    if sun.strength <= 0.0 or sun.softening > 0.0 or facts.gravity.any() or not facts.has_no_drag:
+    if sun.strength <= 0.0 or sun.softening > 0.0 or facts.gravity.any() or not facts.has_no_air:
         return None
     if isinstance(sun.toward, str):
         which = bodies.names.index(sun.toward)

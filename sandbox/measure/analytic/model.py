@@ -11,6 +11,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.ballistics import free_flight
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.demands import AIR, Demand, demands
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
@@ -68,9 +69,9 @@ class SceneFacts:
         return np.asarray(self.world.gravity, dtype=np.float64)
 
     @property
-    def has_no_drag(self) -> bool:
-        """Whether there is neither drag nor damping."""
-        return not (self.world.has_drag or self.world.has_damping)
+    def has_no_air(self) -> bool:
+        """Whether no force depends on velocity: neither drag nor lift nor damping."""
+        return not demands(self.scene) & AIR
 
     def moves_freely(self, number: int) -> bool:
         """Return whether a body can move, cannot collide, and has no thrust."""
@@ -193,6 +194,8 @@ def unsupported_reason(scene: Scene) -> str | None:
     """Return the reason why free flight in a scene has no closed form, or None if it has one."""
     if scene.world.quadratic_drag > 0:
         return "world.quadratic_drag couples x and y: the flight has no closed form"
+    if scene.world.has_damping and Demand.LIFT in demands(scene):
+        return "world.damping slows the spins on which lift depends: the flight has no closed form"
     if scene.attractions:
         return "an attraction acts on every body: the flight has no closed form here"
     return None

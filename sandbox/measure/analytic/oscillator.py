@@ -11,6 +11,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic.model import BodyMotion, SceneFacts, direction, parallel
+from sandbox.scene.compile.demands import AIR, Demand, demands
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.trajectory import ContactEvent
 
@@ -81,7 +82,8 @@ def oscillator(facts: SceneFacts, number: int) -> Oscillator | None:
     anchor = facts.anchor(number)
     if anchor is None or anchor.kind != LinkKind.SPRING or anchor.arm.any():
         return None
-    if facts.world.quadratic_drag > 0.0 or facts.world.has_damping:  # damping changes the spin, which is constant here
+    # Damping changes the spin, which is constant here, and lift couples x and y.
+    if facts.world.quadratic_drag > 0.0 or demands(facts.scene) & AIR - {Demand.DRAG}:
         return None
     length, stiffness, damper = anchor.figures.tolist()
     mass, drag = float(bodies.mass[number]), facts.world.linear_drag

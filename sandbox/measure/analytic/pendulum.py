@@ -108,7 +108,7 @@ def pendulum(facts: SceneFacts, number: int) -> Pendulum | None:
         not facts.moves_freely(number)
         or not facts.matrix.held[number]
         or facts.scene.attractions
-        or not facts.has_no_drag
+        or not facts.has_no_air
     ):
         return None
     anchor = facts.anchor(number)

@@ -55,7 +55,7 @@ def atwood_machine(facts: SceneFacts, number: int) -> HangingBody | None:
     contacts and no other joint, and there is no drag. They move along the rope, and do not reach a wheel.
     """
     pulley = _only_pulley(facts, number)
-    if pulley is None or not facts.gravity.any() or not facts.has_no_drag or facts.scene.attractions:
+    if pulley is None or not facts.gravity.any() or not facts.has_no_air or facts.scene.attractions:
         return None
     down, strength = direction(facts.gravity), float(np.hypot(*facts.gravity))
     pair = int(pulley.a[0]), int(pulley.b[0])

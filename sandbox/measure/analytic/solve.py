@@ -82,7 +82,8 @@ class Solution:
         chunks = max(1, len(self.flying) * len(time) // CHUNK)
         for part in np.array_split(self.flying, chunks) if len(self.flying) else ():
             start = bodies.position[part], bodies.velocity[part]
-            position[:, part], velocity[:, part] = free_flight(time, *start, self.scene.world)
+            turning = bodies.lift[part] * spins[part]
+            position[:, part], velocity[:, part] = free_flight(time, *start, self.scene.world, turning)
         for number, form in self.alone.items():
             position[:, number], velocity[:, number], angle[:, number], spin[:, number] = form.at(time)
         return BodyMotion(position, velocity, angle, spin)
@@ -198,7 +199,8 @@ def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -
     if unsupported_reason(scene) is not None or _is_driven(scene, bodies)[number]:
         return None
     start = bodies.position[number], bodies.velocity[number]
-    position, velocity = free_flight(trajectory.time, *start, scene.world)
+    turning = bodies.lift[number] * bodies.angular_velocity[number]
+    position, velocity = free_flight(trajectory.time, *start, scene.world, turning)
     valid = trajectory.time < valid_until(trajectory, number)
     if bodies.elements[bodies.element[number]].collides != "none":
         angle, _ = free_rotation(trajectory.time, bodies.angle[number], bodies.angular_velocity[number], scene.world)

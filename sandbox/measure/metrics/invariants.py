@@ -10,6 +10,7 @@ from sandbox.measure.metrics.clearance import rotate_points
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import AIR, demands
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
@@ -67,10 +68,10 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way or that
-    jerks a body when it becomes taut, and elastic contacts.
+    It has no drag, lift, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way or
+    that jerks a body when it becomes taut, and elastic contacts.
     """
-    if scene.world.has_drag or scene.world.has_damping or scene.thrusts or scene.drives:
+    if demands(scene) & AIR or scene.thrusts or scene.drives:
         return False
     if scene.bodies.kinematic.any():
         return False
@@ -132,14 +133,14 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the unexplained momentum at the end as a fraction of the largest Σ|m v| of any frame.
 
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
-    between moving bodies conserve momentum. None with drag, damping, thrusts, drives, joints or attraction between
-    moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired
-    with its momentum; with kinematic bodies; or if the run did not reach its end.
+    between moving bodies conserve momentum. None with drag, lift, damping, thrusts, drives, joints or attraction
+    between moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was
+    retired with its momentum; with kinematic bodies; or if the run did not reach its end.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
         return None
-    if world.has_drag or world.has_damping or scene.thrusts or scene.drives or _acts_on_static(scene):
+    if demands(scene) & AIR or scene.thrusts or scene.drives or _acts_on_static(scene):
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones) or bodies.kinematic.any():
         return None

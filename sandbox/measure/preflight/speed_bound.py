@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.forces.air import Air
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
@@ -297,8 +298,7 @@ class SpeedBounds:
         world, bodies = self.scene.world, self.scene.bodies
         if (world.has_drag or world.has_damping) and not len(self.scene.links) and not self.scene.attractions:
             speed = np.minimum(speed, np.maximum(self.start, self._terminal))
-        if world.has_drag:
-            speed = speed + math.hypot(*world.wind)
+        speed = speed + Air.of(world, bodies).speed_by_wind
         speed = speed + self.thrust
         return np.where(bodies.fixed, 0.0, speed)
 

@@ -194,10 +194,12 @@ def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[Model
             )
     if world.has_drag:
         yield ModelChange("no drag", "the scene can also be simulated without drag", _remove_drag)
+    if scene.bodies.lift.any():
+        yield ModelChange("no lift", "the scene can also be simulated without lift", _set_to_zero("lift"))
     if world.has_damping:
         yield ModelChange("no damping", "the scene can also be simulated without damping", _remove_damping)
     if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.body_sources, *scene.fixed)):
-        yield ModelChange("no friction", "the scene can also be simulated without friction", _remove_friction)
+        yield ModelChange("no friction", "the scene can also be simulated without friction", _set_to_zero("friction"))
 
 
 def _contact_pairs(contexts: Sequence[EvaluationContext]) -> IntArray | None:
@@ -229,8 +231,13 @@ def _remove_damping(document: dict[str, Any]) -> None:
     document["world"].pop("damping", None)
 
 
-def _remove_friction(document: dict[str, Any]) -> None:
-    for elements in document.values():
-        for element in elements if isinstance(elements, list) else ():
-            if isinstance(element, dict) and "friction" in element:
-                element["friction"] = 0.0
+def _set_to_zero(key: str) -> SettingChange:
+    """Return a change that sets a key of every element that has it to 0."""
+
+    def change(document: dict[str, Any]) -> None:
+        for elements in document.values():
+            for element in elements if isinstance(elements, list) else ():
+                if isinstance(element, dict) and key in element:
+                    element[key] = 0.0
+
+    return change

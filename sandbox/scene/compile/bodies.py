@@ -245,6 +245,12 @@ class Bodies:
         return np.asarray([isinstance(e, BodySpec) and e.kinematic for e in self.elements], np.bool_)[self.element]
 
     @cached_property
+    def lift(self) -> FloatArray:
+        """(N,) lift coefficient of each: s of the acceleration s ω ẑ × w."""
+        each = [e.lift if isinstance(e, BodySpec) else 0.0 for e in self.elements]
+        return np.asarray(each, dtype=np.float64)[self.element]
+
+    @cached_property
     def immovable(self) -> BoolArray:
         """(N,) whether nothing can push each: it is fixed or kinematic."""
         return self.fixed | self.kinematic

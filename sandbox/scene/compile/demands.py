@@ -14,6 +14,7 @@ from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.fixed import Plane, Post, Wall
 
 
@@ -24,6 +25,7 @@ class Demand(StrEnum):
     ROTATION = "rotation"
     GRAVITY = "gravity"
     DRAG = "drag"
+    LIFT = "lift"
     DAMPING = "damping"
     BALL_BALL = "ball-ball"
     BALL_PLANE = "ball-plane"
@@ -87,6 +89,9 @@ BALLS = frozenset(
 )
 """Demands of scenes of balls and static colliders. Engines list their capabilities; a new demand is supported by
 none."""
+
+AIR = frozenset({Demand.DRAG, Demand.LIFT, Demand.DAMPING})
+"""Demands of forces that depend on velocity."""
 
 SURFACES = frozenset(
     {
@@ -164,6 +169,8 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.DRAG, world.has_drag, why if world.has_drag else "no drag"
     why = f"{world.damping:g} of every velocity remains after 1 s" if world.has_damping else "no damping"
     yield Demand.DAMPING, world.has_damping, why
+    lifted = int(np.count_nonzero(bodies.lift))
+    yield Demand.LIFT, lifted > 0, _count(lifted, "body has lift", "bodies have lift", "no body has lift")
 
     free = int((matrix.free & ~bodies.fixed).sum())
     free_text = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
@@ -290,6 +297,16 @@ def on_floor(setup: Setup) -> bool:
 def curls(setup: Setup) -> bool:
     """Return whether a scene has a surface on which pucks curl."""
     return any(on and demand is Demand.CURL for demand, on, _ in _floor(setup))
+
+
+def demands_of_body(single: BodySpec) -> frozenset[Demand]:
+    """Return the demands that a body alone adds to those of any scene."""
+    stated = (
+        (Demand.GROUPS, single.group is not None),
+        (Demand.KINEMATIC, single.kinematic),
+        (Demand.LIFT, single.lift != 0.0),
+    )
+    return frozenset(demand for demand, is_stated in stated if is_stated)
 
 
 def unmodelled(start: Scene | Setup, capabilities: frozenset[Demand]) -> list[str]:

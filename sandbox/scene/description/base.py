@@ -59,6 +59,8 @@ Acceleration = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
 Moment = Annotated[float, Field(ge=1e-40, le=1e30)]
 """A moment of inertia, kg·m²."""
+Lift = Annotated[float, Field(ge=-1e6, le=1e6)]
+"""Lift coefficient of a spinning body."""
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
@@ -152,5 +154,7 @@ class BodySpec(BodySource):
     """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""
     fixed_rotation: bool = False
     """Never turns, as if its moment of inertia were infinite."""
+    lift: Lift = 0.0
+    """s of the Magnus effect: spin ω turns the velocity through the air at the rate s·ω; above 0, backspin lifts"""
     group: Name | None = None
     """name of a group of bodies that do not collide with each other"""

@@ -187,6 +187,8 @@ def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
         yield "kinematic", "cannot be combined with `fixed`; remove one of the two"
     if single.kinematic and single.fixed_rotation:
         yield "fixed_rotation", "has no effect on a kinematic body, which nothing turns; remove it"
+    if single.lift and (single.fixed or single.kinematic):
+        yield "lift", f"has no effect on a {'fixed' if single.fixed else 'kinematic'} body; remove it"
 
 
 def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:

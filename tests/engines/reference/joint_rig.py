@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from sandbox.engines.forces.air import Air
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, transition
 from sandbox.engines.reference.joints import JointSolver, kick_pose
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
@@ -71,7 +72,7 @@ class Rig:
         constant = np.zeros_like(pose)
         constant[np.isfinite(self.mass), 1] = -gravity
         applied = forces or (lambda x: 0.0)
-        self.u = Inputs(constant, drag, contacts=lambda x: self.solver.forces(x) + applied(x))
+        self.u = Inputs(constant, Air(drag), contacts=lambda x: self.solver.forces(x) + applied(x))
         self.time, self.gravity = 0.0, gravity
 
     def step(self, h: float) -> None:

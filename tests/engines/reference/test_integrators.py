@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from sandbox.engines.forces.air import Air
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, Tableau, amplification, runge_kutta, transition
 
 SYMPLECTIC = ["semi_implicit_euler", "velocity_verlet", "leapfrog"]
@@ -27,7 +28,7 @@ def kepler(t, x, u):
     return np.stack((x[1], -x[0] / np.hypot(*x[0, 0]) ** 3))
 
 
-FALL = Inputs(np.array([[0.0, -9.81]]), quadratic_drag=0.15, linear_drag=0.05, wind=(2.0, 0.5))
+FALL = Inputs(np.array([[0.0, -9.81]]), Air(quadratic_drag=0.15, linear_drag=0.05, wind_x=2.0, wind_y=0.5))
 
 PROBLEMS = {
     "driven oscillator": (driven, DAMPED, np.array([[[1.0]], [[0.5]]]), 4.0, {1: 200, 2: 50, 4: 25}),
@@ -166,7 +167,7 @@ def test_position_error_of_projectiles_matches_the_closed_form(name, h, steps, s
 @pytest.mark.parametrize("name", INTEGRATORS)
 def test_step_is_pure(name):
     x = np.array([[[1.0, 2.0]], [[3.0, 4.0]]])
-    u = Inputs(np.array([[0.0, -9.81]]), linear_drag=0.5)
+    u = Inputs(np.array([[0.0, -9.81]]), Air(linear_drag=0.5))
     one, two = (INTEGRATORS[name].step(transition, 0.0, x, u, 0.1) for _ in range(2))
     assert np.array_equal(one, two)
     assert x.tolist() == [[[1.0, 2.0]], [[3.0, 4.0]]]
@@ -196,7 +197,7 @@ def test_fraction_is_the_part_of_a_kick_that_moves_positions_within_the_step(nam
 
 @given(st.floats(0.01, 2), st.floats(0.01, 2), st.floats(-20, 20))
 def test_drag_matches_its_formula(linear, quadratic, speed):
-    u = Inputs(np.array([[0.0, -9.81]]), linear, quadratic, (1.0, -2.0))
+    u = Inputs(np.array([[0.0, -9.81]]), Air(linear, quadratic, 0.0, 1.0, -2.0))
     rates = transition(0.0, np.array([[[0.0, 0.0]], [[speed, 3.0]]]), u)
     w = np.array([speed - 1.0, 5.0])
     expected = np.array([0.0, -9.81]) - linear * w - quadratic * math.hypot(*w) * w
@@ -205,7 +206,7 @@ def test_drag_matches_its_formula(linear, quadratic, speed):
 
 
 def test_immobile_bodies_feel_no_drag():
-    u = Inputs(np.zeros((2, 2)), linear_drag=1.0, mobile=np.array([[1.0], [0.0]]))
+    u = Inputs(np.zeros((2, 2)), Air(linear_drag=1.0), mobile=np.array([[1.0], [0.0]]))
     rates = transition(0.0, np.array([np.zeros((2, 2)), np.ones((2, 2))]), u)
     assert rates[1].tolist() == [[-1.0, -1.0], [0.0, 0.0]]
 

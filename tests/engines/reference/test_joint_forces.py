@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.engines.common.force_field import add_attraction, add_thrust
+from sandbox.engines.forces.field import add_attraction, add_thrusts
+from sandbox.engines.forces.thrust import ThrustColumns
 from tests.engines.reference.joint_rig import Rig, compile_joints
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
@@ -69,11 +70,13 @@ def test_attraction_is_softened_and_skips_fixed_bodies_and_bodies_at_its_centre(
 
 
 def thrust(throttle, *, force, point=(0.0, 0.0), inverse_mass=0.5, inverse_moment=4.0):
-    arrays = np.array([0]), np.array([point]), np.array([force]), np.array([throttle])
+    always = np.array([-np.inf]), np.array([np.inf])
+    thrusts = ThrustColumns(np.array([0]), np.array([point]), np.array([force]), *always)
+    inverse = np.array([inverse_mass]), np.array([inverse_moment])
 
     def forces(x):
         out = np.zeros_like(x[1])
-        add_thrust(x[0], *arrays, np.array([inverse_mass]), np.array([inverse_moment]), out)
+        add_thrusts(thrusts, np.array([throttle]), 0.0, x[0], *inverse, out)
         return out
 
     return forces

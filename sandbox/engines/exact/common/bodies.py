@@ -9,7 +9,7 @@ from sandbox.engines.common.body_store import ALL, COLLISION_MASKS, FIXED, NOTHI
 from sandbox.engines.common.colliders import static_colliders
 from sandbox.engines.exact.common.requirements import overlap_message, overlapping_collider, touch_tolerance
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
-from sandbox.scene.compile.demands import curls, on_floor
+from sandbox.scene.compile.demands import AIR, curls, demands, demands_of_body, on_floor
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
@@ -83,14 +83,12 @@ class EventDrivenBodies(BodyStore):
         """Continue with a changed scene. Only gravity, coefficients, points of walls and solid flags may differ.
 
         Raises:
-            ActionError: the scene has drag, damping, curl, gravity along a `[surface]`, or more different surfaces than
-                allowed; or a ball overlaps a collider that has moved or become solid.
+            ActionError: the scene has drag, lift, damping, curl, gravity along a `[surface]`, or too many different
+                surfaces; or a ball overlaps a collider that has moved or become solid.
         """
         scene = setup.scene
-        if scene.world.has_drag:
-            raise ActionError("exact does not model drag; pymunk and reference do")
-        if scene.world.has_damping:
-            raise ActionError("exact does not model damping; pymunk and reference do")
+        for demand in sorted(demands(setup) & AIR):
+            raise ActionError(f"exact does not model {demand}; pymunk and reference do")
         is_checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
         if not is_checked and on_floor(setup) and (reason := next(unsupported_on_surface(setup, self.bodies), None)):
             raise ActionError(reason)
@@ -111,13 +109,11 @@ class EventDrivenBodies(BodyStore):
         """Add a validated body and return its index.
 
         Raises:
-            ActionError: it overlaps another object, is not a ball, has a group, is kinematic, is not supported on a
-                `[surface]`, or the scene would have more different surfaces than allowed.
+            ActionError: it overlaps another object, is not a ball, has a group or lift, is kinematic, is not supported
+                on a `[surface]`, or the scene would have more different surfaces than allowed.
         """
-        if single.group is not None:
-            raise ActionError("exact does not model groups; pymunk, reference and box2d do")
-        if single.kinematic:
-            raise ActionError("exact does not model kinematic bodies; pymunk, reference and box2d do")
+        for demand in sorted(demands_of_body(single)):
+            raise ActionError(f"exact does not model {demand}; pymunk, reference and box2d do")
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]

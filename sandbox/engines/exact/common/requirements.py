@@ -22,6 +22,7 @@ from sandbox.scene.geometry.vectors import nearest_fractions
 
 REASONS = {
     Demand.DRAG: "with drag the time of an impact is the root of no polynomial",
+    Demand.LIFT: "with lift the time of an impact is the root of no polynomial",
     Demand.DAMPING: "with damping the time of an impact is the root of no polynomial",
     Demand.ZONES: "a change of gravity or layer within a flight is no event of this engine",
     Demand.ONE_WAY: "whether a wall stops a ball depends on its path before, which an event does not keep",

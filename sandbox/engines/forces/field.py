@@ -1,4 +1,4 @@
-"""Accelerations by attractions and thrusts, for engines that evaluate forces themselves."""
+"""The field of a running scene: accelerations by its attractions and thrusts, for engines that evaluate forces."""
 
 import math
 
@@ -8,8 +8,12 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.geometry import length_and_direction, rotate
 from sandbox.engines.common.kernel import bare_kernel
+from sandbox.engines.forces.attraction import pull
+from sandbox.engines.forces.thrust import ThrustColumns, load
 from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.geometry.shapes import geometry_of
+
+_pull, _load = bare_kernel(pull), bare_kernel(load)
 
 
 @bare_kernel
@@ -24,8 +28,8 @@ def add_attraction(
 ) -> None:
     """Add the accelerations of N bodies by A attractions, and of the attracting bodies by the reactions. Costs A·N.
 
-    A strength is G·M. The mass of the attracting body affects only its own acceleration, by the reaction. A body at the
-    position of its target gets no acceleration.
+    The mass of the attracting body affects only its own acceleration, by the reaction. A body at the position of its
+    target gets no acceleration.
 
     Args:
         pose: (N, 2 or 3) m.
@@ -45,46 +49,61 @@ def add_attraction(
             distance, nx, ny = length_and_direction(x - pose[i, 0], y - pose[i, 1])
             if distance == 0.0:
                 continue
-            pull = strength[k] / (distance * distance + softening[k] * softening[k])
-            out[i, 0] += pull * nx
-            out[i, 1] += pull * ny
+            acceleration = _pull(strength[k], softening[k], distance)
+            out[i, 0] += acceleration * nx
+            out[i, 1] += acceleration * ny
             if own >= 0:
-                answer = pull * (inverse_mass[own] / inverse_mass[i])
-                out[own, 0] -= answer * nx
-                out[own, 1] -= answer * ny
+                reaction = acceleration * (inverse_mass[own] / inverse_mass[i])
+                out[own, 0] -= reaction * nx
+                out[own, 1] -= reaction * ny
 
 
 @bare_kernel
-def add_thrust(
+def thrust_on_body(
+    thrusts: ThrustColumns, k: int, level: float, time: float, angle: float
+) -> tuple[float, float, float]:
+    """Return the force (x, y), N, and torque, N·m, of the k-th thrust at a time of the scene, s.
+
+    Args:
+        thrusts: all.
+        k: index of the thrust.
+        level: fraction of the force that acts.
+        time: s.
+        angle: of the body, rad.
+    """
+    now = level if thrusts.begin[k] <= time < thrusts.end[k] else 0.0
+    x, y, torque = _load(now, thrusts.force[k, 0], thrusts.force[k, 1], thrusts.point[k, 0], thrusts.point[k, 1])
+    world_x, world_y = rotate(x, y, math.cos(angle), math.sin(angle))
+    return world_x, world_y, torque
+
+
+@bare_kernel
+def add_thrusts(
+    thrusts: ThrustColumns,
+    level: FloatArray,
+    time: float,
     pose: FloatArray,
-    body: IntArray,
-    point: FloatArray,
-    force: FloatArray,
-    throttle: FloatArray,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Add the accelerations by T thrusts.
+    """Add the accelerations of N bodies by thrusts.
 
     Args:
+        thrusts: T thrusts.
+        level: (T,) fraction of each force that acts.
+        time: of the scene, s.
         pose: (N, 3) m and rad.
-        body: (T,) index of the body that each thrust acts on.
-        point: (T, 2) m, point of application, in the body's frame about its centre of mass.
-        force: (T, 2) N, in that frame, at full throttle.
-        throttle: (T,) fraction of the force that acts.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
         out: (N, 3) m/s² and rad/s², added to.
     """
-    for k in range(len(body)):
-        i = body[k]
-        x, y = throttle[k] * force[k, 0], throttle[k] * force[k, 1]
-        cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
-        world_x, world_y = rotate(x, y, cos, sin)
-        out[i, 0] += inverse_mass[i] * world_x
-        out[i, 1] += inverse_mass[i] * world_y
-        out[i, 2] += inverse_moment[i] * (point[k, 0] * y - point[k, 1] * x)
+    for k in range(len(thrusts.body)):
+        i = thrusts.body[k]
+        x, y, torque = thrust_on_body(thrusts, k, level[k], time, pose[i, 2])
+        out[i, 0] += inverse_mass[i] * x
+        out[i, 1] += inverse_mass[i] * y
+        out[i, 2] += inverse_moment[i] * torque
 
 
 class ForceField:
@@ -105,18 +124,22 @@ class ForceField:
         self._strength: FloatArray = np.asarray([a.strength for a in attractions], np.float64)
         self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
         self.thrust_indices: IntArray = np.asarray(which, np.int64)
-        self.thrust_bodies: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
-        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in self.thrust_bodies.tolist()]
+        """(T,) index of each thrust in the scene"""
+        number_of_thrust = np.asarray([number[t.body] for t in thrusts], np.int64)
+        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in number_of_thrust.tolist()]
         points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
-        self.thrust_points: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
-        self.thrust_forces: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
-        self.thrust_begins: FloatArray = np.asarray([t.begin for t in thrusts], np.float64)
-        self.thrust_ends: FloatArray = np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64)
+        self.thrusts = ThrustColumns(
+            body=number_of_thrust,
+            point=np.asarray(points, np.float64).reshape(-1, 2),
+            force=np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2),
+            begin=np.asarray([t.begin for t in thrusts], np.float64),
+            end=np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64),
+        )
 
     @property
     def empty(self) -> bool:
         """Whether there are no attractions and no thrusts."""
-        return not (len(self._target) or len(self.thrust_bodies))
+        return not (len(self._target) or len(self.thrusts.body))
 
     def __call__(self, time: float, x: FloatArray) -> FloatArray:
         """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
@@ -142,9 +165,9 @@ class ForceField:
     @property
     def thrusting(self) -> bool:
         """Whether there are thrusts."""
-        return len(self.thrust_bodies) > 0
+        return len(self.thrusts.body) > 0
 
-    def thrusts(self, time: float, x: FloatArray) -> FloatArray:
+    def by_thrusts(self, time: float, x: FloatArray) -> FloatArray:
         """Return the accelerations (N, D) by thrusts alone, m/s² and rad/s²."""
         out: FloatArray = np.zeros_like(x[1])
         self._add_thrusts(time, x, out)
@@ -153,7 +176,6 @@ class ForceField:
     def _add_thrusts(self, time: float, x: FloatArray, out: FloatArray) -> None:
         """Add the accelerations by thrusts."""
         if self.thrusting:
-            store, now = self._store, self._began + time
-            level = store.throttles[self.thrust_indices] * ((self.thrust_begins <= now) & (now < self.thrust_ends))
-            inverse = store.inverse_mass, store.inverse_moment
-            add_thrust(x[0], self.thrust_bodies, self.thrust_points, self.thrust_forces, level, *inverse, out)
+            store = self._store
+            level, inverse = store.throttles[self.thrust_indices], (store.inverse_mass, store.inverse_moment)
+            add_thrusts(self.thrusts, level, self._began + time, x[0], *inverse, out)
