@@ -14,7 +14,7 @@ from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, reach_of, 
 from sandbox.engines.pymunk_adapter.contact_names import is_captured
 from sandbox.pymunk_export.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
@@ -267,7 +267,7 @@ class Contents:
         """Yield the joints."""
         links = self.setup.links
         for k in range(len(links)):
-            kind = LinkKind(int(links.kind[k]))
+            kind = JointKind(int(links.kind[k]))
             values = _joint_values(links, k, self.setup.bodies.names)
             first = "space.static_body" if int(links.a[k]) == WORLD else "bodies[{a}]"
             lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
@@ -327,31 +327,31 @@ def _thrusts_by_body(setup: Setup) -> dict[str, tuple[float, float, float]]:
     return loads
 
 
-JOINT_LINES: dict[LinkKind, tuple[str, ...]] = {
-    LinkKind.ROD: (
+JOINT_LINES: dict[JointKind, tuple[str, ...]] = {
+    JointKind.ROD: (
         "joint = pymunk.PinJoint(<a>, <b>, {anchor_a}, {anchor_b})",
         "joint.distance = {length}",
     ),
-    LinkKind.PIVOT: ("joint = pymunk.PivotJoint(<a>, <b>, {anchor_a}, {anchor_b})",),
-    LinkKind.SLIDE: ("joint = pymunk.SlideJoint(<a>, <b>, {anchor_a}, {anchor_b}, {least}, {most})",),
-    LinkKind.GROOVE: ("joint = pymunk.GrooveJoint(<a>, <b>, {anchor_a}, {far_end}, {anchor_b})",),
-    LinkKind.ROTARY_LIMIT: ("joint = pymunk.RotaryLimitJoint(<a>, <b>, {least}, {most})",),
-    LinkKind.MOTOR: ("joint = pymunk.SimpleMotor(<a>, <b>, {rate})",),
-    LinkKind.RATCHET: (
+    JointKind.PIVOT: ("joint = pymunk.PivotJoint(<a>, <b>, {anchor_a}, {anchor_b})",),
+    JointKind.SLIDE: ("joint = pymunk.SlideJoint(<a>, <b>, {anchor_a}, {anchor_b}, {least}, {most})",),
+    JointKind.GROOVE: ("joint = pymunk.GrooveJoint(<a>, <b>, {anchor_a}, {far_end}, {anchor_b})",),
+    JointKind.ROTARY_LIMIT: ("joint = pymunk.RotaryLimitJoint(<a>, <b>, {least}, {most})",),
+    JointKind.MOTOR: ("joint = pymunk.SimpleMotor(<a>, <b>, {rate})",),
+    JointKind.RATCHET: (
         "joint = pymunk.RatchetJoint(<a>, <b>, {offset}, {ratchet})",
         "joint.angle = {click}",
     ),
-    LinkKind.GEAR: ("joint = pymunk.GearJoint(<a>, <b>, {phase}, {ratio})",),
-    LinkKind.SPRING: (
+    JointKind.GEAR: ("joint = pymunk.GearJoint(<a>, <b>, {phase}, {ratio})",),
+    JointKind.SPRING: (
         "joint = pymunk.DampedSpring(<a>, <b>, {anchor_a}, {anchor_b}, {rest_length}, {stiffness}, {damping})",
     ),
-    LinkKind.ROTARY_SPRING: ("joint = pymunk.DampedRotarySpring(<a>, <b>, {rest_angle}, {stiffness}, {damping})",),
+    JointKind.ROTARY_SPRING: ("joint = pymunk.DampedRotarySpring(<a>, <b>, {rest_angle}, {stiffness}, {damping})",),
 }
 """Statements that create each kind of joint; <a> and <b> stand for its bodies."""
 
 
 def _joint_values(links: JointArrays, k: int, names: Sequence[str]) -> dict[str, str]:
-    """Return the expressions of all columns of joint k, by the figures of `LinkKind`.
+    """Return the expressions of all columns of joint k, by the figures of `JointKind`.
 
     Rates and angles of pymunk's motors and rotary springs are those of the first body relative to the second, so that
     their signs are opposite.

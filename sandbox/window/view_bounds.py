@@ -9,7 +9,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.window.camera import Camera, ViewBox
@@ -27,7 +27,7 @@ SURFACE_MARGIN = 0.12
 OUTLIER_PERCENT = 0.5
 """Percentage of positions ignored at each side if there are more than `OUTLIER_COUNT`."""
 OUTLIER_COUNT = 1000
-ANCHORED_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
+ANCHORED_KINDS = (JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE, JointKind.GROOVE, JointKind.SPRING)
 """Joints with anchor points."""
 MAX_VIEW = 1e15
 """m; larger coordinates are ignored"""
@@ -263,7 +263,7 @@ def _is_tethered(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are static or connected by joints to the world or to a static body, (N,)."""
     links, found = scene.links.of(*ANCHORED_KINDS), bodies.fixed.copy()
     found[links.b[links.a < 0]] = True
-    pulleys = scene.links.of(LinkKind.PULLEY)
+    pulleys = scene.links.of(JointKind.PULLEY)
     found[pulleys.a] = found[pulleys.b] = True
     a, b = links.a[links.a >= 0], links.b[links.a >= 0]
     count = -1
@@ -282,9 +282,9 @@ def _swing_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     anchor, position = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
     is_near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
-    points = [anchor[is_near], links.of(LinkKind.PULLEY).wheels.reshape(-1, 2)]
+    points = [anchor[is_near], links.of(JointKind.PULLEY).wheels.reshape(-1, 2)]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
-        swing = is_near & np.isin(anchored.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[anchored.b]
+        swing = is_near & np.isin(anchored.kind, (JointKind.ROD, JointKind.SLIDE)) & ~bodies.fixed[anchored.b]
         anchor, position, radius = anchor[swing], position[swing], bodies.radius[anchored.b[swing]][:, None]
         length = np.hypot(*(position - anchor).T)
         opposite = np.column_stack((2.0 * anchor[:, 0] - position[:, 0], position[:, 1]))
@@ -342,5 +342,5 @@ def anchor_points(scene: Scene) -> FloatArray:
         points += [(x - r, y - r), (x + r, y + r)]
     links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED_KINDS))
     points += [(x, y) for x, y in links.anchor_a.tolist()]
-    points += [(x, y) for x, y in scene.links.of(LinkKind.PULLEY).wheels.reshape(-1, 2).tolist()]
+    points += [(x, y) for x, y in scene.links.of(JointKind.PULLEY).wheels.reshape(-1, 2).tolist()]
     return np.asarray(points, np.float64).reshape(-1, 2)

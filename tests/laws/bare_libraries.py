@@ -13,7 +13,7 @@ import pymunk
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box, Capsule
 from sandbox.scene.description.fixed import Plane, Wall
@@ -138,7 +138,7 @@ class BareSpace:
     def add_joint(self, k: int) -> None:
         links = self._scene.links
         a, b = (self._space.static_body if n == WORLD else self._bodies[n] for n in (int(links.a[k]), int(links.b[k])))
-        kind = {LinkKind.ROD: pymunk.PinJoint, LinkKind.PIVOT: pymunk.PivotJoint}[LinkKind(int(links.kind[k]))]
+        kind = {JointKind.ROD: pymunk.PinJoint, JointKind.PIVOT: pymunk.PivotJoint}[JointKind(int(links.kind[k]))]
         joint = kind(a, b, tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist()))
         joint.collide_bodies = False
         self._space.add(joint)
@@ -218,7 +218,7 @@ class BareBox2D:
 
     def add_joint(self, k: int) -> None:
         links = self._scene.links
-        is_rod = LinkKind(int(links.kind[k])) == LinkKind.ROD
+        is_rod = JointKind(int(links.kind[k])) == JointKind.ROD
         joint = box2d.DistanceJointDef() if is_rod else box2d.RevoluteJointDef()
         if is_rod:
             joint.length = float(links.figures[k, 0]) * self._scale

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, loads
 from tests.scene.faults import assert_faults
@@ -35,7 +35,7 @@ def test_nodes_are_numbered_along_rows_from_the_upper_left() -> None:
 def test_springs_join_neighbours_at_their_rest_length() -> None:
     scene = scene_of(pins=[])
     bodies, links = scene.bodies, scene.links
-    assert links.kind.tolist() == [LinkKind.SPRING] * 17
+    assert links.kind.tolist() == [JointKind.SPRING] * 17
     pairs = {tuple(pair) for pair in np.column_stack((links.a, links.b)).tolist()}
     grid = np.arange(12).reshape(3, 4)
     across = set(zip(grid[:, :-1].ravel().tolist(), grid[:, 1:].ravel().tolist(), strict=True))
@@ -83,8 +83,8 @@ def test_every_link_starts_at_rest_length_and_their_number_is_right(
 
 def test_shear_and_bend_springs_have_their_own_stiffness() -> None:
     links = scene_of(pins=[], kind="rods", stiffness=None, shear=3.0, bend=5.0).links
-    assert np.unique(links.figures[links.kind == LinkKind.ROD, 1]).tolist() == [0.0]
-    springs = links.figures[links.kind == LinkKind.SPRING]
+    assert np.unique(links.figures[links.kind == JointKind.ROD, 1]).tolist() == [0.0]
+    springs = links.figures[links.kind == JointKind.SPRING]
     diagonal = springs[:, 1] == 3.0
     assert springs[diagonal, 0] == pytest.approx(math.hypot(0.5, 0.25), rel=1e-15)
     assert set(springs[~diagonal, 0].tolist()) == {1.0, 0.5}

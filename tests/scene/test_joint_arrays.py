@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document
@@ -92,7 +92,7 @@ def test_links_list_bodies_held_turned_and_excluded_from_collision() -> None:
     assert links.held(4).tolist() == [True, True, True, False]
     assert links.turned(4).tolist() == [False, True, True, False]
     assert links.apart().tolist() == [[0, 1]]
-    assert links.of(LinkKind.MOTOR).names == ("joint-3",)
+    assert links.of(JointKind.MOTOR).names == ("joint-3",)
 
 
 @pytest.mark.fail_slow(60)  # takes over half a second

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.generators import segments
 from sandbox.scene.files.load import dumps, from_document, loads
@@ -28,14 +28,14 @@ def scene_of(**ragdoll: Any) -> Scene:
 
 def joint_separation(scene: Scene, position: FloatArray, angle: FloatArray) -> float:
     """Return the largest distance between the two anchors of a pivot, m."""
-    pivots = scene.links.of(LinkKind.PIVOT)
+    pivots = scene.links.of(JointKind.PIVOT)
     first, second = pivots.ends(position, angle)
     return float(np.hypot(*(second - first).T).max())
 
 
 def limit_margin(scene: Scene, angle: FloatArray) -> float:
     """Return the smallest distance of a joint angle from its limits, rad; negative beyond a limit."""
-    bounds = scene.links.of(LinkKind.ROTARY_LIMIT)
+    bounds = scene.links.of(JointKind.ROTARY_LIMIT)
     turn = angle[bounds.b] - angle[bounds.a]
     return float(np.minimum(turn - bounds.figures[:, 0], bounds.figures[:, 1] - turn).min())
 

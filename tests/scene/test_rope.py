@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
@@ -42,7 +42,7 @@ def test_rope_without_slack_is_straight_with_equal_links() -> None:
     expected = np.arange(6)[:, None] / 5 * np.array([3.0, 4.0])
     assert scene.bodies.position == pytest.approx(expected, abs=1e-15)  # rounding
     assert scene.bodies.fixed.tolist() == [True, False, False, False, False, True]
-    assert scene.links.kind.tolist() == [LinkKind.ROD] * 5
+    assert scene.links.kind.tolist() == [JointKind.ROD] * 5
     assert scene.links.figures[:, 0].tolist() == [1.0] * 5
     assert not scene.links.collide.any()
 
@@ -99,7 +99,7 @@ def test_rope_with_equal_ends_is_a_regular_polygon() -> None:
 
 def test_springs_have_rest_lengths_of_the_rope_length_and_may_start_stretched() -> None:
     scene = scene_of(length=2.5, damping=0.3, **SPRINGS)
-    assert scene.links.kind.tolist() == [LinkKind.SPRING] * 5
+    assert scene.links.kind.tolist() == [JointKind.SPRING] * 5
     assert scene.links.figures.tolist() == [[0.5, 200.0, 0.3]] * 5
     assert np.hypot(*gaps(scene).T) == pytest.approx(1.0, abs=1e-15)  # rounding
 
@@ -112,7 +112,7 @@ def test_planks_are_joined_end_to_end_and_to_the_world() -> None:
     assert not bodies.round.any()
     assert bodies.angle == pytest.approx(math.atan2(4.0, 3.0), abs=1e-15)  # rounding
     assert bodies.radius == pytest.approx(0.5 + 0.05, abs=1e-15)  # half a link, and the half disc at its end
-    assert links.kind.tolist() == [LinkKind.PIVOT] * 6
+    assert links.kind.tolist() == [JointKind.PIVOT] * 6
     assert links.a.tolist() == [0, 1, 2, 3, WORLD, WORLD]
     assert links.b.tolist() == [1, 2, 3, 4, 0, 4]
     assert np.abs(gaps(scene)).max() < 1e-14  # rounding

@@ -25,7 +25,7 @@ from sandbox.measure.metrics.energy import energies
 from sandbox.measure.preflight import run_preflight, warnings
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.files.load import from_document
@@ -144,7 +144,7 @@ def energy_gain(scene: Scene, done: Trajectory) -> float:
     The reference is at least the energy that lifts every body by its own width, for bodies at rest. The result is 0 if
     thrusts, motors or wind do work.
     """
-    if scene.thrusts or any(scene.world.wind) or len(scene.links.of(LinkKind.MOTOR)):
+    if scene.thrusts or any(scene.world.wind) or len(scene.links.of(JointKind.MOTOR)):
         return 0.0
     kinetic, potential, total = energies(done, scene)
     bodies = scene.bodies

@@ -14,9 +14,9 @@ from sandbox.engines.box2d_adapter.requirements import MERGED
 from sandbox.engines.box2d_adapter.world import Box2DWorld
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.springs import anchors_in_world, spring_law
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 
-SPRINGS = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+SPRINGS = JointKind.SPRING, JointKind.ROTARY_SPRING
 
 UNLIMITED_TORQUE = 1e30
 """N·m in Box2D's units, practically unlimited"""
@@ -30,7 +30,7 @@ class WorldJoints:
         self._joints: dict[int, Any] = {}  # by the index of the joint
         links = store.setup.links
         for k in store.linked().tolist():
-            kind = LinkKind(int(links.kind[k]))
+            kind = JointKind(int(links.kind[k]))
             if kind not in MERGED and (kind not in SPRINGS or (links.a[k] != WORLD and not links.collide[k])):
                 self._joints[k] = world.create_joint(self._definition(links, k))
         self.has_springs = bool(np.isin(links.kind, SPRINGS).any())
@@ -45,20 +45,20 @@ class WorldJoints:
         x, y, _ = links.figures[k].tolist()
         scale = self._world.scale
         a, b = int(links.a[k]), int(links.b[k])
-        match LinkKind(int(links.kind[k])):
-            case LinkKind.SPRING | LinkKind.ROTARY_SPRING:
+        match JointKind(int(links.kind[k])):
+            case JointKind.SPRING | JointKind.ROTARY_SPRING:
                 joint = box2d.FilterJointDef()
                 joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
                 return joint
-            case LinkKind.ROD:
+            case JointKind.ROD:
                 joint = box2d.DistanceJointDef()
                 joint.length = x * scale
-            case LinkKind.SLIDE:
+            case JointKind.SLIDE:
                 joint = box2d.DistanceJointDef()
                 joint.length = y * scale
                 joint.enable_spring, joint.hertz = True, 0.0  # no spring, and not rigid: only the limits act
                 joint.enable_limit, joint.min_length, joint.max_length = True, x * scale, y * scale
-            case LinkKind.GROOVE:
+            case JointKind.GROOVE:
                 joint = box2d.WheelJointDef()
                 along = links.figures[k, :2] - links.anchor_a[k]
                 length = float(np.hypot(*along))
@@ -80,10 +80,10 @@ class WorldJoints:
         between = np.flatnonzero((links.a == links.a[k]) & (links.b == links.b[k]) & intact)
         for other in between.tolist():
             low, high, _ = links.figures[other].tolist()
-            if links.kind[other] == LinkKind.MOTOR:
+            if links.kind[other] == JointKind.MOTOR:
                 joint.enable_motor, joint.motor_speed = True, low
                 joint.max_motor_torque = min(float(links.max_force[other]) * scale**2, UNLIMITED_TORQUE)
-            elif links.kind[other] == LinkKind.ROTARY_LIMIT:
+            elif links.kind[other] == JointKind.ROTARY_LIMIT:
                 joint.reference_angle = math.remainder(0.5 * (low + high), math.tau)
                 joint.enable_limit, joint.lower_angle, joint.upper_angle = True, 0.5 * (low - high), 0.5 * (high - low)
         return joint
@@ -108,8 +108,8 @@ class WorldJoints:
         if links is before:
             return
         changed = (links.figures[:, 0] != before.figures[:, 0]) | (links.max_force != before.max_force)
-        for motor in np.flatnonzero(changed & (links.kind == LinkKind.MOTOR)).tolist():
-            between = (links.a == links.a[motor]) & (links.b == links.b[motor]) & (links.kind == LinkKind.PIVOT)
+        for motor in np.flatnonzero(changed & (links.kind == JointKind.MOTOR)).tolist():
+            between = (links.a == links.a[motor]) & (links.b == links.b[motor]) & (links.kind == JointKind.PIVOT)
             for k in np.flatnonzero(between).tolist():
                 if k in self._joints:
                     definition, joint = self._definition(links, k), self._joints[k]
@@ -124,7 +124,7 @@ class WorldJoints:
     def add_spring_forces(self, force: FloatArray, torque: FloatArray) -> None:
         """Add the forces (N, 2), N, and torques (N,), N·m, of springs and their dampers in the present state."""
         store = self._store
-        springs, rotary = store.links.of(LinkKind.SPRING), store.links.of(LinkKind.ROTARY_SPRING)
+        springs, rotary = store.links.of(JointKind.SPRING), store.links.of(JointKind.ROTARY_SPRING)
         if len(springs):
             arm_a, vector, along, size = self._spring_state(springs)
             arm_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)[0]
@@ -177,6 +177,6 @@ class WorldJoints:
         for kind in SPRINGS:
             springs = intact.of(kind)
             if len(springs):
-                size = self._spring_state(springs)[3] if kind == LinkKind.SPRING else self._rotary_torque(springs)
+                size = self._spring_state(springs)[3] if kind == JointKind.SPRING else self._rotary_torque(springs)
                 found += springs.number[np.abs(size) > springs.strength].tolist()
         return np.asarray(sorted(found), np.int64)

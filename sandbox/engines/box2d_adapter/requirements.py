@@ -17,12 +17,12 @@ from sandbox.engines.box2d_adapter.limits import (
     scale_for,
 )
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
-MERGED = {LinkKind.MOTOR: "motor", LinkKind.ROTARY_LIMIT: "rotary limit"}
+MERGED = {JointKind.MOTOR: "motor", JointKind.ROTARY_LIMIT: "rotary limit"}
 """Joints that Box2D has as part of a pivot only"""
 
 
@@ -36,14 +36,14 @@ def joint_faults(links: JointArrays) -> Iterator[str]:
     """Yield why joints are not supported."""
     pairs = list(zip(links.a.tolist(), links.b.tolist(), links.kind.tolist(), strict=True))
     for k, name in enumerate(links.names):
-        kind, pair = LinkKind(int(links.kind[k])), (int(links.a[k]), int(links.b[k]))
+        kind, pair = JointKind(int(links.kind[k])), (int(links.a[k]), int(links.b[k]))
         if kind in MERGED:
-            pivot = *pair, LinkKind.PIVOT
+            pivot = *pair, JointKind.PIVOT
             if pairs.count(pivot) != 1 or pairs.count((*pair, kind)) != 1:
                 yield f"{name}: Box2D has a {MERGED[kind]} as part of a pivot only, one of each between two bodies"
             elif math.isfinite(links.strength[pairs.index(pivot)]) or math.isfinite(links.strength[k]):
                 yield f"{name}: a {MERGED[kind]} that breaks, or whose pivot breaks, is not supported"
-        if kind == LinkKind.ROTARY_LIMIT and not links.figures[k, 1] - links.figures[k, 0] < 2.0 * math.pi:
+        if kind == JointKind.ROTARY_LIMIT and not links.figures[k, 1] - links.figures[k, 0] < 2.0 * math.pi:
             yield f"{name}: a range of a whole turn or more is not supported, as Box2D knows angles modulo 2π"
 
 

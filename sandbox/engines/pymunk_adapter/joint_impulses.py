@@ -7,7 +7,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.springs import anchors_in_world
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force, relative
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 
 
 class JointImpulses(NamedTuple):
@@ -132,7 +132,7 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_s
         return JointImpulses(motor_links.a, motor_links.b, no_force, no_force, no_force, np.zeros(0))
     unknown = _least_squares(_unit_responses(rigid, position, angle), _stacked(joint_sums))
     first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
-    signs = np.sign(unknown[first[rigid.kind == LinkKind.MOTOR]])
+    signs = np.sign(unknown[first[rigid.kind == JointKind.MOTOR]])
     return JointImpulses(
         motor_links.a, motor_links.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_links))
     )
@@ -169,7 +169,7 @@ def _least_squares(table: FloatArray, sums: FloatArray) -> FloatArray:
 
 def _component_counts(links: JointArrays) -> IntArray:
     """Return the number of components of the impulse of each joint, (K,)."""
-    return np.where(np.isin(links.kind, (LinkKind.PIVOT, LinkKind.GROOVE)), 2, 1)
+    return np.where(np.isin(links.kind, (JointKind.PIVOT, JointKind.GROOVE)), 2, 1)
 
 
 def _stacked(joint_sums: ImpulseSums) -> FloatArray:
@@ -185,12 +185,12 @@ def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray)
     arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
     for k, kind in enumerate(links.kind.tolist()):
         a, b, first_column = int(links.a[k]), int(links.b[k]), int(column[k])
-        if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR, LinkKind.RATCHET):
+        if kind in (JointKind.MOTOR, JointKind.ROTARY_LIMIT, JointKind.GEAR, JointKind.RATCHET):
             table[b, 2, first_column] += 1.0
-            table[a, 2, first_column] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
+            table[a, 2, first_column] -= 1.0 / links.figures[k, 1] if kind == JointKind.GEAR else 1.0
             continue
         middle = position[a] if a >= 0 else np.zeros(2)
-        first_arm = point_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
+        first_arm = point_b[k] - middle if kind == JointKind.GROOVE else arm_a[k]
         directions = np.eye(2) if count[k] == 2 else (point_b - point_a)[k : k + 1]
         for component, direction in enumerate(directions):
             for body, arm, sign in ((a, first_arm, -1.0), (b, arm_b[k], 1.0)):

@@ -9,7 +9,7 @@ import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.springs import anchors_in_world, spring_law
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 
 
 def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
@@ -33,28 +33,28 @@ def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bi
 def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
     x, y, z = links.figures[k].tolist()
     anchor_a, anchor_b = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
-    match LinkKind(int(links.kind[k])):
-        case LinkKind.ROD:
+    match JointKind(int(links.kind[k])):
+        case JointKind.ROD:
             rod = pymunk.PinJoint(a, b, anchor_a, anchor_b)
             rod.distance = x
             return rod
-        case LinkKind.PIVOT:
+        case JointKind.PIVOT:
             return pymunk.PivotJoint(a, b, anchor_a, anchor_b)
-        case LinkKind.SLIDE:
+        case JointKind.SLIDE:
             return pymunk.SlideJoint(a, b, anchor_a, anchor_b, x, y)
-        case LinkKind.GROOVE:
+        case JointKind.GROOVE:
             return pymunk.GrooveJoint(a, b, anchor_a, (x, y), anchor_b)
-        case LinkKind.ROTARY_LIMIT:
+        case JointKind.ROTARY_LIMIT:
             return pymunk.RotaryLimitJoint(a, b, x, y)
-        case LinkKind.MOTOR:
+        case JointKind.MOTOR:
             return pymunk.SimpleMotor(a, b, -x)  # pymunk: rate of the first body relative to the second
-        case LinkKind.GEAR:
+        case JointKind.GEAR:
             return pymunk.GearJoint(a, b, x, y)
-        case LinkKind.SPRING:
+        case JointKind.SPRING:
             return pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, z)
-        case LinkKind.ROTARY_SPRING:
+        case JointKind.ROTARY_SPRING:
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
-        case LinkKind.RATCHET:
+        case JointKind.RATCHET:
             ratchet = pymunk.RatchetJoint(a, b, y, z)
             ratchet.angle = x
             return ratchet
@@ -233,10 +233,10 @@ class SpaceJoints:
     def by_kind(self) -> "JointsByKind":
         """The present joints by kind."""
         if self._by_kind is None:
-            springs, rotary = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+            springs, rotary = JointKind.SPRING, JointKind.ROTARY_SPRING
             present = self._present
             rigid = present.some(~np.isin(present.kind, (springs, rotary)))
-            self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(LinkKind.MOTOR))
+            self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(JointKind.MOTOR))
         return self._by_kind
 
     def impulses(self, links: JointArrays) -> FloatArray:
@@ -264,7 +264,7 @@ class SpaceJoints:
         self._present: JointArrays = links
         self._by_kind = None
         breakable = links.some(np.isfinite(links.strength))
-        kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+        kinds = JointKind.SPRING, JointKind.ROTARY_SPRING
         self._breakable_springs, self._breakable_rotary = breakable.of(kinds[0]), breakable.of(kinds[1])
         self._breakable_joints = breakable.some(~np.isin(breakable.kind, kinds)) if len(breakable) else breakable
         self.has_breakable = len(breakable) > 0

@@ -11,7 +11,7 @@ from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_stepp
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.compile.drives import names_of
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -51,7 +51,7 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
 
 def _max_force_faults(setup: Setup) -> list[str]:
     """Return the first joint whose largest force is not supported: springs are forces, and grooves have two rows."""
-    for kind in (LinkKind.SPRING, LinkKind.ROTARY_SPRING, LinkKind.GROOVE):
+    for kind in (JointKind.SPRING, JointKind.ROTARY_SPRING, JointKind.GROOVE):
         links = setup.links.of(kind)
         limited = np.flatnonzero(np.isfinite(links.max_force))
         if len(limited):
@@ -129,7 +129,7 @@ class ReferenceEngine:
         missing = unmodelled(setup, self.capabilities) + setting_faults(settings, self.name, {"persistence": 1}, ABSENT)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
-        rods = setup.links.of(LinkKind.ROD)
+        rods = setup.links.of(JointKind.ROD)
         if settings.joints == "rattle" and len(points := np.flatnonzero(rods.figures[:, 0] == 0.0)):
             name = rods.names[points[0]]
             missing.append(

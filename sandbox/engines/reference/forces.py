@@ -10,7 +10,7 @@ from sandbox.engines.forces.air import Air
 from sandbox.engines.forces.field import ForceField
 from sandbox.engines.reference.integrators import Inputs, State
 from sandbox.engines.reference.joints import JointSolver
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 
 
 def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:
@@ -30,7 +30,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     if coordinates == 3:
         constant[:, 2] = store.torque * store.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
-    springs = store.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+    springs = store.setup.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(joints.forces_at)
     return Inputs(

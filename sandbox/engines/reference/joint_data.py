@@ -17,18 +17,18 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.geometry import length_and_direction, rotate
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.common.springs import spring_law
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 
 # Plain integers: numba compares them faster than members of an enumeration.
-ROD, PIVOT, SLIDE = int(LinkKind.ROD), int(LinkKind.PIVOT), int(LinkKind.SLIDE)
-ROTARY_LIMIT, MOTOR, GEAR = int(LinkKind.ROTARY_LIMIT), int(LinkKind.MOTOR), int(LinkKind.GEAR)
-GROOVE, PULLEY = int(LinkKind.GROOVE), int(LinkKind.PULLEY)
-SPRING, ROTARY_SPRING = int(LinkKind.SPRING), int(LinkKind.ROTARY_SPRING)
+ROD, PIVOT, SLIDE = int(JointKind.ROD), int(JointKind.PIVOT), int(JointKind.SLIDE)
+ROTARY_LIMIT, MOTOR, GEAR = int(JointKind.ROTARY_LIMIT), int(JointKind.MOTOR), int(JointKind.GEAR)
+GROOVE, PULLEY = int(JointKind.GROOVE), int(JointKind.PULLEY)
+SPRING, ROTARY_SPRING = int(JointKind.SPRING), int(JointKind.ROTARY_SPRING)
 
-SPRINGS = (LinkKind.SPRING, LinkKind.ROTARY_SPRING)
-CONSTRAINTS = tuple(kind for kind in LinkKind if kind not in SPRINGS)
+SPRINGS = (JointKind.SPRING, JointKind.ROTARY_SPRING)
+CONSTRAINTS = tuple(kind for kind in JointKind if kind not in SPRINGS)
 
-GROOVE_ENDS = 1 + int(max(LinkKind))
+GROOVE_ENDS = 1 + int(max(JointKind))
 """Second constraint of a groove, along it; that of the kind `GROOVE` is across it"""
 
 JACOBIAN_KINDS = (GROOVE, GROOVE_ENDS, GEAR, PULLEY)
@@ -47,7 +47,7 @@ class JointData(NamedTuple):
     link: IntArray
     """(K,) index among all joints of the setup"""
     kind: IntArray
-    """(K,) `LinkKind`"""
+    """(K,) `JointKind`"""
     first: IntArray
     """(K,)"""
     second: IntArray
@@ -55,7 +55,7 @@ class JointData(NamedTuple):
     anchor: FloatArray
     """(K, 4) m, anchors ax, ay, bx, by in the frames of the bodies; for the world, a point in space"""
     figures: FloatArray
-    """(K, 3), as defined by `LinkKind`"""
+    """(K, 3), as defined by `JointKind`"""
     wheel: FloatArray
     """(K, 4) m, positions of both wheels of a pulley in the world: ax, ay, bx, by"""
     max_force: FloatArray
@@ -70,7 +70,7 @@ class JointData(NamedTuple):
         return JointData._make(np.concatenate(pair) for pair in zip(self, more, strict=True))
 
 
-def select_joints(links: JointArrays, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
+def select_joints(links: JointArrays, *kinds: JointKind, among: IntArray | None = None) -> JointData:
     """Return the joints of some kinds, in their order; with `among`, only those with these indices.
 
     A groove is followed by its second constraint, `GROOVE_ENDS`.

@@ -46,9 +46,9 @@ from sandbox.engines.reference.joint_rows import (
     write_joint_impulses,
 )
 from sandbox.engines.reference.position_joints import project
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 
-LIMITS = (LinkKind.SLIDE, LinkKind.ROTARY_LIMIT, LinkKind.PULLEY, GROOVE_ENDS)
+LIMITS = (JointKind.SLIDE, JointKind.ROTARY_LIMIT, JointKind.PULLEY, GROOVE_ENDS)
 """Kinds that act at a limit only"""
 
 METHODS = ("impulses", "relaxation", "xpbd", "rattle")

@@ -12,7 +12,7 @@ from sandbox.scene.compile.ballistics import free_flight
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.demands import AIR, Demand, demands
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.world import World
@@ -32,7 +32,7 @@ rounding.
 class Anchor(NamedTuple):
     """Only joint of a body, which connects it to a fixed point."""
 
-    kind: LinkKind
+    kind: JointKind
     figures: FloatArray
     """(3,) parameters by kind"""
     place: FloatArray
@@ -95,7 +95,7 @@ class SceneFacts:
             return None
         joint = self.links.some(np.asarray([k]))
         (start,), (end,) = joint.ends(self.bodies.position, self.bodies.angle)
-        kind, figures = LinkKind(int(joint.kind[0])), joint.figures[0]
+        kind, figures = JointKind(int(joint.kind[0])), joint.figures[0]
         if int(joint.b[0]) == number:
             other, position, arm = int(joint.a[0]), start, joint.anchor_b[0]
         else:

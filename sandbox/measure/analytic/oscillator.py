@@ -12,7 +12,7 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic.model import BodyMotion, SceneFacts, direction, parallel
 from sandbox.scene.compile.demands import AIR, Demand, demands
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.trajectory import ContactEvent
 
 
@@ -80,7 +80,7 @@ def oscillator(facts: SceneFacts, number: int) -> Oscillator | None:
     if not facts.moves_freely(number) or not facts.matrix.held[number] or scene.attractions:
         return None
     anchor = facts.anchor(number)
-    if anchor is None or anchor.kind != LinkKind.SPRING or anchor.arm.any():
+    if anchor is None or anchor.kind != JointKind.SPRING or anchor.arm.any():
         return None
     # Damping changes the spin, which is constant here, and lift couples x and y.
     if facts.world.quadratic_drag > 0.0 or demands(facts.scene) & AIR - {Demand.DRAG}:

@@ -13,7 +13,7 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic.elliptic import first_kind, jacobi, quarter_period
 from sandbox.measure.analytic.model import PARALLEL_SINE, Anchor, BodyMotion, SceneFacts, cross, direction
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.trajectory import ContactEvent
 
 
@@ -131,7 +131,7 @@ def pendulum(facts: SceneFacts, number: int) -> Pendulum | None:
     pull = math.hypot(*facts.gravity)
     down = direction(facts.gravity) if pull > 0.0 else direction(arm)
     frequency = math.sqrt(float(bodies.mass[number]) * pull * length / moment)
-    free_spin = spin if anchor.kind == LinkKind.ROD else None
+    free_spin = spin if anchor.kind == JointKind.ROD else None
     theta, half = _halved(down, arm / length)
     return Pendulum(
         Swing(theta, half, rate, frequency), anchor.place, length, down, float(bodies.angle[number]), free_spin
@@ -142,11 +142,11 @@ def _moment(facts: SceneFacts, number: int, anchor: Anchor, arm: FloatArray, rat
     """Return the moment of inertia about the pivot point, kg·m²; None if the joint makes no pendulum."""
     bodies, length = facts.bodies, math.hypot(*arm)
     size = length + float(np.abs(anchor.place).max())  # the scale of the rounding of coordinates
-    if anchor.kind == LinkKind.ROD:
+    if anchor.kind == JointKind.ROD:
         if anchor.arm.any() or abs(float(anchor.figures[0]) - length) > PARALLEL_SINE * size:
             return None
         return float(bodies.mass[number]) * length**2
-    if anchor.kind != LinkKind.PIVOT:
+    if anchor.kind != JointKind.PIVOT:
         return None
     cos, sin = math.cos(bodies.angle[number]), math.sin(bodies.angle[number])
     held = np.asarray([cos * anchor.arm[0] - sin * anchor.arm[1], sin * anchor.arm[0] + cos * anchor.arm[1]])

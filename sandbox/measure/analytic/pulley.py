@@ -11,7 +11,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic.model import PARALLEL_SINE, BodyMotion, SceneFacts, direction, parallel
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.trajectory import ContactEvent
 
 
@@ -95,7 +95,7 @@ def _only_pulley(facts: SceneFacts, number: int) -> JointArrays | None:
     pulley = links.some(found)
     pair = pulley.a[0], pulley.b[0]
     shared = np.isin(links.a, pair) | np.isin(links.b, pair)
-    if pulley.kind[0] != LinkKind.PULLEY or shared.sum() != 1 or math.isfinite(pulley.strength[0]):
+    if pulley.kind[0] != JointKind.PULLEY or shared.sum() != 1 or math.isfinite(pulley.strength[0]):
         return None
     return None if pulley.anchor_a.any() or pulley.anchor_b.any() else pulley
 

@@ -11,7 +11,7 @@ from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import AIR, demands
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -75,8 +75,8 @@ def conserves_energy(scene: Scene) -> bool:
         return False
     if scene.bodies.kinematic.any():
         return False
-    springs, motors = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING), scene.links.of(LinkKind.MOTOR)
-    slides = scene.links.of(LinkKind.SLIDE)
+    springs, motors = scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING), scene.links.of(JointKind.MOTOR)
+    slides = scene.links.of(JointKind.SLIDE)
     if springs.figures[:, 2].any() or len(motors) or len(slides) or scene.links.is_limited.any():
         return False
     matrix = contact_matrix(scene)
@@ -92,7 +92,7 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     body by its own width. Energy that explicit Euler adds in free flight, m·g²·h·t/2, does not count.
     """
     links = scene.links
-    if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
+    if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(JointKind.MOTOR)):
         return 0.0
     if scene.bodies.kinematic.any():
         return 0.0
@@ -160,7 +160,7 @@ def _acts_on_static(scene: Scene) -> bool:
     bodies, links = scene.bodies, scene.links
     static = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
     is_attracted = any(not isinstance(each.toward, str) or each.toward in static for each in scene.attractions)
-    is_held = (links.a < 0) | (links.kind == LinkKind.PULLEY) | bodies.fixed[links.a] | bodies.fixed[links.b]
+    is_held = (links.a < 0) | (links.kind == JointKind.PULLEY) | bodies.fixed[links.a] | bodies.fixed[links.b]
     return is_attracted or bool(is_held.any())
 
 
@@ -174,18 +174,18 @@ CHUNK = 2_000_000
 """Frames × joints that are processed at once."""
 
 CONSTRAINT_KINDS = (
-    LinkKind.ROD,
-    LinkKind.PIVOT,
-    LinkKind.SLIDE,
-    LinkKind.GROOVE,
-    LinkKind.ROTARY_LIMIT,
-    LinkKind.GEAR,
-    LinkKind.PULLEY,
+    JointKind.ROD,
+    JointKind.PIVOT,
+    JointKind.SLIDE,
+    JointKind.GROOVE,
+    JointKind.ROTARY_LIMIT,
+    JointKind.GEAR,
+    JointKind.PULLEY,
 )
 """Kinds of joints that are constraints with an error; springs, motors and ratchets are not."""
 
 
-ANGLE_KINDS = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
+ANGLE_KINDS = (JointKind.ROTARY_LIMIT, JointKind.GEAR)
 """Kinds of joints whose error is an angle"""
 
 
@@ -266,8 +266,8 @@ def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
     rope, or the bound of the slide; the diameter of the smaller body, and of the larger one; the longer arm of the
     anchors. A body that cannot move does not count beside one that can: a static body may be a point.
     """
-    length = np.where(np.isin(links.kind, (LinkKind.ROD, LinkKind.PULLEY)), links.figures[:, 0], 0.0)
-    length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
+    length = np.where(np.isin(links.kind, (JointKind.ROD, JointKind.PULLEY)), links.figures[:, 0], 0.0)
+    length = np.where(links.kind == JointKind.SLIDE, links.figures[:, 1], length)
     ends = np.column_stack((links.a, links.b))
     arms = np.hypot(*np.stack((links.anchor_a, links.anchor_b)).transpose(2, 1, 0))
     counts = (ends >= 0) & ~bodies.immovable[ends]
@@ -295,13 +295,13 @@ def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present
         to_second = np.hypot(*np.moveaxis(second - links.wheels[:, 2:], 2, 0))
         angle_a, angle_b = turned_by(links, angle)
         by_kind = {
-            LinkKind.ROD: np.abs(apart - x),
-            LinkKind.PIVOT: apart,
-            LinkKind.SLIDE: np.maximum(x - apart, apart - y),
-            LinkKind.GROOVE: _from_groove(links, position, angle, second),
-            LinkKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
-            LinkKind.GEAR: np.abs(angle_b * y - angle_a - x),
-            LinkKind.PULLEY: to_first + y * to_second - x,
+            JointKind.ROD: np.abs(apart - x),
+            JointKind.PIVOT: apart,
+            JointKind.SLIDE: np.maximum(x - apart, apart - y),
+            JointKind.GROOVE: _from_groove(links, position, angle, second),
+            JointKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
+            JointKind.GEAR: np.abs(angle_b * y - angle_a - x),
+            JointKind.PULLEY: to_first + y * to_second - x,
         }
     found = np.full(present.shape, np.nan)
     for kind, error in by_kind.items():

@@ -29,13 +29,13 @@ from sandbox.engines.common.solver_settings import BIAS
 from sandbox.measure.metrics.invariants import ANGLE_KINDS, joint_scales, starting_errors
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits, required_iterations
 from sandbox.measure.preflight.stiffness import Product, connected_groups, extreme_eigenvalues
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
 MEASURED_FRACTION = 0.93
 """Fraction of r/(2λ) from which on chains hold, as measured."""
-IMPULSE_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.PULLEY)
+IMPULSE_KINDS = (JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE, JointKind.GROOVE, JointKind.PULLEY)
 MIN_MASS_RATIO = 10.0
 """A joint between masses whose ratio exceeds this is named."""
 
@@ -182,7 +182,7 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     pull = math.hypot(*scene.world.gravity)
     if settings.joints not in ("relaxation", "xpbd", "rattle") or pull == 0.0:
         return
-    links, depth = scene.links.of(LinkKind.ROD), 0
+    links, depth = scene.links.of(JointKind.ROD), 0
     if not len(links):
         return
     is_static = np.append(scene.bodies.immovable, True)  # the world is −1, the last
@@ -217,7 +217,7 @@ digits.
 FAR_ANCHOR_RADII = 2.0
 """An anchor farther from the centre of its body than this many radii is a lever without mass, or a mistake."""
 
-ANCHORED_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.SPRING)
+ANCHORED_KINDS = (JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE, JointKind.SPRING)
 
 ANCHOR_ORDER = (
     "in a joint with one body, the first of `anchors` is in the frame of the body, the second in world coordinates"
@@ -235,7 +235,7 @@ def joint_start_warnings(scene: Scene) -> Iterator[Diagnostic]:
         return
     errors = starting_errors(scene)
     fractions = np.nan_to_num(errors / joint_scales(links, scene.bodies))
-    swapped = _swapped(scene, links) & ~((links.kind == LinkKind.PIVOT) & (fractions <= MAX_START_ERROR))
+    swapped = _swapped(scene, links) & ~((links.kind == JointKind.PIVOT) & (fractions <= MAX_START_ERROR))
     violated = (fractions > MAX_START_ERROR) & ~swapped
     if violated.any():
         worst = int(np.argmax(np.where(violated, fractions, 0.0)))

@@ -16,7 +16,7 @@ from sandbox.measure.preflight.seams import seam_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
 from sandbox.measure.run.run_warnings import wasted_integrator
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.bodies import Compound, Polygon, PolygonPart
@@ -212,8 +212,8 @@ def _pymunk_dampers(scene: Scene) -> Iterator[Diagnostic]:
     1 m on a hinge at its end, c·h/I from 0.009 to 0.6: the error at 0.5 s is 0.6 rad times c·h/I.
     """
     bodies, links = scene.bodies, scene.links
-    springs = links.of(LinkKind.ROTARY_SPRING)
-    pivots = links.of(LinkKind.PIVOT)
+    springs = links.of(JointKind.ROTARY_SPRING)
+    pivots = links.of(JointKind.PIVOT)
     held = np.zeros(len(bodies), np.bool_)
     held[pivots.b[np.hypot(*pivots.anchor_b.T) > 0.0]] = True
     held[pivots.a[(pivots.a >= 0) & (np.hypot(*pivots.anchor_a.T) > 0.0)]] = True

@@ -11,7 +11,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.forces.air import Air
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointKind
 from sandbox.scene.compile.potential import Potential
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_SPEED
@@ -31,9 +31,9 @@ def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
     and the paths through the bodies between their joints.
     """
     bodies, links = scene.bodies, scene.links
-    links = links.some(~links.is_limited).of(LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE)
-    length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
-    length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
+    links = links.some(~links.is_limited).of(JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE)
+    length = np.where(links.kind == JointKind.ROD, links.figures[:, 0], 0.0)
+    length = np.where(links.kind == JointKind.SLIDE, links.figures[:, 1], length)
     arm_a, arm_b = (np.hypot(*each.T) for each in (links.anchor_a, links.anchor_b))
     is_static = np.append(bodies.fixed, True)  # the world is −1, the last
     paths: Paths = [[] for _ in range(len(bodies))]
@@ -108,7 +108,7 @@ class SpeedBounds:
             found.append("kinematic bodies")
         if self.matrix.moving_surfaces:
             found.append("moving surfaces")
-        if len(scene.links.of(LinkKind.MOTOR)):
+        if len(scene.links.of(JointKind.MOTOR)):
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")
@@ -131,7 +131,7 @@ class SpeedBounds:
         """(N,) m²/s², square of the speed at the start, with the energy of springs and attraction."""
         scene, bodies = self.scene, self.scene.bodies
         squared = np.square(self.start)
-        springs = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+        springs = scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
         if len(springs):
             present = np.ones((1, len(bodies)), np.bool_)
             stored = Potential(scene, bodies).of_springs(

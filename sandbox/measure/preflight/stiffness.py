@@ -17,7 +17,7 @@ from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, 
 from sandbox.measure.preflight.speed_bound import SpeedBounds
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.derived import derived_once
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -209,7 +209,7 @@ def fastest_modes(setup: Setup) -> tuple[SpringMode, ...]:
     l₀/l). Other joints are left out: they only add mass, so that the modes are slower than stated.
     """
     bodies = setup.scene.bodies
-    links = setup.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+    links = setup.scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
     if not len(links):
         return ()
     free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
@@ -269,7 +269,7 @@ def _rows(links: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[
     length = np.hypot(*line.T)
     unit = np.where(length[:, None] > 0.0, line / np.where(length > 0.0, length, 1.0)[:, None], (1.0, 0.0))
     across = np.column_stack((-unit[:, 1], unit[:, 0]))
-    straight = links.kind == LinkKind.SPRING
+    straight = links.kind == JointKind.SPRING
     rest, stiffness, damping = links.figures.T
     taut = np.clip(1.0 - rest / np.where(length > 0.0, length, np.inf), 0.0, 1.0)
     taut = np.where((length == 0.0) & (rest == 0.0), 1.0, taut)  # a spring of length 0 is isotropic

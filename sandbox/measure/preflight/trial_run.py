@@ -29,7 +29,7 @@ from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.filters import filter_table
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Settings
@@ -243,7 +243,7 @@ class TrialRun:
     def _energy_gains(self) -> Iterator[Diagnostic]:
         gain = energy_gain(self.run, self.scene)
         if gain > MAX_ENERGY_GAIN:
-            springs = len(self.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)) > 0
+            springs = len(self.scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)) > 0
             message = f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.description}"
             message += self._by_impacts()
             yield Diagnostic("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})

@@ -13,7 +13,7 @@ from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -143,7 +143,7 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         "attracted_rk4": substeps * bodies * len(scene.attractions) * (settings.integrator == "rk4"),
         "driven": substeps * (len(scene.thrusts) + len(scene.drives)),
         "joined": substeps * len(setup.links),
-        "springs": substeps * len(setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)),
+        "springs": substeps * len(setup.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)),
         "on_floor": substeps * (scene.surface is not None),
     }
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.geometry.shapes import geometry_of
@@ -106,7 +106,7 @@ MARGIN = 0.06
 """Free space around the shown region, as a fraction of its size."""
 ENCODED_RATIO = 3.0
 """Side of the encoded square, in sizes of the viewport: space for zooming out and panning."""
-ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
+ANCHORED = (JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE, JointKind.GROOVE, JointKind.SPRING)
 
 Bounds = tuple[float, float, float, float]
 """left, bottom, right, top, m"""
@@ -189,7 +189,7 @@ def _static_bounds(scene: Scene) -> Iterator[FloatArray]:
         if not isinstance(each.toward, str):
             yield np.asarray((each.toward, each.toward))
     anchors = links.anchor_a[(links.a < 0) & np.isin(links.kind, ANCHORED)]
-    for anchor in (*anchors, *links.wheels[links.kind == LinkKind.PULLEY].reshape(-1, 2)):
+    for anchor in (*anchors, *links.wheels[links.kind == JointKind.PULLEY].reshape(-1, 2)):
         yield np.asarray((anchor, anchor))
 
 
@@ -201,12 +201,12 @@ MAX_JOINTS = 5000
 MAX_NAMES = 8
 """Up to this number of bodies, each is labelled with its name."""
 SYMBOLS = {
-    LinkKind.ROD: "rod",
-    LinkKind.SLIDE: "string",
-    LinkKind.GROOVE: "rod",
-    LinkKind.SPRING: "spring",
-    LinkKind.PIVOT: "pivot",
-    LinkKind.PULLEY: "string",
+    JointKind.ROD: "rod",
+    JointKind.SLIDE: "string",
+    JointKind.GROOVE: "rod",
+    JointKind.SPRING: "spring",
+    JointKind.PIVOT: "pivot",
+    JointKind.PULLEY: "string",
 }
 """Visible kinds of joints, and the symbol of each."""
 
@@ -276,7 +276,7 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
     found = []
     ends = links.ends(bodies.position, bodies.angle)
     for k in np.flatnonzero(np.isin(links.kind, list(SYMBOLS)))[:MAX_JOINTS].tolist():
-        row: list[Any] = [int(links.number[k]), SYMBOLS[LinkKind(int(links.kind[k]))]]
+        row: list[Any] = [int(links.number[k]), SYMBOLS[JointKind(int(links.kind[k]))]]
         anchors: list[float] = []
         for number, anchor, end in (
             (links.a[k], links.anchor_a[k], ends[0][k]),
@@ -290,7 +290,7 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
                 anchors += [_short(value) for value in anchor.tolist()]
         if -2 in row[2:4] or row[2:4] == [-1, -1]:
             continue
-        if links.kind[k] != LinkKind.PULLEY:
+        if links.kind[k] != JointKind.PULLEY:
             found.append([*row, *anchors])
             continue
         number, symbol, a, b = row

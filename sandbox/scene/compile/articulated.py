@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.bodies import Layout, link_length, rotated, uniform_layout
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.generators import ENDS, STRIDE, BodySegment, Cloth, Ragdoll, Rope, RopeEnd, segments
 from sandbox.scene.geometry.vectors import to_world
@@ -87,21 +87,21 @@ def rope_joints(rope: Rope) -> JointArrays:
         first, last = (rope.tied(end) is not None for end in ENDS)
         node = np.concatenate(([STARTS_AT] * first, np.arange(count), [ENDS_AT] * last)).astype(np.int64)
         if rope.kind == "rods":
-            return JointArrays.alike(LinkKind.ROD, node[:-1], node[1:], figures=(length, 0.0, 0.0))
+            return JointArrays.alike(JointKind.ROD, node[:-1], node[1:], figures=(length, 0.0, 0.0))
         assert rope.stiffness is not None
         figures = length, rope.stiffness, rope.damping
-        return JointArrays.alike(LinkKind.SPRING, node[:-1], node[1:], figures=figures)
+        return JointArrays.alike(JointKind.SPRING, node[:-1], node[1:], figures=figures)
     half, plank = 0.5 * length, np.arange(count)
-    links = JointArrays.alike(LinkKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
+    links = JointArrays.alike(JointKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
     ends: tuple[tuple[RopeEnd, int, Point, int, float], ...] = (
         ("start", 0, rope.start, STARTS_AT, -half),
         ("end", count - 1, rope.end, ENDS_AT, half),
     )
     for end, body, position, placeholder, anchor in ends:
         if rope.tied(end) is not None:
-            joint = JointArrays.alike(LinkKind.PIVOT, [placeholder], [body], (0.0, 0.0), (anchor, 0.0))
+            joint = JointArrays.alike(JointKind.PIVOT, [placeholder], [body], (0.0, 0.0), (anchor, 0.0))
         elif rope.holds(end):
-            joint = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
+            joint = JointArrays.alike(JointKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
         else:
             continue
         links = links.joined(joint)
@@ -141,8 +141,8 @@ def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float |
     a = index[:height, left : left + width].ravel()
     b = index[down : down + height, other : other + width].ravel()
     if stiffness is None:
-        return JointArrays.alike(LinkKind.ROD, a, b, figures=(length, 0.0, 0.0))
-    return JointArrays.alike(LinkKind.SPRING, a, b, figures=(length, stiffness, cloth.damping))
+        return JointArrays.alike(JointKind.ROD, a, b, figures=(length, 0.0, 0.0))
+    return JointArrays.alike(JointKind.SPRING, a, b, figures=(length, stiffness, cloth.damping))
 
 
 class Pose(NamedTuple):
@@ -189,9 +189,9 @@ def limb_joints(ragdoll: Ragdoll) -> JointArrays:
     a, b = [index[part.parent] for _, part in joined], [index[name] for name, _ in joined]
     anchor_a = [_anchor(parts[part.parent], part.joint, flip, ragdoll.height) for _, part in joined]
     anchor_b = [_anchor(part, part.joint, flip, ragdoll.height) for _, part in joined]
-    pivots = JointArrays.alike(LinkKind.PIVOT, a, b, np.asarray(anchor_a), np.asarray(anchor_b))
+    pivots = JointArrays.alike(JointKind.PIVOT, a, b, np.asarray(anchor_a), np.asarray(anchor_b))
     bounds = [_bounds(part, parts[part.parent], flip) for _, part in joined]
-    return pivots.joined(JointArrays.alike(LinkKind.ROTARY_LIMIT, a, b, figures=np.asarray(bounds)))
+    return pivots.joined(JointArrays.alike(JointKind.ROTARY_LIMIT, a, b, figures=np.asarray(bounds)))
 
 
 def _flip(ragdoll: Ragdoll) -> float:

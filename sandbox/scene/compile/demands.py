@@ -11,7 +11,7 @@ import numpy as np
 
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.derived import derived_once
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
@@ -109,17 +109,17 @@ FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS, Demand.PUCKS})
 """Demands of spheres and pucks on a `[surface]`; curl of pucks is a demand of its own."""
 
 DEMAND_OF_JOINT = {
-    LinkKind.ROD: Demand.RODS,
-    LinkKind.PIVOT: Demand.PIVOTS,
-    LinkKind.SLIDE: Demand.SLIDES,
-    LinkKind.GROOVE: Demand.GROOVES,
-    LinkKind.ROTARY_LIMIT: Demand.ROTARY_LIMITS,
-    LinkKind.MOTOR: Demand.MOTORS,
-    LinkKind.GEAR: Demand.GEARS,
-    LinkKind.SPRING: Demand.SPRINGS,
-    LinkKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
-    LinkKind.PULLEY: Demand.PULLEYS,
-    LinkKind.RATCHET: Demand.RATCHETS,
+    JointKind.ROD: Demand.RODS,
+    JointKind.PIVOT: Demand.PIVOTS,
+    JointKind.SLIDE: Demand.SLIDES,
+    JointKind.GROOVE: Demand.GROOVES,
+    JointKind.ROTARY_LIMIT: Demand.ROTARY_LIMITS,
+    JointKind.MOTOR: Demand.MOTORS,
+    JointKind.GEAR: Demand.GEARS,
+    JointKind.SPRING: Demand.SPRINGS,
+    JointKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
+    JointKind.PULLEY: Demand.PULLEYS,
+    JointKind.RATCHET: Demand.RATCHETS,
 }
 """Demands of each kind of joint."""
 
@@ -246,7 +246,7 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
 
 def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     scene, links = setup.scene, setup.links
-    has_limit = np.isfinite(links.max_force) & (links.kind != LinkKind.MOTOR)  # that of a motor is part of motors
+    has_limit = np.isfinite(links.max_force) & (links.kind != JointKind.MOTOR)  # that of a motor is part of motors
     for demand, applies in (
         *((demand, links.kind == kind) for kind, demand in DEMAND_OF_JOINT.items()),
         (Demand.MAX_FORCE, has_limit),

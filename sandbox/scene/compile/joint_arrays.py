@@ -15,7 +15,7 @@ WORLD = -1
 """Index of the static world, as the first body of a joint."""
 
 
-class LinkKind(IntEnum):
+class JointKind(IntEnum):
     """Kind of a joint, and the meaning of its `figures`."""
 
     ROD = 0
@@ -43,12 +43,12 @@ class LinkKind(IntEnum):
 
 
 TURNING = (
-    LinkKind.GROOVE,
-    LinkKind.ROTARY_LIMIT,
-    LinkKind.MOTOR,
-    LinkKind.GEAR,
-    LinkKind.ROTARY_SPRING,
-    LinkKind.RATCHET,
+    JointKind.GROOVE,
+    JointKind.ROTARY_LIMIT,
+    JointKind.MOTOR,
+    JointKind.GEAR,
+    JointKind.ROTARY_SPRING,
+    JointKind.RATCHET,
 )
 """Kinds that can rotate bodies at any anchor; the others only at anchors off the centre of mass."""
 
@@ -67,7 +67,7 @@ class JointArrays:
     """The joints of a scene: those of the file in their order, then those of its generators."""
 
     kind: IntArray
-    """(J,) `LinkKind`"""
+    """(J,) `JointKind`"""
     a: IntArray
     """(J,) index of the first body, or `WORLD`"""
     b: IntArray
@@ -125,7 +125,7 @@ class JointArrays:
     @classmethod
     def alike(
         cls,
-        kind: LinkKind,
+        kind: JointKind,
         a: npt.ArrayLike,
         b: npt.ArrayLike,
         anchor_a: npt.ArrayLike = (0.0, 0.0),
@@ -180,7 +180,7 @@ class JointArrays:
         """Return the joints without those of some indices in the whole scene."""
         return self.some(~np.isin(self.number, list(broken))) if broken else self
 
-    def of(self, *kinds: LinkKind) -> Self:
+    def of(self, *kinds: JointKind) -> Self:
         """Return the joints of some kinds."""
         return self if not len(self) else self.some(np.isin(self.kind, kinds))
 
@@ -191,9 +191,9 @@ class JointArrays:
 
     def clicked(self, angle: FloatArray) -> Self:
         """Return the joints with ratchets at the last clicks of bodies that turned to angles, (N,) rad."""
-        if not (self.kind == LinkKind.RATCHET).any():
+        if not (self.kind == JointKind.RATCHET).any():
             return self
-        rows, figures = self.kind == LinkKind.RATCHET, self.figures.copy()
+        rows, figures = self.kind == JointKind.RATCHET, self.figures.copy()
         _, phase, ratchet = figures[rows].T
         a, b = self.a[rows], self.b[rows]
         turned = angle[b] - np.where(a >= 0, angle[a], 0.0)

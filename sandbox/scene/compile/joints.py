@@ -11,7 +11,7 @@ from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_joints, 
 from sandbox.scene.compile.bodies import Bodies, rotated
 from sandbox.scene.compile.drives import is_immovable
 from sandbox.scene.compile.generators import count_of
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind, last_click
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind, last_click
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, SoftBody
 from sandbox.scene.description.joints import (
@@ -100,18 +100,18 @@ def _to_body_frame(position: Point, number: int, bodies: Bodies) -> FloatArray:
     return rotated(np.asarray([position]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
 
 
-KINDS: dict[type, LinkKind] = {
-    Rod: LinkKind.ROD,
-    Pivot: LinkKind.PIVOT,
-    Slide: LinkKind.SLIDE,
-    Groove: LinkKind.GROOVE,
-    RotaryLimit: LinkKind.ROTARY_LIMIT,
-    Motor: LinkKind.MOTOR,
-    Gear: LinkKind.GEAR,
-    Spring: LinkKind.SPRING,
-    RotarySpring: LinkKind.ROTARY_SPRING,
-    Pulley: LinkKind.PULLEY,
-    Ratchet: LinkKind.RATCHET,
+KINDS: dict[type, JointKind] = {
+    Rod: JointKind.ROD,
+    Pivot: JointKind.PIVOT,
+    Slide: JointKind.SLIDE,
+    Groove: JointKind.GROOVE,
+    RotaryLimit: JointKind.ROTARY_LIMIT,
+    Motor: JointKind.MOTOR,
+    Gear: JointKind.GEAR,
+    Spring: JointKind.SPRING,
+    RotarySpring: JointKind.ROTARY_SPRING,
+    Pulley: JointKind.PULLEY,
+    Ratchet: JointKind.RATCHET,
 }
 
 

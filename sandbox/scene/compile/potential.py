@@ -4,7 +4,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.forces import Attraction
@@ -36,7 +36,7 @@ class Potential:
         setup = Setup.of(start)
         scene, links = setup.scene, setup.links
         breaks = np.full(len(links), np.inf) if breaks is None else breaks
-        kinds = (LinkKind.SPRING, _stretch), (LinkKind.ROTARY_SPRING, _turn)
+        kinds = (JointKind.SPRING, _stretch), (JointKind.ROTARY_SPRING, _turn)
         self._springs = [(links.of(kind), breaks[links.kind == kind], strain) for kind, strain in kinds]
         number = {name: k for k, name in enumerate(bodies.names)} if scene.attractions else {}
         self._attractions = [

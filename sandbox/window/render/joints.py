@@ -15,7 +15,7 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind, last_click
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind, last_click
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.window.render.body_geometry import clipped_box
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
@@ -71,7 +71,7 @@ class JointSegments:
     ends: FloatArray
     """(J, 4) px: anchor on the first body or on the world, then anchor on the second body"""
 
-    def of(self, *kinds: LinkKind) -> "JointSegments":
+    def of(self, *kinds: JointKind) -> "JointSegments":
         """Return the joints of the given kinds."""
         which = np.isin(self.links.kind, kinds)
         return JointSegments(self.links.some(which), self.ends[which])
@@ -99,7 +99,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
         width, height = view.camera.size
         margin = 100.0 * view.ui_scale
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
-        over = links.kind == LinkKind.PULLEY
+        over = links.kind == JointKind.PULLEY
         for wheel in (links.wheels[over, :2], links.wheels[over, 2:]) if over.any() else ():
             low[over] = np.minimum(low[over], view.camera.to_screen(wheel))
             high[over] = np.maximum(high[over], view.camera.to_screen(wheel))
@@ -111,7 +111,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
 
 def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
     """Draw rods, strings and springs, and their anchors on the world."""
-    fast = joints.of(LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING)
+    fast = joints.of(JointKind.ROD, JointKind.SLIDE, JointKind.SPRING)
     anchors = fast.ends[fast.links.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(anchors), 3))
     size = np.full(len(anchors), (ANCHOR_RADIUS if len(anchors) <= SOLID_RODS else 0.5 * ANCHOR_RADIUS) * view.ui_scale)
@@ -119,10 +119,10 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
         for x, y in anchors.tolist():
             _draw_support(view, (x, y))
     discs.draw(view.surface, anchors, size, tint, CircleStyle(0.0, antialias=view.antialias))
-    _draw_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
-    _draw_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
-    _draw_pulleys(view, joints.of(LinkKind.PULLEY), discs)
-    springs = joints.of(LinkKind.SPRING)
+    _draw_rods(view, joints.of(JointKind.ROD), ROD, 2.4)
+    _draw_rods(view, joints.of(JointKind.SLIDE), STRING, 1.4)
+    _draw_pulleys(view, joints.of(JointKind.PULLEY), discs)
+    springs = joints.of(JointKind.SPRING)
     if not len(springs.links):
         return
     shade = strain(springs, view.camera.scale)
@@ -212,18 +212,18 @@ MAX_DIALS = 60
 """Largest number of dials, the symbols of rotary joints, which take longer to draw."""
 SMALL_SYMBOL, LARGE_SYMBOL = 12.0, 34.0
 """px, smallest and largest radius of the arcs of rotary joints"""
-_TINTS: dict[LinkKind, RgbColour] = {
-    LinkKind.ROD: INK,
-    LinkKind.PIVOT: YELLOW,
-    LinkKind.SLIDE: SKY,
-    LinkKind.GROOVE: SKY,
-    LinkKind.ROTARY_LIMIT: GREEN,
-    LinkKind.MOTOR: ORANGE,
-    LinkKind.GEAR: INK,
-    LinkKind.SPRING: INK,
-    LinkKind.ROTARY_SPRING: SKY,
-    LinkKind.PULLEY: SKY,
-    LinkKind.RATCHET: GREEN,
+_TINTS: dict[JointKind, RgbColour] = {
+    JointKind.ROD: INK,
+    JointKind.PIVOT: YELLOW,
+    JointKind.SLIDE: SKY,
+    JointKind.GROOVE: SKY,
+    JointKind.ROTARY_LIMIT: GREEN,
+    JointKind.MOTOR: ORANGE,
+    JointKind.GEAR: INK,
+    JointKind.SPRING: INK,
+    JointKind.ROTARY_SPRING: SKY,
+    JointKind.PULLEY: SKY,
+    JointKind.RATCHET: GREEN,
 }
 
 
@@ -243,33 +243,33 @@ class AngleDial(NamedTuple):
 
 def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
     """Draw the symbols of all visible joints."""
-    renderers: dict[LinkKind, Callable[[DrawContext, JointSegments], None]] = {
-        LinkKind.ROD: _draw_rod_symbols,
-        LinkKind.GEAR: _draw_gears,
-        LinkKind.SLIDE: _draw_slides,
-        LinkKind.GROOVE: _draw_grooves,
-        LinkKind.ROTARY_LIMIT: _draw_limits,
-        LinkKind.ROTARY_SPRING: _draw_rotary_springs,
-        LinkKind.MOTOR: _draw_motors,
-        LinkKind.RATCHET: _draw_ratchets,
+    renderers: dict[JointKind, Callable[[DrawContext, JointSegments], None]] = {
+        JointKind.ROD: _draw_rod_symbols,
+        JointKind.GEAR: _draw_gears,
+        JointKind.SLIDE: _draw_slides,
+        JointKind.GROOVE: _draw_grooves,
+        JointKind.ROTARY_LIMIT: _draw_limits,
+        JointKind.ROTARY_SPRING: _draw_rotary_springs,
+        JointKind.MOTOR: _draw_motors,
+        JointKind.RATCHET: _draw_ratchets,
     }
-    for kind in (*renderers, LinkKind.SPRING, LinkKind.PULLEY, LinkKind.PIVOT):
+    for kind in (*renderers, JointKind.SPRING, JointKind.PULLEY, JointKind.PIVOT):
         some = joints.of(kind)
         if len(some.links) > MAX_SYMBOLS:
             tint = np.broadcast_to(
                 np.asarray(mix_colours(BACKGROUND, _TINTS[kind], 0.7), np.uint8), (len(some.links), 3)
             )
-            if kind is LinkKind.SPRING:
+            if kind is JointKind.SPRING:
                 tint = SHADES[strain(some, view.camera.scale)]
             draw_thin_lines(view.surface, some.ends, packed_pixels(tint, view.surface), view.antialias)
         elif len(some.links) and kind in renderers:
             renderers[kind](view, some)
         if (
-            kind in (LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING, LinkKind.PULLEY)
+            kind in (JointKind.ROD, JointKind.SLIDE, JointKind.SPRING, JointKind.PULLEY)
             and 0 < len(some.links) <= MAX_SYMBOLS
         ):
             _draw_dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
-        if kind in (LinkKind.PIVOT, LinkKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
+        if kind in (JointKind.PIVOT, JointKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
             _draw_rings(view, some.ends[:, 2:], _TINTS[kind], discs)
 
 
@@ -402,7 +402,7 @@ def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
     """Return the dials of rotary joints: at a pivot of the same two bodies, else at the centre of the second body."""
     frame, bodies, links = view.snapshot.frame, view.snapshot.bodies, joints.links
     all_links, pivots = view.snapshot.links, {}
-    for k in np.flatnonzero(all_links.kind == LinkKind.PIVOT).tolist():
+    for k in np.flatnonzero(all_links.kind == JointKind.PIVOT).tolist():
         pivots[int(all_links.a[k]), int(all_links.b[k])] = k
     _, hinge = all_links.ends(frame.position, frame.angle)
     found = []

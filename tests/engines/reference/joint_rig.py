@@ -8,14 +8,14 @@ import numpy as np
 from sandbox.engines.forces.air import Air
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, transition
 from sandbox.engines.reference.joints import JointSolver, kick_pose
-from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 
 G = 9.81
 BIAS = 0.9**60
 """pymunk's default error bias: a tenth of a joint error is corrected in 1/60 s."""
 
 
-def link(kind: LinkKind, a: int, b: int, *figures: float, **more: Any) -> dict[str, Any]:
+def link(kind: JointKind, a: int, b: int, *figures: float, **more: Any) -> dict[str, Any]:
     return {"kind": kind, "a": a, "b": b, "figures": [*figures, 0.0, 0.0, 0.0][:3], **more}
 
 
@@ -122,4 +122,4 @@ class Rig:
 def pendulum(angle: float, **more: Any) -> Rig:
     """Return a ball on a rod of 1 m that hangs from the origin, `angle` degrees from straight down, at rest."""
     a = math.radians(angle)
-    return Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)
+    return Rig(compile_joints(link(JointKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)

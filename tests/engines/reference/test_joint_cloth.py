@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from sandbox.engines.reference.joints import MAX_STRETCH
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from tests.engines.reference.joint_rig import G, Rig, compile_joints, link
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
@@ -45,16 +45,16 @@ def test_chain_comes_to_rest_in_its_catenary(method, integrator, iterations, acc
     piece, depth = 0.07, math.sqrt(0.7**2 - 0.5**2)
     x = np.arange(1, 21) / 20
     start = np.column_stack((x, -depth * np.minimum(2 * x, 2 - 2 * x)))  # two straight halves
-    joints = compile_joints(*(link(LinkKind.ROD, k - 1, k, piece) for k in range(20)))
+    joints = compile_joints(*(link(JointKind.ROD, k - 1, k, piece) for k in range(20)))
     mass = [0.05] * 19 + [math.inf]
     rig = Rig(joints, start, mass=mass, drag=3.0, method=method, integrator=integrator, iterations=iterations)
     rig.run(12.0, 1 / 120)
     assert -rig.pose[:, 1].min() == pytest.approx(discrete_sag(), abs=accuracy)
 
 
-def hanging_chain(method, iterations, kind=LinkKind.SPRING, count=10, cap=math.inf, stiffness=400.0):
+def hanging_chain(method, iterations, kind=JointKind.SPRING, count=10, cap=math.inf, stiffness=400.0):
     """Return the extension of a hanging chain at rest and the lengths of its links, m."""
-    figures = (0.1, stiffness, 1.0) if kind == LinkKind.SPRING else (0.1,)
+    figures = (0.1, stiffness, 1.0) if kind == JointKind.SPRING else (0.1,)
     joints = compile_joints(*(link(kind, k - 1, k, *figures) for k in range(count)))
     pose = [[0.0, -0.1 * (k + 1)] for k in range(count)]
     rig = Rig(joints, pose, mass=0.1, drag=3.0, method=method, iterations=iterations, cap=cap).run(8.0, 1 / 120)
@@ -70,7 +70,7 @@ def test_stiffness_of_xpbd_is_independent_of_the_iterations_once_converged():
 
 
 def test_stiffness_of_relaxation_grows_with_the_iterations():
-    five, ten, twenty = (hanging_chain("relaxation", n, LinkKind.ROD)[0] for n in (5, 10, 20))
+    five, ten, twenty = (hanging_chain("relaxation", n, JointKind.ROD)[0] for n in (5, 10, 20))
     assert five > 2.0 * ten > 4.0 * twenty > 0.0  # measured 5.9, 2.8, 1.2 mm of 1 m
 
 
@@ -82,7 +82,7 @@ def test_capped_springs_stretch_no_farther_than_their_cap():
 
 
 def test_springs_of_zero_rest_length_have_no_cap():
-    joints = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, 10.0))
+    joints = compile_joints(link(JointKind.SPRING, -1, 0, 0.0, 10.0))
     one = Rig(joints, [1, 0], method="relaxation", cap=MAX_STRETCH).run(0.3, 0.01)
     other = Rig(joints, [1, 0], method="relaxation").run(0.3, 0.01)
     assert np.array_equal(one.x, other.x)

@@ -7,7 +7,7 @@ import pytest
 
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.joints import METHODS, JointSolver
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link
 
 METHOD_AND_INTEGRATOR = [
@@ -20,9 +20,9 @@ METHOD_AND_INTEGRATOR = [
 def tumbling(method, integrator, *more):
     """Return three bodies in a row, joined off their centres, that tumble freely."""
     joints = compile_joints(
-        link(LinkKind.ROD, 0, 1, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
-        link(LinkKind.ROD, 1, 2, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
-        link(LinkKind.ROTARY_LIMIT, 0, 1, -0.3, 0.3),
+        link(JointKind.ROD, 0, 1, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
+        link(JointKind.ROD, 1, 2, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
+        link(JointKind.ROTARY_LIMIT, 0, 1, -0.3, 0.3),
         *more,
     )
     rates = [[1, 2, 3], [0, -1, 0], [0.5, 1, -2]]
@@ -33,7 +33,7 @@ def tumbling(method, integrator, *more):
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_free_bodies_conserve_momentum(method, integrator):
-    rig = tumbling(method, integrator, link(LinkKind.PIVOT, 1, 2, anchor_a=(0.5, 0.2), anchor_b=(-0.5, 0.2)))
+    rig = tumbling(method, integrator, link(JointKind.PIVOT, 1, 2, anchor_a=(0.5, 0.2), anchor_b=(-0.5, 0.2)))
     before = rig.momentum
     rig.run(2.0, 1 / 240)
     assert rig.momentum == pytest.approx(before, rel=1e-12)  # rounding of 480 steps
@@ -66,7 +66,7 @@ def test_corrections_along_final_directions_lose_angular_momentum_at_first_order
 def test_rotary_limit_holds(method, integrator):
     """A beam on a pivot falls onto its limit at −½ and stays; the torque there equals that of its weight."""
     joints = compile_joints(
-        link(LinkKind.PIVOT, -1, 0, anchor_b=(-0.5, 0.0)), link(LinkKind.ROTARY_LIMIT, -1, 0, -0.5, 1.0)
+        link(JointKind.PIVOT, -1, 0, anchor_b=(-0.5, 0.0)), link(JointKind.ROTARY_LIMIT, -1, 0, -0.5, 1.0)
     )
     rig = Rig(joints, [0.5, 0, 0], moment=1 / 12, method=method, integrator=integrator, iterations=50)
     for _ in range(960):
@@ -78,7 +78,7 @@ def test_rotary_limit_holds(method, integrator):
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_slack_slide_does_nothing(method, integrator):
-    joints = compile_joints(link(LinkKind.SLIDE, -1, 0, 0.1, 2.0))
+    joints = compile_joints(link(JointKind.SLIDE, -1, 0, 0.1, 2.0))
     jointed = Rig(joints, [1, 0], [[0.3, 1, 0]], method=method, integrator=integrator).run(0.5, 1 / 240)
     free = Rig(compile_joints(), [1, 0], [[0.3, 1, 0]], method=method, integrator=integrator).run(0.5, 1 / 240)
     assert np.array_equal(jointed.x, free.x)
@@ -86,7 +86,7 @@ def test_slack_slide_does_nothing(method, integrator):
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_slide_limits_the_distance_on_both_sides(method, integrator):
-    joints = compile_joints(link(LinkKind.SLIDE, -1, 0, 0.4, 1.0))
+    joints = compile_joints(link(JointKind.SLIDE, -1, 0, 0.4, 1.0))
     rig = Rig(joints, [0.8, 0.0], [[0.0, 2.0, 0]], method=method, integrator=integrator)
     for _ in range(960):
         rig.step(1 / 240)
@@ -99,11 +99,11 @@ def test_slide_limits_the_distance_on_both_sides(method, integrator):
 
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
-@pytest.mark.parametrize("kind", [LinkKind.ROD, LinkKind.PIVOT])
+@pytest.mark.parametrize("kind", [JointKind.ROD, JointKind.PIVOT])
 def test_joint_force_does_not_exceed_its_maximum(method, integrator, kind):
     """The body falls straight down with g − F/m."""
-    figures = (1.0,) if kind == LinkKind.ROD else ()
-    anchor = (0.0, 0.0) if kind == LinkKind.ROD else (0.0, 1.0)
+    figures = (1.0,) if kind == JointKind.ROD else ()
+    anchor = (0.0, 0.0) if kind == JointKind.ROD else (0.0, 1.0)
     joints = compile_joints(link(kind, -1, 0, *figures, anchor_b=anchor, max_force=4.0))
     rig = Rig(joints, [0, -1], mass=2.0, method=method, integrator=integrator).run(1.0, 1 / 100)
     assert rig.rates[0, 1] == pytest.approx(-(G - 2.0), rel=1e-12)  # rounding of 100 steps
@@ -113,7 +113,7 @@ def test_joint_force_does_not_exceed_its_maximum(method, integrator, kind):
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_load_of_a_joint_is_the_hanging_weight(method, integrator):
     joints = compile_joints(
-        link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.PIVOT, 0, 1, anchor_a=(0, -0.5), anchor_b=(0, 0.5))
+        link(JointKind.ROD, -1, 0, 1.0), link(JointKind.PIVOT, 0, 1, anchor_a=(0, -0.5), anchor_b=(0, 0.5))
     )
     rig = Rig(joints, [[0, -1], [0, -2]], mass=[1, 2], moment=1.0, method=method, integrator=integrator, iterations=60)
     rig.run(2.0, 1 / 240)
@@ -125,7 +125,7 @@ def test_load_of_a_joint_is_the_hanging_weight(method, integrator):
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("method", METHODS)
 def test_hanging_body_at_rest_has_the_velocity_not_yet_applied_to_positions(method, integrator):
-    rig = Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [0, -1], method=method, integrator=integrator).run(
+    rig = Rig(compile_joints(link(JointKind.ROD, -1, 0, 1.0)), [0, -1], method=method, integrator=integrator).run(
         2, 1 / 240
     )
     remaining = 1.0 - INTEGRATORS[integrator].fraction if method in ("relaxation", "xpbd") else 0.0
@@ -136,7 +136,7 @@ def test_hanging_body_at_rest_has_the_velocity_not_yet_applied_to_positions(meth
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_broken_joint_releases_its_body_and_the_rest_keep_their_impulses(method, integrator):
-    joints = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, -1, 1, 1.0))
+    joints = compile_joints(link(JointKind.ROD, -1, 0, 1.0), link(JointKind.ROD, -1, 1, 1.0))
     rig = Rig(joints, [[0, -1], [0, -1]], method=method, integrator=integrator).run(1.0, 1 / 100)
     kept = rig.solver.impulse()[1].copy()
     assert kept[1] != 0.0
@@ -152,7 +152,7 @@ def test_broken_joint_releases_its_body_and_the_rest_keep_their_impulses(method,
 
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_joints_between_fixed_bodies_do_nothing(method, integrator):
-    kinds = [(LinkKind.ROD, 0.3), (LinkKind.PIVOT, 0), (LinkKind.SLIDE, 0, 0.1), (LinkKind.ROTARY_LIMIT, 1, 2)]
+    kinds = [(JointKind.ROD, 0.3), (JointKind.PIVOT, 0), (JointKind.SLIDE, 0, 0.1), (JointKind.ROTARY_LIMIT, 1, 2)]
     joints = compile_joints(*(link(kind, 0, 1, *figures) for kind, *figures in kinds))
     rig = Rig(joints, [[0, 0], [1, 0]], mass=math.inf, method=method, integrator=integrator)
     before = rig.x.copy()
@@ -163,14 +163,14 @@ def test_joints_between_fixed_bodies_do_nothing(method, integrator):
 @pytest.mark.parametrize(("method", "integrator"), METHOD_AND_INTEGRATOR)
 def test_rod_between_coincident_ends_does_nothing(method, integrator):
     rig = Rig(
-        compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [0, 0], gravity=0, method=method, integrator=integrator
+        compile_joints(link(JointKind.ROD, -1, 0, 1.0)), [0, 0], gravity=0, method=method, integrator=integrator
     ).run(0.1, 0.01)
     assert np.array_equal(rig.x, np.zeros((2, 1, 3)))  # no direction to push along, as in Munk2D
 
 
 def test_single_short_step_between_long_ones_causes_no_jolt():
     """Warm-start impulses scale down with a shorter step and do not scale above that in the next long one."""
-    joints = compile_joints(*(link(LinkKind.ROD, k - 1, k, 0.1) for k in range(20)))
+    joints = compile_joints(*(link(JointKind.ROD, k - 1, k, 0.1) for k in range(20)))
     rig = Rig(joints, [[0.0, -0.1 * (k + 1)] for k in range(20)], mass=np.linspace(1, 5, 20)).run(3.0, 1 / 120)
     before = np.abs(rig.rates).max()
     rig.step(1e-6)

@@ -12,7 +12,7 @@ import sandbox
 from sandbox.arrays import FloatArray
 from sandbox.engines.reference.joint_data import GROOVE_ENDS, constrained_value, select_joints
 from sandbox.engines.reference.joints import METHODS
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.files.load import from_document
 from tests.engines.reference.joint_rig import compile_joints, link
 
@@ -52,16 +52,16 @@ pose = st.floats(-3.0, 3.0).map(lambda value: round(value, 3))
 
 
 @given(
-    kind=st.sampled_from([LinkKind.GROOVE, LinkKind.GEAR, LinkKind.PULLEY]),
+    kind=st.sampled_from([JointKind.GROOVE, JointKind.GEAR, JointKind.PULLEY]),
     numbers=st.lists(pose, min_size=6, max_size=6),
     figures=st.tuples(st.floats(0.5, 3.0), st.floats(0.5, 3.0)),
     anchors=st.tuples(*[st.floats(-1.0, 1.0)] * 4),
     first=st.sampled_from([-1, 0]),
 )
 def test_jacobian_is_the_derivative_of_the_value(
-    kind: LinkKind, numbers: list[float], figures: tuple[float, float], anchors: tuple[float, ...], first: int
+    kind: JointKind, numbers: list[float], figures: tuple[float, float], anchors: tuple[float, ...], first: int
 ) -> None:
-    if kind == LinkKind.PULLEY:
+    if kind == JointKind.PULLEY:
         first = 0
     joints = select_joints(
         compile_joints(
@@ -229,6 +229,6 @@ def test_faults_of_pulleys_are_reported(change: dict[str, Any], path: str) -> No
 
 
 def test_last_constraint_of_a_groove_is_its_length() -> None:
-    joints = select_joints(compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.GROOVE, -1, 0, 1.0)), *LinkKind)
-    assert joints.kind.tolist() == [LinkKind.ROD, LinkKind.GROOVE, GROOVE_ENDS]
+    joints = select_joints(compile_joints(link(JointKind.ROD, -1, 0, 1.0), link(JointKind.GROOVE, -1, 0, 1.0)), *JointKind)
+    assert joints.kind.tolist() == [JointKind.ROD, JointKind.GROOVE, GROOVE_ENDS]
     assert joints.link.tolist() == [0, 1, 1]

@@ -7,7 +7,7 @@ import pymunk
 import pytest
 from scipy.special import ellipk
 
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
@@ -68,7 +68,7 @@ def test_impulses_keep_the_length_within_their_bias(angle):
 )
 def test_rod_on_an_end_pivot_has_the_period_of_a_physical_pendulum(method, integrator, accuracy):
     """A physical pendulum: 1 m long, I = 1/12 about its centre, d = ½, m g d sinθ = −(I + m d²) θ̈, from 90°."""
-    joints = compile_joints(link(LinkKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
+    joints = compile_joints(link(JointKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
     rig = Rig(joints, [0.5, 0.0, math.pi / 2], moment=1 / 12, method=method, integrator=integrator, iterations=20)
     period = 4 * math.sqrt((1 / 12 + 1 / 4) / (G / 2)) * ellipk(0.5)
     assert measured_period(rig, 1 / 480) == pytest.approx(period, rel=accuracy)
@@ -88,7 +88,7 @@ def test_rod_on_an_end_pivot_has_the_period_of_a_physical_pendulum(method, integ
     ],
 )
 def test_energy_of_a_double_pendulum_stays_in_the_band_of_its_method(method, integrator, band):
-    joints = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, 0, 1, 1.0))
+    joints = compile_joints(link(JointKind.ROD, -1, 0, 1.0), link(JointKind.ROD, 0, 1, 1.0))
     rig = Rig(joints, [[1, 0], [2, 0]], method=method, integrator=integrator, iterations=20)
     before, worst = rig.energy, 0.0
     for _ in range(5 * 960):
@@ -101,19 +101,19 @@ def test_energy_of_a_double_pendulum_stays_in_the_band_of_its_method(method, int
 JOINTS = {
     "pin": (
         lambda space, body: pymunk.PinJoint(space.static_body, body, (0, 0), (0.1, 0.2)),
-        link(LinkKind.ROD, -1, 0, math.hypot(1.1, 0.2), anchor_b=(0.1, 0.2)),
+        link(JointKind.ROD, -1, 0, math.hypot(1.1, 0.2), anchor_b=(0.1, 0.2)),
     ),
     "pivot": (
         lambda space, body: pymunk.PivotJoint(space.static_body, body, (0.3, 0.2), (-0.7, 0.2)),
-        link(LinkKind.PIVOT, -1, 0, anchor_a=(0.3, 0.2), anchor_b=(-0.7, 0.2)),
+        link(JointKind.PIVOT, -1, 0, anchor_a=(0.3, 0.2), anchor_b=(-0.7, 0.2)),
     ),
     "slide": (
         lambda space, body: pymunk.SlideJoint(space.static_body, body, (0, 0), (0.1, 0.2), 0.2, 1.2),
-        link(LinkKind.SLIDE, -1, 0, 0.2, 1.2, anchor_b=(0.1, 0.2)),
+        link(JointKind.SLIDE, -1, 0, 0.2, 1.2, anchor_b=(0.1, 0.2)),
     ),
     "rotary limit": (
         lambda space, body: pymunk.RotaryLimitJoint(space.static_body, body, -0.3, 0.3),
-        link(LinkKind.ROTARY_LIMIT, -1, 0, -0.3, 0.3),
+        link(JointKind.ROTARY_LIMIT, -1, 0, -0.3, 0.3),
     ),
 }
 
@@ -152,7 +152,7 @@ def test_chain_of_three_matches_pymunk_step_by_step():
         space.add(body, joint)
         bodies.append(body)
         before = body
-    joints = compile_joints(*(link(LinkKind.ROD, k - 1, k, 1.0) for k in range(3)))
+    joints = compile_joints(*(link(JointKind.ROD, k - 1, k, 1.0) for k in range(3)))
     rig = Rig(joints, [[1, 0], [2, 0], [3, 0]], mass=[1, 2, 3], integrator="explicit_euler", iterations=7)
     for _ in range(240):
         space.step(1 / 240)

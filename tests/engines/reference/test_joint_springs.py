@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.joint_arrays import JointKind
 from tests.engines.reference.joint_rig import G, Rig, compile_joints, link
 
 OMEGA = 2 * math.pi
@@ -16,7 +16,7 @@ def oscillator(h: float, steps: int, **settings) -> tuple[np.ndarray, np.ndarray
 
     It starts at rest, 0.1 m from equilibrium.
     """
-    joints = compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2))
+    joints = compile_joints(link(JointKind.SPRING, -1, 0, 1.0, OMEGA**2))
     rig = Rig(joints, [1.1, 0.0], gravity=0.0, **settings)
     x, energy = [0.1], []
     for _ in range(steps):
@@ -35,7 +35,7 @@ def test_xpbd_is_backward_euler():
 def test_xpbd_dampers_match_a_backward_euler_step():
     """The system is linear, so one iteration suffices: x' = x + h v', v' = v − h (ω² x' + c v')."""
     c, h = 3.0, 0.01
-    rig = Rig(compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2, c)), [1.1, 0.0], gravity=0.0, method="xpbd")
+    rig = Rig(compile_joints(link(JointKind.SPRING, -1, 0, 1.0, OMEGA**2, c)), [1.1, 0.0], gravity=0.0, method="xpbd")
     x, v = 0.1, 0.0
     for _ in range(100):
         rig.step(h)
@@ -45,14 +45,14 @@ def test_xpbd_dampers_match_a_backward_euler_step():
 
 
 def test_xpbd_holds_any_stiffness():
-    rig = Rig(compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, 1e12)), [0.0, -1.0], method="xpbd").run(1.0, 0.01)
+    rig = Rig(compile_joints(link(JointKind.SPRING, -1, 0, 1.0, 1e12)), [0.0, -1.0], method="xpbd").run(1.0, 0.01)
     assert rig.pose[0, 1] == pytest.approx(-1.0, abs=1e-10)  # m g/k is 1e-11 m
 
 
 @pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])
 def test_two_bodies_oscillate_with_their_reduced_mass(integrator):
-    joints = compile_joints(link(LinkKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
+    joints = compile_joints(link(JointKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
     rig = Rig(joints, [[0, 0], [1.1, 0]], mass=[1, 3], gravity=0.0, integrator=integrator).run(10.0, 1e-3)
     # Back at the start after ten periods: the relative frequency error is (ωh)²/24, plus rounding.
     assert rig.pose[:, 0] == pytest.approx([0.0, 1.1], abs=1e-7)
@@ -61,7 +61,7 @@ def test_two_bodies_oscillate_with_their_reduced_mass(integrator):
 
 def test_spring_off_the_centres_exerts_force_and_torque():
     """Force and torque match central differences of the energy ½ k (l − l₀)²."""
-    joints = compile_joints(link(LinkKind.SPRING, 0, 1, 0.7, 40.0, anchor_a=(0.2, 0.1), anchor_b=(-0.1, 0.3)))
+    joints = compile_joints(link(JointKind.SPRING, 0, 1, 0.7, 40.0, anchor_a=(0.2, 0.1), anchor_b=(-0.1, 0.3)))
     pose = np.array([[0.1, -0.2, 0.4], [0.9, 0.5, -1.1]])
     mass, moment = np.array([1.0, 3.0]), np.array([0.2, 0.5])
     rig = Rig(joints, pose, mass=mass, moment=moment)
@@ -81,7 +81,7 @@ def test_spring_off_the_centres_exerts_force_and_torque():
 
 def test_spring_of_zero_rest_length_oscillates_through_its_anchor():
     """F = −k r is linear in both directions, so Verlet's numerical frequency is exact, also at r = 0."""
-    joints = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, OMEGA**2))
+    joints = compile_joints(link(JointKind.SPRING, -1, 0, 0.0, OMEGA**2))
     rig = Rig(joints, [0.3, 0.0], [[0.0, 0.5, 0.0]], gravity=0.0, integrator="velocity_verlet")
     omega = 2 / 0.01 * math.asin(OMEGA * 0.01 / 2)
     for k in range(1, 201):
@@ -90,7 +90,7 @@ def test_spring_of_zero_rest_length_oscillates_through_its_anchor():
 
 
 def test_damped_spring_of_zero_rest_length_brakes_at_its_anchor():
-    joints = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, 10.0, 3.0))
+    joints = compile_joints(link(JointKind.SPRING, -1, 0, 0.0, 10.0, 3.0))
     rig = Rig(joints, [0.0, 0.0], [[0.3, -0.4, 0.0]], mass=2.0)
     assert rig.solver.forces(rig.x)[0, :2] == pytest.approx([-0.45, 0.6], rel=1e-15)  # −c v/m
     rig.x[1] = 0.0
@@ -100,7 +100,7 @@ def test_damped_spring_of_zero_rest_length_brakes_at_its_anchor():
 @pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("method", ["impulses", "xpbd"])
 def test_rotary_springs_oscillate_with_the_reduced_moment(method):
-    joints = compile_joints(link(LinkKind.ROTARY_SPRING, 0, 1, 0.5, OMEGA**2 * 0.75))
+    joints = compile_joints(link(JointKind.ROTARY_SPRING, 0, 1, 0.5, OMEGA**2 * 0.75))
     pose = [[0, 0, 0], [1, 0, 0.6]]
     rig = Rig(joints, pose, moment=[1, 3], gravity=0.0, integrator="velocity_verlet", method=method).run(1.0, 1e-4)
     # After one period: with forces, Verlet's (ωh)²/24 squared; in XPBD the amplitude falls by ω² h t/2 at first order.
@@ -110,7 +110,7 @@ def test_rotary_springs_oscillate_with_the_reduced_moment(method):
 
 
 def test_rotary_dampers_brake():
-    joints = compile_joints(link(LinkKind.ROTARY_SPRING, -1, 0, 0.0, 1e-30, 0.5))
+    joints = compile_joints(link(JointKind.ROTARY_SPRING, -1, 0, 0.0, 1e-30, 0.5))
     rig = Rig(joints, [0, 0, 0], [[0, 0, 2.0]], moment=0.25, gravity=0.0, integrator="rk4").run(1.0, 0.01)
     assert rig.rates[0, 2] == pytest.approx(2 * math.exp(-2.0), rel=1e-7)  # RK4 at c h/I = 0.02: error 2e-9 per second
 
@@ -120,7 +120,7 @@ def test_rotary_dampers_brake():
 def test_hanging_chain_of_springs_stretches_by_the_sum_of_weights(method, accuracy):
     """By n (n + 1)/2 · m g/k, once drag has brought it to rest."""
     n, k, m = 8, 500.0, 0.2
-    joints = compile_joints(*(link(LinkKind.SPRING, j - 1, j, 0.1, k, 2.0) for j in range(n)))
+    joints = compile_joints(*(link(JointKind.SPRING, j - 1, j, 0.1, k, 2.0) for j in range(n)))
     pose = [[0.0, -0.1 * (j + 1)] for j in range(n)]
     rig = Rig(joints, pose, mass=m, drag=2.0, method=method, iterations=100).run(20.0, 1 / 200)
     stretch = -rig.pose[-1, 1] - 0.1 * n
@@ -136,7 +136,7 @@ def test_stretched_string_oscillates_in_its_modes(mode):
     ends = [[0.0, 0.0], [length * (count + 1), 0.0]]
     shape = 1e-7 * np.sin(mode * math.pi * np.arange(1, count + 1) / (count + 1))
     pose = [*([length * (j + 1), y] for j, y in enumerate(shape)), ends[1]]
-    joints = compile_joints(*(link(LinkKind.SPRING, j - 1, j, 0.5 * length, k) for j in range(count + 1)))
+    joints = compile_joints(*(link(JointKind.SPRING, j - 1, j, 0.5 * length, k) for j in range(count + 1)))
     mass = [m] * count + [math.inf]
     rig = Rig(joints, pose, mass=mass, gravity=0.0, integrator="velocity_verlet")
     tension = k * 0.5 * length
