@@ -375,8 +375,8 @@ def _check_lengths(lengths: Mapping[str, int], stated: _Stated) -> None:
     if refusal:
         raise TooLargeError(refusal)
     joints, accounted, causes = (lengths.get(letter, 0) for letter in "JEK")
-    if joints and joints != len(scene.links):
-        raise ValueError(f"broken_time has {joints:,} joints, but info.scene {len(scene.links):,}")
+    if joints and joints != len(scene.joint_arrays):
+        raise ValueError(f"broken_time has {joints:,} joints, but info.scene {len(scene.joint_arrays):,}")
     if accounted not in (0, frames):
         raise ValueError(f"energy has {accounted:,} values of {frames:,} frames")
     if causes != (len(info.causes) if accounted else 0):

@@ -259,7 +259,7 @@ class Simulation(Protocol):
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
+        """Time in s, by index in `setup.joints`, at which joints broke."""
 
     @property
     def plane_reach(self) -> PlaneReach | None:

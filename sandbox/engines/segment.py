@@ -114,7 +114,7 @@ class Segment:
         broken = self.simulation.broken
         if self.before is None:
             return broken
-        joint_index = self.simulation.setup.links.number
+        joint_index = self.simulation.setup.joints.number
         return {int(joint_index[k]): self._start + time for k, time in broken.items()}
 
     @property

@@ -314,7 +314,7 @@ class SwitchableSimulation:
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
+        """Time in s, by index in `setup.joints`, at which joints broke."""
         return MappingProxyType({**self._broken, **self._segment.broken}) if self._broken else self._segment.broken
 
     @property

@@ -265,18 +265,18 @@ class Contents:
 
     def joints(self) -> Iterator[Block]:
         """Yield the joints."""
-        links = self.setup.links
-        for k in range(len(links)):
-            kind = JointKind(int(links.kind[k]))
-            values = _joint_values(links, k, self.setup.bodies.names)
-            first = "space.static_body" if int(links.a[k]) == WORLD else "bodies[{a}]"
+        joints = self.setup.joints
+        for k in range(len(joints)):
+            kind = JointKind(int(joints.kind[k]))
+            values = _joint_values(joints, k, self.setup.bodies.names)
+            first = "space.static_body" if int(joints.a[k]) == WORLD else "bodies[{a}]"
             lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
             columns = {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
-            limits = {"max_force": links.max_force[k], "max_bias": links.max_bias[k], "error_bias": links.bias[k]}
+            limits = {"max_force": joints.max_force[k], "max_bias": joints.max_bias[k], "error_bias": joints.bias[k]}
             columns |= {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
             stated = "".join(f", {key}={{{key}}}" for key in limits if key in columns)
-            lines.append(f"add_joint(space, joint, collide_bodies={bool(links.collide[k])}{stated})")
-            title = literal(links.names[k]) if links.names[k] else f"joint {k + 1}"
+            lines.append(f"add_joint(space, joint, collide_bodies={bool(joints.collide[k])}{stated})")
+            title = literal(joints.names[k]) if joints.names[k] else f"joint {k + 1}"
             yield Block(f"{kind.name.lower().replace('_', ' ')} joints", title, tuple(lines), columns)
 
 
@@ -350,20 +350,20 @@ JOINT_LINES: dict[JointKind, tuple[str, ...]] = {
 """Statements that create each kind of joint; <a> and <b> stand for its bodies."""
 
 
-def _joint_values(links: JointArrays, k: int, names: Sequence[str]) -> dict[str, str]:
+def _joint_values(joints: JointArrays, k: int, names: Sequence[str]) -> dict[str, str]:
     """Return the expressions of all columns of joint k, by the figures of `JointKind`.
 
     Rates and angles of pymunk's motors and rotary springs are those of the first body relative to the second, so that
     their signs are opposite.
     """
-    x, y, z = map(literal, links.figures[k].tolist())
-    opposite = literal(-float(links.figures[k, 0]))
-    a = int(links.a[k])
+    x, y, z = map(literal, joints.figures[k].tolist())
+    opposite = literal(-float(joints.figures[k, 0]))
+    a = int(joints.a[k])
     return {
         "a": literal("" if a == WORLD else names[a]),
-        "b": literal(names[int(links.b[k])]),
-        "anchor_a": literal(tuple(links.anchor_a[k].tolist())),
-        "anchor_b": literal(tuple(links.anchor_b[k].tolist())),
+        "b": literal(names[int(joints.b[k])]),
+        "anchor_a": literal(tuple(joints.anchor_a[k].tolist())),
+        "anchor_b": literal(tuple(joints.anchor_b[k].tolist())),
         "length": x,
         "least": x,
         "most": y,

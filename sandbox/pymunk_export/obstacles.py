@@ -85,7 +85,7 @@ def _forces(setup: Setup) -> Iterator[Obstacle]:
 
 
 def _objects(setup: Setup) -> Iterator[Obstacle]:
-    scene, links = setup.scene, setup.links
+    scene, joints = setup.scene, setup.joints
     if scene.zones:
         yield Obstacle("zone", f"zones are not part of pymunk: {_names(scene.zones)}")
     one_way = [name for name, wall in zip(_wall_names(scene), scene.walls, strict=True) if wall.one_way]
@@ -93,7 +93,7 @@ def _objects(setup: Setup) -> Iterator[Obstacle]:
         yield Obstacle("wall", f"one-way walls need callbacks with a memory: {_listed(one_way)}")
     if np.isfinite(setup.bodies.lifetime).any():
         yield Obstacle("emitter", "bodies with a lifetime are removed by a clock")
-    breakable = [links.names[k] or f"number {k + 1}" for k in np.flatnonzero(np.isfinite(links.strength)).tolist()]
+    breakable = [joints.names[k] or f"number {k + 1}" for k in np.flatnonzero(np.isfinite(joints.strength)).tolist()]
     if breakable:
         yield Obstacle("joint", f"breakable joints need the load of each after every substep: {_listed(breakable)}")
 

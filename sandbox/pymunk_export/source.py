@@ -166,7 +166,7 @@ def _extent(setup: Setup) -> ViewExtent:
     corners += [np.asarray(each.points) for each in scene.walls]
     for post in scene.posts:
         corners += [np.asarray([post.position]) - post.radius, np.asarray([post.position]) + post.radius]
-    corners += setup.links.ends(bodies.position, bodies.angle) if len(setup.links) else ()
+    corners += setup.joints.ends(bodies.position, bodies.angle) if len(setup.joints) else ()
     rows = np.concatenate(corners)
     if not len(rows):
         return (-1.0, -1.0), (1.0, 1.0)
@@ -225,7 +225,7 @@ def _helpers(contents: Contents) -> Iterator[str]:
             "        arbiter.surface_velocity = (velocity.x + slip * normal.y, velocity.y - slip * normal.x)",
             "",
         )
-    if len(contents.setup.links):
+    if len(contents.setup.joints):
         yield from (
             "",
             "def add_joint(",

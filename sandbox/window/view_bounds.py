@@ -261,11 +261,11 @@ def _static_body_corners(bodies: Bodies) -> list[FloatArray]:
 
 def _is_tethered(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are static or connected by joints to the world or to a static body, (N,)."""
-    links, found = scene.links.of(*ANCHORED_KINDS), bodies.fixed.copy()
-    found[links.b[links.a < 0]] = True
-    pulleys = scene.links.of(JointKind.PULLEY)
+    joints, found = scene.joint_arrays.of(*ANCHORED_KINDS), bodies.fixed.copy()
+    found[joints.b[joints.a < 0]] = True
+    pulleys = scene.joint_arrays.of(JointKind.PULLEY)
     found[pulleys.a] = found[pulleys.b] = True
-    a, b = links.a[links.a >= 0], links.b[links.a >= 0]
+    a, b = joints.a[joints.a >= 0], joints.b[joints.a >= 0]
     count = -1
     while (now := int(found.sum())) != count:
         count, either = now, found[a] | found[b]
@@ -275,14 +275,14 @@ def _is_tethered(scene: Scene, bodies: Bodies) -> BoolArray:
 
 def _swing_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     """Return the box of world anchors, and of the swings of bodies suspended from them by rods and strings."""
-    links = scene.links
-    if not len(links):
+    joints = scene.joint_arrays
+    if not len(joints):
         return []
-    anchored = links.some((links.a < 0) & np.isin(links.kind, ANCHORED_KINDS))
+    anchored = joints.some((joints.a < 0) & np.isin(joints.kind, ANCHORED_KINDS))
     anchor, position = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
     is_near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
-    points = [anchor[is_near], links.of(JointKind.PULLEY).wheels.reshape(-1, 2)]
+    points = [anchor[is_near], joints.of(JointKind.PULLEY).wheels.reshape(-1, 2)]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
         swing = is_near & np.isin(anchored.kind, (JointKind.ROD, JointKind.SLIDE)) & ~bodies.fixed[anchored.b]
         anchor, position, radius = anchor[swing], position[swing], bodies.radius[anchored.b[swing]][:, None]
@@ -340,7 +340,7 @@ def anchor_points(scene: Scene) -> FloatArray:
     for post in scene.posts:
         (x, y), r = post.position, post.radius
         points += [(x - r, y - r), (x + r, y + r)]
-    links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED_KINDS))
-    points += [(x, y) for x, y in links.anchor_a.tolist()]
-    points += [(x, y) for x, y in scene.links.of(JointKind.PULLEY).wheels.reshape(-1, 2).tolist()]
+    joints = scene.joint_arrays.some((scene.joint_arrays.a < 0) & np.isin(scene.joint_arrays.kind, ANCHORED_KINDS))
+    points += [(x, y) for x, y in joints.anchor_a.tolist()]
+    points += [(x, y) for x, y in scene.joint_arrays.of(JointKind.PULLEY).wheels.reshape(-1, 2).tolist()]
     return np.asarray(points, np.float64).reshape(-1, 2)

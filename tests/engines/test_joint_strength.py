@@ -189,11 +189,11 @@ def broken_chain(engine: str) -> SwitchableSimulation:
 @pytest.mark.parametrize("to", ENGINES)
 def test_joint_stays_broken_after_an_engine_switch(engine: str, to: str) -> None:
     simulation = broken_chain(engine)
-    broken, links = dict(simulation.broken), simulation.setup.links
+    broken, links = dict(simulation.broken), simulation.setup.joints
     simulation.apply(Switch(time=0.0, engine=to))
     assert simulation.broken == broken
-    assert np.array_equal(simulation.setup.links.number, links.number)
-    assert np.array_equal(simulation.setup.links.b, links.b)  # by the body indices of the whole run
+    assert np.array_equal(simulation.setup.joints.number, links.number)
+    assert np.array_equal(simulation.setup.joints.b, links.b)  # by the body indices of the whole run
     simulation.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -5.0]))
     before = simulation.frame().velocity[3:].mean(axis=0)
     advance(simulation, 10)
@@ -230,9 +230,9 @@ def test_broken_rope_stays_broken_after_it_is_launched_again(engine: str) -> Non
 def test_joints_of_a_cloth_have_the_same_strength(engine: str) -> None:
     cloth = {"corner": [0, 0], "columns": 3, "rows": 3, "spacing": [0.1, 0.1], "stiffness": 100.0, "mass": 0.1}
     scene = scene_of(cloth=[{**cloth, "strength": 1.5}])
-    assert (scene.links.strength == 1.5).all()
-    assert np.isinf(scene_of(cloth=[cloth]).links.strength).all()
+    assert (scene.joint_arrays.strength == 1.5).all()
+    assert np.isinf(scene_of(cloth=[cloth]).joint_arrays.strength).all()
     simulation = start(scene, engine)
     advance(simulation, 30)
-    broken_pairs = {(int(scene.links.a[k]), int(scene.links.b[k])) for k in simulation.broken}
+    broken_pairs = {(int(scene.joint_arrays.a[k]), int(scene.joint_arrays.b[k])) for k in simulation.broken}
     assert broken_pairs == {(0, 3), (1, 4), (2, 5)}  # the uppermost threads carry twice 1 N of weight and oscillate

@@ -60,7 +60,7 @@ def _worlds(scene: Scene, engine: str) -> "Iterator[BareSpace | BareBox2D]":
             else:
                 for k in indices:
                     world.add_body(k, *of_body[k])
-        for k in range(len(scene.links)):
+        for k in range(len(scene.joint_arrays)):
             world.add_joint(k)
         yield world
 
@@ -136,7 +136,7 @@ class BareSpace:
         self._bodies[k] = body
 
     def add_joint(self, k: int) -> None:
-        links = self._scene.links
+        links = self._scene.joint_arrays
         a, b = (self._space.static_body if n == WORLD else self._bodies[n] for n in (int(links.a[k]), int(links.b[k])))
         kind = {JointKind.ROD: pymunk.PinJoint, JointKind.PIVOT: pymunk.PivotJoint}[JointKind(int(links.kind[k]))]
         joint = kind(a, b, tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist()))
@@ -217,7 +217,7 @@ class BareBox2D:
         self._bodies[k] = body
 
     def add_joint(self, k: int) -> None:
-        links = self._scene.links
+        links = self._scene.joint_arrays
         is_rod = JointKind(int(links.kind[k])) == JointKind.ROD
         joint = box2d.DistanceJointDef() if is_rod else box2d.RevoluteJointDef()
         if is_rod:

@@ -61,7 +61,7 @@ def tables_of(scene: Scene, name: str) -> list[str]:
 
 
 def test_names_of_bodies_static_elements_joints_drives_and_thrusts_are_paths(scene: Scene) -> None:
-    shown = [*scene.bodies.names, *scene.fixed_names, *scene.links.names, "drive-1", "thrust-1"]
+    shown = [*scene.bodies.names, *scene.fixed_names, *scene.joint_arrays.names, "drive-1", "thrust-1"]
     assert len(shown) == len(set(shown))
     for name in shown:
         assert tables_of(scene, name) == [name.partition("-")[0]]

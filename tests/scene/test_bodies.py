@@ -110,10 +110,10 @@ def test_changed_copy_of_a_scene_has_its_own_bodies():
         '[world]\ngravity = [0, -9.81]\n[[ball]]\nname = "a"\nradius = 0.1\nposition = [0, 1]\n'
         '[[ball]]\nname = "b"\nradius = 0.1\nposition = [1, 1]\n[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n'
     )
-    assert scene.bodies.names == ("a", "b") and len(scene.links) == 1
+    assert scene.bodies.names == ("a", "b") and len(scene.joint_arrays) == 1
     changed = scene.model_copy(update={"balls": scene.balls[:1], "joints": ()})
     assert changed.bodies.names == ("a",)
-    assert len(changed.links) == 0
+    assert len(changed.joint_arrays) == 0
     assert scene.bodies.names == ("a", "b")
 
 

@@ -34,7 +34,7 @@ def test_nodes_are_numbered_along_rows_from_the_upper_left() -> None:
 
 def test_springs_join_neighbours_at_their_rest_length() -> None:
     scene = scene_of(pins=[])
-    bodies, links = scene.bodies, scene.links
+    bodies, links = scene.bodies, scene.joint_arrays
     assert links.kind.tolist() == [JointKind.SPRING] * 17
     pairs = {tuple(pair) for pair in np.column_stack((links.a, links.b)).tolist()}
     grid = np.arange(12).reshape(3, 4)
@@ -65,7 +65,7 @@ def test_every_link_starts_at_rest_length_and_their_number_is_right(
         spacing=[width, height],
         **coefficients,
     )
-    bodies, links = scene.bodies, scene.links
+    bodies, links = scene.bodies, scene.joint_arrays
     length = np.hypot(*(bodies.position[links.a] - bodies.position[links.b]).T)
     assert links.figures[:, 0] == pytest.approx(length, rel=1e-12)  # rounding of positions, 100 links from the corner
     assert not (bodies.fixed[links.a] & bodies.fixed[links.b]).any()
@@ -82,7 +82,7 @@ def test_every_link_starts_at_rest_length_and_their_number_is_right(
 
 
 def test_shear_and_bend_springs_have_their_own_stiffness() -> None:
-    links = scene_of(pins=[], kind="rods", stiffness=None, shear=3.0, bend=5.0).links
+    links = scene_of(pins=[], kind="rods", stiffness=None, shear=3.0, bend=5.0).joint_arrays
     assert np.unique(links.figures[links.kind == JointKind.ROD, 1]).tolist() == [0.0]
     springs = links.figures[links.kind == JointKind.SPRING]
     diagonal = springs[:, 1] == 3.0
@@ -101,7 +101,7 @@ def test_pinned_nodes_are_fixed_and_have_no_links_to_each_other(pins: Any, fixed
     assert {tuple(v) for v in scene.bodies.velocity[fixed].tolist()} <= {(0.0, 0.0)}
     loose = np.delete(scene.bodies.velocity, fixed, axis=0)
     assert loose.tolist() == [[1.0, 2.0]] * len(loose)
-    links = scene.links
+    links = scene.joint_arrays
     assert not np.isin(links.a, fixed)[np.isin(links.b, fixed)].any()
 
 

@@ -27,7 +27,7 @@ def test_joint_of_every_kind_is_read() -> None:
             )
         )
     )  # fmt: skip
-    assert len(scene.joints) == len(scene.links) == 13
+    assert len(scene.joints) == len(scene.joint_arrays) == 13
     assert isinstance(scene.joints[1], Rod)
 
 

@@ -28,14 +28,14 @@ def scene_of(**ragdoll: Any) -> Scene:
 
 def joint_separation(scene: Scene, position: FloatArray, angle: FloatArray) -> float:
     """Return the largest distance between the two anchors of a pivot, m."""
-    pivots = scene.links.of(JointKind.PIVOT)
+    pivots = scene.joint_arrays.of(JointKind.PIVOT)
     first, second = pivots.ends(position, angle)
     return float(np.hypot(*(second - first).T).max())
 
 
 def limit_margin(scene: Scene, angle: FloatArray) -> float:
     """Return the smallest distance of a joint angle from its limits, rad; negative beyond a limit."""
-    bounds = scene.links.of(JointKind.ROTARY_LIMIT)
+    bounds = scene.joint_arrays.of(JointKind.ROTARY_LIMIT)
     turn = angle[bounds.b] - angle[bounds.a]
     return float(np.minimum(turn - bounds.figures[:, 0], bounds.figures[:, 1] - turn).min())
 
@@ -82,7 +82,7 @@ def test_ragdoll_starts_joined_and_within_its_joint_limits(ragdoll: dict[str, An
     bodies, height = scene.bodies, ragdoll.get("height", 1.75)
     assert joint_separation(scene, bodies.position, bodies.angle) < 1e-14 * (height + 20.0)  # rounding of positions
     assert limit_margin(scene, bodies.angle) >= math.radians(4.9)  # the smallest margin of the initial pose is 5°
-    assert len(scene.links) == 28
+    assert len(scene.joint_arrays) == 28
     assert loads(dumps(scene)) == scene
 
 

@@ -31,20 +31,20 @@ def scene_of(more: dict[str, Any] | None = None, **rope: Any) -> Scene:
 
 def gaps(scene: Scene) -> FloatArray:
     """Return the vector between the two ends of each link in the initial state, (L, 2) m."""
-    first, second = scene.links.ends(scene.bodies.position, scene.bodies.angle)
+    first, second = scene.joint_arrays.ends(scene.bodies.position, scene.bodies.angle)
     return second - first
 
 
 def test_rope_without_slack_is_straight_with_equal_links() -> None:
     scene = scene_of(name="line")
     assert scene.bodies.names == tuple(f"line-{n}" for n in range(1, 7))
-    assert scene.links.names == tuple(f"line-joint-{n}" for n in range(1, 6))
+    assert scene.joint_arrays.names == tuple(f"line-joint-{n}" for n in range(1, 6))
     expected = np.arange(6)[:, None] / 5 * np.array([3.0, 4.0])
     assert scene.bodies.position == pytest.approx(expected, abs=1e-15)  # rounding
     assert scene.bodies.fixed.tolist() == [True, False, False, False, False, True]
-    assert scene.links.kind.tolist() == [JointKind.ROD] * 5
-    assert scene.links.figures[:, 0].tolist() == [1.0] * 5
-    assert not scene.links.collide.any()
+    assert scene.joint_arrays.kind.tolist() == [JointKind.ROD] * 5
+    assert scene.joint_arrays.figures[:, 0].tolist() == [1.0] * 5
+    assert not scene.joint_arrays.collide.any()
 
 
 def test_nodes_have_the_given_mass_and_do_not_collide() -> None:
@@ -99,14 +99,14 @@ def test_rope_with_equal_ends_is_a_regular_polygon() -> None:
 
 def test_springs_have_rest_lengths_of_the_rope_length_and_may_start_stretched() -> None:
     scene = scene_of(length=2.5, damping=0.3, **SPRINGS)
-    assert scene.links.kind.tolist() == [JointKind.SPRING] * 5
-    assert scene.links.figures.tolist() == [[0.5, 200.0, 0.3]] * 5
+    assert scene.joint_arrays.kind.tolist() == [JointKind.SPRING] * 5
+    assert scene.joint_arrays.figures.tolist() == [[0.5, 200.0, 0.3]] * 5
     assert np.hypot(*gaps(scene).T) == pytest.approx(1.0, abs=1e-15)  # rounding
 
 
 def test_planks_are_joined_end_to_end_and_to_the_world() -> None:
     scene = scene_of(mass=2.0, **PLANKS)
-    bodies, links = scene.bodies, scene.links
+    bodies, links = scene.bodies, scene.joint_arrays
     assert len(bodies) == 5
     assert not bodies.fixed.any()
     assert not bodies.round.any()
@@ -122,13 +122,13 @@ def test_planks_are_joined_end_to_end_and_to_the_world() -> None:
 @pytest.mark.parametrize(("fix", "fixed"), [([], []), (["start"], [0]), (["end"], [5]), (["end", "start"], [0, 5])])
 def test_fix_selects_the_fixed_ends(fix: list[str], fixed: list[int]) -> None:
     assert np.flatnonzero(scene_of(fix=fix).bodies.fixed).tolist() == fixed
-    assert len(scene_of(fix=fix, **PLANKS).links) == 4 + len(fixed)
+    assert len(scene_of(fix=fix, **PLANKS).joint_arrays) == 4 + len(fixed)
 
 
 @pytest.mark.parametrize("kind", [{}, SPRINGS, PLANKS], ids=["rods", "springs", "planks"])
 def test_tied_rope_is_anchored_to_bodies_at_its_ends(kind: dict[str, Any]) -> None:
     scene = scene_of({"ball": BALLS}, tie={"start": "a", "end": "b"}, **kind)
-    bodies, links = scene.bodies, scene.links
+    bodies, links = scene.bodies, scene.joint_arrays
     assert not bodies.fixed.any()
     assert len(bodies) == 2 + (5 if kind is PLANKS else 4)
     first, second = links.ends(bodies.position, bodies.angle)
@@ -142,21 +142,21 @@ def test_tied_rope_is_anchored_to_bodies_at_its_ends(kind: dict[str, Any]) -> No
 def test_single_link_between_two_bodies_has_no_nodes() -> None:
     scene = scene_of({"ball": BALLS}, links=1, tie={"start": "a", "end": "b"})
     assert scene.bodies.names == ("a", "b")
-    assert scene.links.a.tolist() == [0]
-    assert scene.links.b.tolist() == [1]
-    assert scene.links.figures[0, 0] == 5.0
+    assert scene.joint_arrays.a.tolist() == [0]
+    assert scene.joint_arrays.b.tolist() == [1]
+    assert scene.joint_arrays.figures[0, 0] == 5.0
 
 
 def test_links_between_fixed_bodies_are_left_out() -> None:
-    assert len(scene_of(links=1).links) == 0
+    assert len(scene_of(links=1).joint_arrays) == 0
     fixed = [{**BALLS[0], "fixed": True}]
-    assert len(scene_of({"ball": fixed}, links=1, tie={"start": "a"}).links) == 0
+    assert len(scene_of({"ball": fixed}, links=1, tie={"start": "a"}).joint_arrays) == 0
 
 
 def test_joints_of_the_file_precede_those_of_ropes() -> None:
     joint = {"kind": "rod", "between": ["a", "rope-1-2"], "name": "mine"}
     scene = scene_of({"ball": BALLS, "joint": [joint]})
-    assert scene.links.names == ("mine", *(f"rope-1-joint-{n}" for n in range(1, 6)))
+    assert scene.joint_arrays.names == ("mine", *(f"rope-1-joint-{n}" for n in range(1, 6)))
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ def cloth_space(scene: Scene) -> pymunk.Space:
         body.position = position
         space.add(body)
         bodies.append(body)
-    links = scene.links
+    links = scene.joint_arrays
     for a, b, (rest, stiffness, damping) in zip(
         links.a.tolist(), links.b.tolist(), links.figures.tolist(), strict=True
     ):

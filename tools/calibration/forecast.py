@@ -113,7 +113,7 @@ def troubles(scene: Scene, kinds: Iterable[str]) -> set[str]:
     """Return the troubles that warnings of these kinds forecast for a scene."""
     found = {TROUBLES[kind] for kind in kinds if kind in TROUBLES}
     if "joint or stack" in found:
-        found = found - {"joint or stack"} | {"joint" if len(scene.links) else "stack"}
+        found = found - {"joint or stack"} | {"joint" if len(scene.joint_arrays) else "stack"}
     return found
 
 
@@ -144,7 +144,7 @@ def energy_gain(scene: Scene, done: Trajectory) -> float:
     The reference is at least the energy that lifts every body by its own width, for bodies at rest. The result is 0 if
     thrusts, motors or wind do work.
     """
-    if scene.thrusts or any(scene.world.wind) or len(scene.links.of(JointKind.MOTOR)):
+    if scene.thrusts or any(scene.world.wind) or len(scene.joint_arrays.of(JointKind.MOTOR)):
         return 0.0
     kinetic, potential, total = energies(done, scene)
     bodies = scene.bodies

@@ -111,7 +111,7 @@ class Box2DEngine:
             for drive, name in zip(setup.scene.drives, names_of(setup.scene), strict=True)
             if drive.kind == "torque"
         ]
-        missing += _first(joint_faults(setup.links))
+        missing += _first(joint_faults(setup.joints))
         matrix = contact_matrix(setup)
         missing += _first(mixing_faults(setup.scene, matrix))
         missing += _first(size_faults(setup, self.resolve(setup, settings)))
@@ -127,7 +127,7 @@ class Box2DEngine:
         exponent = round(math.log2(SLOP_LENGTHS / slop_of(setup)))
         defaults: dict[str, object] = {"slop": SLOP_LENGTHS * 2.0**-exponent, **FIXED_METHODS}
         defaults |= {"continuous": True, "sleeping": False, "workers": 1}
-        if not len(setup.links):
+        if not len(setup.joints):
             del defaults["joints"]
         return settings.replace(**{k: v for k, v in defaults.items() if getattr(settings, k) is None})
 

@@ -28,24 +28,24 @@ class WorldJoints:
     def __init__(self, world: Box2DWorld, store: BodyStore) -> None:
         self._world, self._store = world, store
         self._joints: dict[int, Any] = {}  # by the index of the joint
-        links = store.setup.links
-        for k in store.linked().tolist():
-            kind = JointKind(int(links.kind[k]))
-            if kind not in MERGED and (kind not in SPRINGS or (links.a[k] != WORLD and not links.collide[k])):
-                self._joints[k] = world.create_joint(self._definition(links, k))
-        self.has_springs = bool(np.isin(links.kind, SPRINGS).any())
-        self.has_breakable = bool(np.isfinite(links.strength).any())
+        joints = store.setup.joints
+        for k in store.intact_joints().tolist():
+            kind = JointKind(int(joints.kind[k]))
+            if kind not in MERGED and (kind not in SPRINGS or (joints.a[k] != WORLD and not joints.collide[k])):
+                self._joints[k] = world.create_joint(self._definition(joints, k))
+        self.has_springs = bool(np.isin(joints.kind, SPRINGS).any())
+        self.has_breakable = bool(np.isfinite(joints.strength).any())
         """whether joints can break"""
 
-    def _definition(self, links: JointArrays, k: int) -> Any:
+    def _definition(self, joints: JointArrays, k: int) -> Any:
         """Return the definition of a joint that is not part of a pivot.
 
         Springs are forces: theirs only excludes contacts of the two bodies.
         """
-        x, y, _ = links.figures[k].tolist()
+        x, y, _ = joints.figures[k].tolist()
         scale = self._world.scale
-        a, b = int(links.a[k]), int(links.b[k])
-        match JointKind(int(links.kind[k])):
+        a, b = int(joints.a[k]), int(joints.b[k])
+        match JointKind(int(joints.kind[k])):
             case JointKind.SPRING | JointKind.ROTARY_SPRING:
                 joint = box2d.FilterJointDef()
                 joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
@@ -60,30 +60,30 @@ class WorldJoints:
                 joint.enable_limit, joint.min_length, joint.max_length = True, x * scale, y * scale
             case JointKind.GROOVE:
                 joint = box2d.WheelJointDef()
-                along = links.figures[k, :2] - links.anchor_a[k]
+                along = joints.figures[k, :2] - joints.anchor_a[k]
                 length = float(np.hypot(*along))
                 joint.local_axis_a = tuple((along / length).tolist())
                 joint.enable_spring = False
                 joint.enable_limit, joint.lower_translation, joint.upper_translation = True, 0.0, length * scale
             case _:
-                joint = self._pivot(links, k)
+                joint = self._pivot(joints, k)
         joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
-        joint.local_anchor_a = tuple((links.anchor_a[k] * scale).tolist())
-        joint.local_anchor_b = tuple((links.anchor_b[k] * scale).tolist())
-        joint.collide_connected = bool(links.collide[k])
+        joint.local_anchor_a = tuple((joints.anchor_a[k] * scale).tolist())
+        joint.local_anchor_b = tuple((joints.anchor_b[k] * scale).tolist())
+        joint.collide_connected = bool(joints.collide[k])
         return joint
 
-    def _pivot(self, links: JointArrays, k: int) -> Any:
+    def _pivot(self, joints: JointArrays, k: int) -> Any:
         """Return the definition of a pivot, with the motor and the rotary limit of its two bodies."""
         joint, scale = box2d.RevoluteJointDef(), self._world.scale
-        intact = np.isin(np.arange(len(links)), self._store.linked())
-        between = np.flatnonzero((links.a == links.a[k]) & (links.b == links.b[k]) & intact)
+        intact = np.isin(np.arange(len(joints)), self._store.intact_joints())
+        between = np.flatnonzero((joints.a == joints.a[k]) & (joints.b == joints.b[k]) & intact)
         for other in between.tolist():
-            low, high, _ = links.figures[other].tolist()
-            if links.kind[other] == JointKind.MOTOR:
+            low, high, _ = joints.figures[other].tolist()
+            if joints.kind[other] == JointKind.MOTOR:
                 joint.enable_motor, joint.motor_speed = True, low
-                joint.max_motor_torque = min(float(links.max_force[other]) * scale**2, UNLIMITED_TORQUE)
-            elif links.kind[other] == JointKind.ROTARY_LIMIT:
+                joint.max_motor_torque = min(float(joints.max_force[other]) * scale**2, UNLIMITED_TORQUE)
+            elif joints.kind[other] == JointKind.ROTARY_LIMIT:
                 joint.reference_angle = math.remainder(0.5 * (low + high), math.tau)
                 joint.enable_limit, joint.lower_angle, joint.upper_angle = True, 0.5 * (low - high), 0.5 * (high - low)
         return joint
@@ -97,34 +97,34 @@ class WorldJoints:
 
     def renew(self, replaced: set[int]) -> None:
         """Create the joints of bodies, by their indices, that were replaced and have lost them."""
-        links = self._store.setup.links
+        joints = self._store.setup.joints
         for k in self._joints:
-            if not replaced.isdisjoint((int(links.a[k]), int(links.b[k]))):
-                self._joints[k] = self._world.create_joint(self._definition(links, k))
+            if not replaced.isdisjoint((int(joints.a[k]), int(joints.b[k]))):
+                self._joints[k] = self._world.create_joint(self._definition(joints, k))
 
     def update_motors(self, before: JointArrays) -> None:
         """Set the values of motors that differ from those of the joints before an action."""
-        links = self._store.setup.links
-        if links is before:
+        joints = self._store.setup.joints
+        if joints is before:
             return
-        changed = (links.figures[:, 0] != before.figures[:, 0]) | (links.max_force != before.max_force)
-        for motor in np.flatnonzero(changed & (links.kind == JointKind.MOTOR)).tolist():
-            between = (links.a == links.a[motor]) & (links.b == links.b[motor]) & (links.kind == JointKind.PIVOT)
+        changed = (joints.figures[:, 0] != before.figures[:, 0]) | (joints.max_force != before.max_force)
+        for motor in np.flatnonzero(changed & (joints.kind == JointKind.MOTOR)).tolist():
+            between = (joints.a == joints.a[motor]) & (joints.b == joints.b[motor]) & (joints.kind == JointKind.PIVOT)
             for k in np.flatnonzero(between).tolist():
                 if k in self._joints:
-                    definition, joint = self._definition(links, k), self._joints[k]
+                    definition, joint = self._definition(joints, k), self._joints[k]
                     joint.motor_speed, joint.max_motor_torque = definition.motor_speed, definition.max_motor_torque
                     joint.wake_bodies()
 
     def forget(self) -> None:
         """Forget joints whose bodies were removed with them."""
-        intact = set(self._store.linked().tolist())
+        intact = set(self._store.intact_joints().tolist())
         self._joints = {k: joint for k, joint in self._joints.items() if k in intact}
 
     def add_spring_forces(self, force: FloatArray, torque: FloatArray) -> None:
         """Add the forces (N, 2), N, and torques (N,), N·m, of springs and their dampers in the present state."""
         store = self._store
-        springs, rotary = store.links.of(JointKind.SPRING), store.links.of(JointKind.ROTARY_SPRING)
+        springs, rotary = store.joints.of(JointKind.SPRING), store.joints.of(JointKind.ROTARY_SPRING)
         if len(springs):
             arm_a, vector, along, size = self._spring_state(springs)
             arm_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)[0]
@@ -167,13 +167,13 @@ class WorldJoints:
 
     def overloaded(self) -> IntArray:
         """Return the indices of joints whose force exceeds their strength; of rigid ones, that of the last substep."""
-        links, found = self._store.setup.links, []
+        joints, found = self._store.setup.joints, []
         for k, joint in self._joints.items():
-            if math.isfinite(links.strength[k]):
+            if math.isfinite(joints.strength[k]):
                 force = joint.get_constraint_force()
-                if math.hypot(force.x, force.y) > links.strength[k] * self._world.scale:
+                if math.hypot(force.x, force.y) > joints.strength[k] * self._world.scale:
                     found.append(k)
-        intact = self._store.links
+        intact = self._store.joints
         for kind in SPRINGS:
             springs = intact.of(kind)
             if len(springs):

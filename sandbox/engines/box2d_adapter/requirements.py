@@ -32,18 +32,18 @@ def is_installed() -> bool:
     return find_spec("pyb2d3") is not None
 
 
-def joint_faults(links: JointArrays) -> Iterator[str]:
+def joint_faults(joints: JointArrays) -> Iterator[str]:
     """Yield why joints are not supported."""
-    pairs = list(zip(links.a.tolist(), links.b.tolist(), links.kind.tolist(), strict=True))
-    for k, name in enumerate(links.names):
-        kind, pair = JointKind(int(links.kind[k])), (int(links.a[k]), int(links.b[k]))
+    pairs = list(zip(joints.a.tolist(), joints.b.tolist(), joints.kind.tolist(), strict=True))
+    for k, name in enumerate(joints.names):
+        kind, pair = JointKind(int(joints.kind[k])), (int(joints.a[k]), int(joints.b[k]))
         if kind in MERGED:
             pivot = *pair, JointKind.PIVOT
             if pairs.count(pivot) != 1 or pairs.count((*pair, kind)) != 1:
                 yield f"{name}: Box2D has a {MERGED[kind]} as part of a pivot only, one of each between two bodies"
-            elif math.isfinite(links.strength[pairs.index(pivot)]) or math.isfinite(links.strength[k]):
+            elif math.isfinite(joints.strength[pairs.index(pivot)]) or math.isfinite(joints.strength[k]):
                 yield f"{name}: a {MERGED[kind]} that breaks, or whose pivot breaks, is not supported"
-        if kind == JointKind.ROTARY_LIMIT and not links.figures[k, 1] - links.figures[k, 0] < 2.0 * math.pi:
+        if kind == JointKind.ROTARY_LIMIT and not joints.figures[k, 1] - joints.figures[k, 0] < 2.0 * math.pi:
             yield f"{name}: a range of a whole turn or more is not supported, as Box2D knows angles modulo 2π"
 
 

@@ -335,12 +335,12 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
                 return
             before = BodyState.of(store)
             scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
-            links = store.setup.links
+            joints = store.setup.joints
             leaving = apply_action(action, store)
             if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
                 self._joints.renew(self._world.update_surfaces())  # first: new shapes need the new values
             self._update_world(before, scene)
-            self._joints.update_motors(links)
+            self._joints.update_motors(joints)
             if store.scene is not scene or len(store.position) > len(before.position):
                 self._set_air(store.scene)
             if leaving is not None:

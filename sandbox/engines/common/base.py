@@ -126,7 +126,7 @@ class BaseSimulation(ABC):
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
+        """Time in s, by index in `setup.joints`, at which joints broke."""
         return {}
 
     @property

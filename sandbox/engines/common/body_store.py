@@ -118,14 +118,14 @@ class BodyStore:
             self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.kinematic[n] else 1.0 / moment_about_hinge
 
     @property
-    def links(self) -> JointArrays:
+    def joints(self) -> JointArrays:
         """The joints that are intact and whose bodies are present."""
-        return self.setup.links.some(self.linked())
+        return self.setup.joints.some(self.intact_joints())
 
-    def linked(self) -> IntArray:
+    def intact_joints(self) -> IntArray:
         """Return the indices of the scene's joints that are intact and whose bodies are present."""
-        links, is_present = self.setup.links, np.append(self.present, True)  # index −1, the world, is the last entry
-        intact = is_present[links.a] & is_present[links.b]
+        joints, is_present = self.setup.joints, np.append(self.present, True)  # index −1, the world, is the last entry
+        intact = is_present[joints.a] & is_present[joints.b]
         intact[list(self._broken)] = False
         return np.flatnonzero(intact)
 
@@ -162,12 +162,12 @@ class BodyStore:
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
+        """Time in s, by index in `setup.joints`, at which joints broke."""
         return MappingProxyType(self._broken)
 
-    def mark_broken(self, links: IntArray, time: float) -> None:
+    def mark_broken(self, joints: IntArray, time: float) -> None:
         """Mark joints, by their indices, as broken since a time, s."""
-        self._broken |= dict.fromkeys(links.tolist(), time)
+        self._broken |= dict.fromkeys(joints.tolist(), time)
 
     def motion(self, index: int) -> tuple[FloatArray, float]:
         """Return the velocity (2,), m/s, and the angular velocity, rad/s, of a body."""
@@ -294,5 +294,5 @@ class HasBodyStore:
 
     @property
     def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
+        """Time in s, by index in `setup.joints`, at which joints broke."""
         return self._store.broken

@@ -54,7 +54,7 @@ def energy_of(
 def total_energy(simulation: Simulation) -> float:
     """Return the energy of the present state, J."""
     setup, broken = simulation.setup, simulation.broken
-    breaks = np.full(len(setup.links), np.inf)
+    breaks = np.full(len(setup.joints), np.inf)
     breaks[list(broken)] = list(broken.values())
     return energy_of(simulation.frame(), simulation.bodies, setup.scene.world.gravity, setup, breaks)[2]
 

@@ -26,7 +26,7 @@ def overload(start: Scene | Setup, settings: Settings) -> list[str]:
     overlaps = 0
     if max_overlaps * iterations > STEP_WORK.value:  # rare; other scenes need no search for overlaps
         overlaps = count_overlaps(bodies.position[is_moving], bodies.core[is_moving], max_overlaps)
-    rows = max(CONTACTS_PER_BODY * moving_count, overlaps) + len(setup.links)
+    rows = max(CONTACTS_PER_BODY * moving_count, overlaps) + len(setup.joints)
     solver_refusal = STEP_WORK.refusal(
         f"a step of up to {rows:,} contacts and joints × ({settings.iterations:,} iterations + {DETECTION_COST} for "
         f"detection) × {settings.substeps:,} substeps takes work of",

@@ -120,7 +120,7 @@ class PymunkBodies(BodyStore):
         in_space = indices[~is_particle]
         position, velocity, angle, spin = (array[in_space] for array in state)
         self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])
-        self.space_bodies.link(self.setup.links)
+        self.space_bodies.add_joints(self.setup.joints)
 
     @property
     def _needs_space(self) -> BoolArray:
@@ -159,7 +159,7 @@ class PymunkBodies(BodyStore):
             self.space_bodies.rebuild(setup.scene, self.bodies, self.contact_matrix)
         else:
             self.space_bodies.rebuild_world(setup.scene, self.bodies)
-        self.space_bodies.joints.update(setup.links)
+        self.space_bodies.joints.update(setup.joints)
 
     def _demands(self, setup: Setup) -> frozenset[Demand]:
         """Return the demands of a setup, and of the bodies that actions have added."""

@@ -244,7 +244,7 @@ class PymunkEnergyLedger:
         """Start the accounting of a store."""
         self.account = EnergyLedger()
         self._store = store
-        self._breaks = np.full(len(store.setup.links), np.inf)
+        self._breaks = np.full(len(store.setup.joints), np.inf)
         self._potential: tuple[tuple[Scene, Bodies], Potential] | None = None
         self._was_asleep: BoolArray | None = None  # at the start of the substep
         store.space_bodies.field.applied = {}

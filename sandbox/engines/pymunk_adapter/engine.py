@@ -135,7 +135,7 @@ class PymunkEngine:
             "persistence": PERSISTENCE,
             **FIXED_METHODS,
         }
-        if len(setup.links):
+        if len(setup.joints):
             defaults["joints"] = "impulses"
         if settings.sleeping:
             defaults |= {"sleep_time": SLEEP_TIME, "idle_speed": 0.0}

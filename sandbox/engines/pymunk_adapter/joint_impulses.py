@@ -88,16 +88,16 @@ def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: flo
         angle: (N,) rad.
         h: substep, s.
     """
-    links = joints.by_kind.springs
-    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
-    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    joint_arrays = joints.by_kind.springs
+    arm_a, point_a = anchors_in_world(joint_arrays.a, joint_arrays.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(joint_arrays.b, joint_arrays.anchor_b, position, angle)
     displacement = point_b - point_a
     length = np.hypot(displacement[:, 0], displacement[:, 1])
     direction = displacement / np.where(length > 0.0, length, 1.0)[:, None]
-    elastic = elastic_force(links, length) * h
-    damper = joints.impulses(links) - elastic
-    no_torque = np.zeros(len(links))
-    spring_ends = links.a, links.b, arm_a, arm_b
+    elastic = elastic_force(joint_arrays, length) * h
+    damper = joints.impulses(joint_arrays) - elastic
+    no_torque = np.zeros(len(joint_arrays))
+    spring_ends = joint_arrays.a, joint_arrays.b, arm_a, arm_b
 
     rotary = joints.by_kind.rotary
     rotary_elastic = elastic_force(rotary, relative(rotary, angle)) * h
@@ -126,15 +126,15 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_s
         angle: (N,) rad.
         joint_sums: sum of the impulses of all joints but springs.
     """
-    rigid, motor_links = joints.by_kind.rigid, joints.by_kind.motors
-    no_force = np.zeros((len(motor_links), 2))
-    if not len(motor_links):
-        return JointImpulses(motor_links.a, motor_links.b, no_force, no_force, no_force, np.zeros(0))
+    rigid, motor_joints = joints.by_kind.rigid, joints.by_kind.motors
+    no_force = np.zeros((len(motor_joints), 2))
+    if not len(motor_joints):
+        return JointImpulses(motor_joints.a, motor_joints.b, no_force, no_force, no_force, np.zeros(0))
     unknown = _least_squares(_unit_responses(rigid, position, angle), _stacked(joint_sums))
     first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
     signs = np.sign(unknown[first[rigid.kind == JointKind.MOTOR]])
     return JointImpulses(
-        motor_links.a, motor_links.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_links))
+        motor_joints.a, motor_joints.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_joints))
     )
 
 
@@ -167,27 +167,27 @@ def _least_squares(table: FloatArray, sums: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.lstsq(table, sums, rcond=None)[0], dtype=np.float64)
 
 
-def _component_counts(links: JointArrays) -> IntArray:
+def _component_counts(joints: JointArrays) -> IntArray:
     """Return the number of components of the impulse of each joint, (K,)."""
-    return np.where(np.isin(links.kind, (JointKind.PIVOT, JointKind.GROOVE)), 2, 1)
+    return np.where(np.isin(joints.kind, (JointKind.PIVOT, JointKind.GROOVE)), 2, 1)
 
 
 def _stacked(joint_sums: ImpulseSums) -> FloatArray:
     return np.column_stack((joint_sums.linear, joint_sums.angular))[:-1].reshape(-1)
 
 
-def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
+def _unit_responses(joints: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the effect of unit impulses of joints, (U,), on all bodies: (3N, U); x, y and angular for each body."""
-    count = _component_counts(links)
+    count = _component_counts(joints)
     column = np.cumsum(count) - count
     table = np.zeros((len(position) + 1, 3, int(count.sum())))
-    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
-    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
-    for k, kind in enumerate(links.kind.tolist()):
-        a, b, first_column = int(links.a[k]), int(links.b[k]), int(column[k])
+    arm_a, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
+    for k, kind in enumerate(joints.kind.tolist()):
+        a, b, first_column = int(joints.a[k]), int(joints.b[k]), int(column[k])
         if kind in (JointKind.MOTOR, JointKind.ROTARY_LIMIT, JointKind.GEAR, JointKind.RATCHET):
             table[b, 2, first_column] += 1.0
-            table[a, 2, first_column] -= 1.0 / links.figures[k, 1] if kind == JointKind.GEAR else 1.0
+            table[a, 2, first_column] -= 1.0 / joints.figures[k, 1] if kind == JointKind.GEAR else 1.0
             continue
         middle = position[a] if a >= 0 else np.zeros(2)
         first_arm = point_b[k] - middle if kind == JointKind.GROOVE else arm_a[k]

@@ -12,28 +12,28 @@ from sandbox.engines.common.springs import anchors_in_world, spring_law
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 
 
-def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
+def constraint_of(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
     """Create the constraint of joint k between two bodies of a space.
 
     Args:
-        links: of the scene.
+        joints: of the scene.
         k: index of the joint.
         a: first body; the space's static body if that is the world.
         b: second body.
         bias: fraction of the error that remains after one second, of joints without their own.
     """
-    constraint = _new_constraint(links, k, a, b)
-    constraint.collide_bodies = bool(links.collide[k])
-    constraint.error_bias = bias if math.isnan(links.bias[k]) else float(links.bias[k])
-    constraint.max_bias = float(links.max_bias[k])
-    constraint.max_force = float(links.max_force[k])
+    constraint = _new_constraint(joints, k, a, b)
+    constraint.collide_bodies = bool(joints.collide[k])
+    constraint.error_bias = bias if math.isnan(joints.bias[k]) else float(joints.bias[k])
+    constraint.max_bias = float(joints.max_bias[k])
+    constraint.max_force = float(joints.max_force[k])
     return constraint
 
 
-def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
-    x, y, z = links.figures[k].tolist()
-    anchor_a, anchor_b = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
-    match JointKind(int(links.kind[k])):
+def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
+    x, y, z = joints.figures[k].tolist()
+    anchor_a, anchor_b = tuple(joints.anchor_a[k].tolist()), tuple(joints.anchor_b[k].tolist())
+    match JointKind(int(joints.kind[k])):
         case JointKind.ROD:
             rod = pymunk.PinJoint(a, b, anchor_a, anchor_b)
             rod.distance = x
@@ -63,69 +63,69 @@ def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) 
 
 
 def spring_force_magnitude(
-    links: JointArrays, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
+    joints: JointArrays, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
 ) -> FloatArray:
     """Return the magnitude of the force of springs, (K,) N.
 
     Args:
-        links: K springs.
+        joints: K springs.
         position: (N, 2) m.
         velocity: (N, 2) m/s.
         angle: (N,) rad.
         spin: (N,) rad/s.
     """
-    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
-    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    arm_a, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
     displacement = point_b - point_a
-    relative_velocity = _anchor_velocity(links.b, arm_b, velocity, spin) - _anchor_velocity(
-        links.a, arm_a, velocity, spin
+    relative_velocity = _anchor_velocity(joints.b, arm_b, velocity, spin) - _anchor_velocity(
+        joints.a, arm_a, velocity, spin
     )
     length = np.hypot(displacement[:, 0], displacement[:, 1])
     rate = np.einsum("kd,kd->k", displacement, relative_velocity) / np.where(length > 0.0, length, 1.0)
-    rest, stiffness, damping = links.figures.T
-    return np.asarray(np.minimum(np.abs(spring_law(rest, stiffness, damping, length, rate)), links.max_force))
+    rest, stiffness, damping = joints.figures.T
+    return np.asarray(np.minimum(np.abs(spring_law(rest, stiffness, damping, length, rate)), joints.max_force))
 
 
-def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
+def spring_forces(joints: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the forces (N, 2), N, of springs on bodies, without their dampers.
 
     Args:
-        links: K springs.
+        joints: K springs.
         position: (N, 2) m.
         angle: (N,) rad.
     """
-    _, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
-    _, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    _, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
+    _, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
     displacement = point_b - point_a
     length = np.hypot(displacement[:, 0], displacement[:, 1])
-    per_length = np.divide(elastic_force(links, length), length, out=np.zeros_like(length), where=length > 0.0)
+    per_length = np.divide(elastic_force(joints, length), length, out=np.zeros_like(length), where=length > 0.0)
     force = displacement * per_length[:, None]
     total = np.zeros((len(position) + 1, 2))  # the last row is the world, −1
-    np.add.at(total, links.b, force)
-    np.subtract.at(total, links.a, force)
+    np.add.at(total, joints.b, force)
+    np.subtract.at(total, joints.a, force)
     return total[:-1]
 
 
-def spring_torque_magnitude(links: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
+def spring_torque_magnitude(joints: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
     """Return the magnitude of the torque of rotary springs, (K,) N·m."""
-    rest, stiffness, damping = links.figures.T
-    torque = spring_law(rest, stiffness, damping, relative(links, angle), relative(links, spin))
-    return np.asarray(np.minimum(np.abs(torque), links.max_force))
+    rest, stiffness, damping = joints.figures.T
+    torque = spring_law(rest, stiffness, damping, relative(joints, angle), relative(joints, spin))
+    return np.asarray(np.minimum(np.abs(torque), joints.max_force))
 
 
-def elastic_force(links: JointArrays, extent: FloatArray) -> FloatArray:
+def elastic_force(joints: JointArrays, extent: FloatArray) -> FloatArray:
     """Return the force of springs without dampers, at lengths (K,), m, or angles of rotary springs (K,), rad.
 
     pymunk limits it to `max_force`, and then its sum with the force of the damper.
     """
-    rest, stiffness, damping = links.figures.T
+    rest, stiffness, damping = joints.figures.T
     force = spring_law(rest, stiffness, damping, extent, np.zeros_like(extent))
-    return np.asarray(np.clip(force, -links.max_force, links.max_force))
+    return np.asarray(np.clip(force, -joints.max_force, joints.max_force))
 
 
-def relative(links: JointArrays, values: FloatArray) -> FloatArray:
+def relative(joints: JointArrays, values: FloatArray) -> FloatArray:
     """Return values (N,) of second bodies minus those of first bodies, (K,); 0 for the world."""
-    return np.asarray(values[links.b] - np.where(links.a >= 0, values[links.a], 0.0))
+    return np.asarray(values[joints.b] - np.where(joints.a >= 0, values[joints.a], 0.0))
 
 
 def _anchor_velocity(index: IntArray, arm: FloatArray, velocity: FloatArray, spin: FloatArray) -> FloatArray:
@@ -155,48 +155,48 @@ class SpaceJoints:
 
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
-        self._links: JointArrays | None = None
+        self._joints: JointArrays | None = None
         self._constraints: dict[int, pymunk.Constraint] = {}
         self._by_kind: JointsByKind | None = None
         self.count = 0
         """number of constraints"""
         self._rebuild(JointArrays.none())
 
-    def add(self, links: JointArrays, body: Callable[[int], pymunk.Body], bias: float) -> None:
+    def add(self, joints: JointArrays, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Add the joints of a scene, once.
 
         Args:
-            links: of the scene; all their bodies are in the space.
+            joints: of the scene; all their bodies are in the space.
             body: returns a body by its index.
             bias: fraction of the error that remains after one second, of joints without their own.
         """
-        if self._links is not None:
+        if self._joints is not None:
             return
-        self._links = links
-        for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
+        self._joints = joints
+        for k, (a, b) in enumerate(zip(joints.a.tolist(), joints.b.tolist(), strict=True)):
             first = self._space.static_body if a == WORLD else body(a)
-            constraint = constraint_of(links, k, first, body(b), bias)
+            constraint = constraint_of(joints, k, first, body(b), bias)
             self._space.add(constraint)
             self._constraints[k] = constraint
-        self._rebuild(links.counted())
+        self._rebuild(joints.counted())
 
-    def update(self, links: JointArrays) -> None:
+    def update(self, joints: JointArrays) -> None:
         """Set the values of motors to those of the scene's joints, of which only these differ from before."""
-        if self._links is None or links is self._links:
+        if self._joints is None or joints is self._joints:
             return
-        self._links = links
+        self._joints = joints
         for k, constraint in self._constraints.items():
             if isinstance(constraint, pymunk.SimpleMotor):
-                rate, max_force = -float(links.figures[k, 0]), float(links.max_force[k])
+                rate, max_force = -float(joints.figures[k, 0]), float(joints.max_force[k])
                 if (constraint.rate, constraint.max_force) != (rate, max_force):  # to set them wakes bodies
                     constraint.rate, constraint.max_force = rate, max_force
         self._rebuild(self._of_constraints())
 
     def remove(self, index: int) -> None:
         """Remove the joints of a body that leaves."""
-        if self._links is None:
+        if self._joints is None:
             return
-        attached = np.flatnonzero((self._links.a == index) | (self._links.b == index))
+        attached = np.flatnonzero((self._joints.a == index) | (self._joints.b == index))
         self._remove([k for k in attached.tolist() if k in self._constraints])
 
     def break_overloaded(
@@ -239,12 +239,12 @@ class SpaceJoints:
             self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(JointKind.MOTOR))
         return self._by_kind
 
-    def impulses(self, links: JointArrays) -> FloatArray:
+    def impulses(self, joints: JointArrays) -> FloatArray:
         """Return pymunk's impulse of each of some joints in the last substep, (K,) N·s or N·m·s.
 
         For joints it is the magnitude; for springs it is signed, positive if it pushes the bodies apart.
         """
-        return np.asarray([self._constraints[k].impulse for k in links.number.tolist()], dtype=np.float64)
+        return np.asarray([self._constraints[k].impulse for k in joints.number.tolist()], dtype=np.float64)
 
     def _remove(self, indices: list[int]) -> None:
         if not indices:
@@ -255,15 +255,15 @@ class SpaceJoints:
 
     def _of_constraints(self) -> JointArrays:
         """Return the joints that have a constraint."""
-        assert self._links is not None
-        return self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64))
+        assert self._joints is not None
+        return self._joints.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64))
 
-    def _rebuild(self, links: JointArrays) -> None:
+    def _rebuild(self, joints: JointArrays) -> None:
         """Update the lists of present joints, and of those that can break."""
         self.count = len(self._constraints)
-        self._present: JointArrays = links
+        self._present: JointArrays = joints
         self._by_kind = None
-        breakable = links.some(np.isfinite(links.strength))
+        breakable = joints.some(np.isfinite(joints.strength))
         kinds = JointKind.SPRING, JointKind.ROTARY_SPRING
         self._breakable_springs, self._breakable_rotary = breakable.of(kinds[0]), breakable.of(kinds[1])
         self._breakable_joints = breakable.some(~np.isin(breakable.kind, kinds)) if len(breakable) else breakable

@@ -61,7 +61,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
 
 def size_faults(setup: Setup) -> list[str]:
     """Return why it would take too long to create a scene's space."""
-    size = len(setup.bodies) + len(setup.links)
+    size = len(setup.bodies) + len(setup.joints)
     if size <= SPACE_SIZE.value:  # most scenes: no need to count the bodies in free flight
         return []
     size -= int((contact_matrix(setup).free & ~setup.bodies.fixed).sum())

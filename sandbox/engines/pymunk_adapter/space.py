@@ -206,11 +206,11 @@ class SpaceBodies(SpaceBodyTable):
         self._reader.invalidate_order()
         self._state = self._needs_check = None
 
-    def link(self, links: JointArrays) -> None:
+    def add_joints(self, joints: JointArrays) -> None:
         """Add the scene's joints, once; jointed bodies are always in the space."""
         assert self._settings.bias is not None
         if self._members:
-            self.joints.add(links, lambda index: self._members[index].body, self._settings.bias)
+            self.joints.add(joints, lambda index: self._members[index].body, self._settings.bias)
 
     @property
     def asleep(self) -> BoolArray | None:
@@ -448,16 +448,16 @@ class SpaceBodies(SpaceBodyTable):
 
         pymunk evaluates springs after positions have moved by the old velocities.
         """
-        links = self.joints.by_kind.springs
-        if not len(links):
+        joints = self.joints.by_kind.springs
+        if not len(joints):
             return None
         position, angle = np.zeros((len(self._can_touch), 2)), np.zeros(len(self._can_touch))
         position[indices] = state[:, 0:2] + state[:, 3:5] * self._h
         angle[indices] = state[:, 2] + state[:, 5] * self._h
-        for index in np.setdiff1d(np.concatenate((links.a, links.b)), [WORLD, *indices]).tolist():  # fixed bodies
+        for index in np.setdiff1d(np.concatenate((joints.a, joints.b)), [WORLD, *indices]).tolist():  # fixed bodies
             body = self._members[index].body
             position[index], angle[index] = body.position, body.angle
-        return spring_forces(links, position, angle)[indices]
+        return spring_forces(joints, position, angle)[indices]
 
     def _read(self) -> tuple[IntArray, FloatArray]:
         if self._state is None:

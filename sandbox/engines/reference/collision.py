@@ -305,7 +305,7 @@ class CirclePipeline(CollisionPipeline):
     def rebuild(self) -> None:
         """Update after a change of the bodies or static colliders in the body store."""
         super().rebuild()
-        self._excluded: IntArray = excluded_pair_keys(self._store.links)
+        self._excluded: IntArray = excluded_pair_keys(self._store.joints)
         self._has_groups = bool(self._store.bodies.group.any())
         self._owner = np.arange(len(self._store.position))  # each ball is its own body
 

@@ -319,7 +319,7 @@ def _ball_columns(pipeline: CollisionPipeline, store: BodyStore) -> BallColumns:
         moves=_own(pipeline.moves),
         can_touch=_own(pipeline.can_touch),
         owner=np.arange(len(store.radius)),
-        excluded=_own(excluded_pair_keys(store.links)),
+        excluded=_own(excluded_pair_keys(store.joints)),
         group=_own(store.bodies.group),
     )
 

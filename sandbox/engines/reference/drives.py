@@ -337,7 +337,7 @@ class Drives:
         self.inverse_moment_forces: FloatArray = store.inverse_moment
         """(N,) 1/(kg·m²), inverse moments for forces in the planned substep: 0 for a body pressed onto a stop"""
         self._no_rows: VelocityConstraints = make_velocity_constraints(
-            select_joints(store.setup.links, among=np.empty(0, np.int64))
+            select_joints(store.setup.joints, among=np.empty(0, np.int64))
         )
 
     @classmethod

@@ -64,7 +64,7 @@ class StepEnergyLedger:
             self._inertia[store.driven] = 0.0
         self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
         self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
-        breaks = np.full(len(store.setup.links), np.inf)
+        breaks = np.full(len(store.setup.joints), np.inf)
         breaks[list(store.broken)] = -np.inf
         self._potential = Potential(store.setup, store.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))

@@ -33,7 +33,7 @@ def _drive_faults(setup: Setup, wanted: frozenset[Demand], settings: Settings) -
         body, drive = jointed
         missing.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
     bodies = setup.bodies
-    kinematic = np.flatnonzero(bodies.kinematic & setup.links.held(len(bodies)))
+    kinematic = np.flatnonzero(bodies.kinematic & setup.joints.held(len(bodies)))
     if len(kinematic):
         missing.append(f"it does not model a joint to {bodies.names[kinematic[0]]!r}, which is kinematic")
     return missing
@@ -42,7 +42,7 @@ def _drive_faults(setup: Setup, wanted: frozenset[Demand], settings: Settings) -
 def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
     """Return a driven body that has a joint as well, and its drive; None if there is none."""
     scene, numbers = setup.scene, setup.bodies.number_of
-    joined = setup.links.held(len(setup.bodies))
+    joined = setup.joints.held(len(setup.bodies))
     for drive, name in zip(scene.drives, names_of(scene), strict=True):
         if drive.body in numbers and joined[numbers[drive.body]]:
             return drive.body, name
@@ -52,11 +52,11 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
 def _max_force_faults(setup: Setup) -> list[str]:
     """Return the first joint whose largest force is not supported: springs are forces, and grooves have two rows."""
     for kind in (JointKind.SPRING, JointKind.ROTARY_SPRING, JointKind.GROOVE):
-        links = setup.links.of(kind)
-        limited = np.flatnonzero(np.isfinite(links.max_force))
+        joints = setup.joints.of(kind)
+        limited = np.flatnonzero(np.isfinite(joints.max_force))
         if len(limited):
             word = kind.name.lower().replace("_", " ")
-            return [f"max_force of a {word} is not supported ({links.names[int(limited[0])]!r})"]
+            return [f"max_force of a {word} is not supported ({joints.names[int(limited[0])]!r})"]
     return []
 
 
@@ -129,7 +129,7 @@ class ReferenceEngine:
         missing = unmodelled(setup, self.capabilities) + setting_faults(settings, self.name, {"persistence": 1}, ABSENT)
         missing += self._detection_faults(wanted, settings)
         missing += _max_force_faults(setup)
-        rods = setup.links.of(JointKind.ROD)
+        rods = setup.joints.of(JointKind.ROD)
         if settings.joints == "rattle" and len(points := np.flatnonzero(rods.figures[:, 0] == 0.0)):
             name = rods.names[points[0]]
             missing.append(
@@ -193,7 +193,7 @@ class ReferenceEngine:
             own = {**TABLETOP_METHODS, "slop": slop_of(setup), "bias": BIAS, "broad_phase": _default_broad_phase(setup)}
             return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
         choices: dict[str, object] = {**DEFAULT_METHODS, "slop": slop_of(setup), "bias": BIAS, "persistence": 1}
-        if len(setup.links):
+        if len(setup.joints):
             choices["joints"] = "impulses"
         if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
             choices["integrator"] = "semi_implicit_euler"  # with explicit Euler, oscillations gain energy

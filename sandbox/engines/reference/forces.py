@@ -30,7 +30,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     if coordinates == 3:
         constant[:, 2] = store.torque * store.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
-    springs = store.setup.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
+    springs = store.setup.joints.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(joints.forces_at)
     return Inputs(

@@ -44,7 +44,7 @@ Anchors: TypeAlias = tuple[float, float, float, float]
 class JointData(NamedTuple):
     """K joints by the indices of their bodies; the first may be `WORLD`, −1."""
 
-    link: IntArray
+    joint: IntArray
     """(K,) index among all joints of the setup"""
     kind: IntArray
     """(K,) `JointKind`"""
@@ -70,21 +70,21 @@ class JointData(NamedTuple):
         return JointData._make(np.concatenate(pair) for pair in zip(self, more, strict=True))
 
 
-def select_joints(links: JointArrays, *kinds: JointKind, among: IntArray | None = None) -> JointData:
+def select_joints(joints: JointArrays, *kinds: JointKind, among: IntArray | None = None) -> JointData:
     """Return the joints of some kinds, in their order; with `among`, only those with these indices.
 
     A groove is followed by its second constraint, `GROOVE_ENDS`.
     """
-    which = np.isin(links.kind, kinds)
+    which = np.isin(joints.kind, kinds)
     if among is not None:
-        which &= np.isin(np.arange(len(links)), among)
-    anchor = np.column_stack((links.anchor_a, links.anchor_b))
-    columns = links.kind, links.a, links.b, anchor, links.figures, links.wheels, links.max_force
-    found = JointData(np.arange(len(links)), *columns).take(np.flatnonzero(which))
+        which &= np.isin(np.arange(len(joints)), among)
+    anchor = np.column_stack((joints.anchor_a, joints.anchor_b))
+    columns = joints.kind, joints.a, joints.b, anchor, joints.figures, joints.wheels, joints.max_force
+    found = JointData(np.arange(len(joints)), *columns).take(np.flatnonzero(which))
     if not (found.kind == GROOVE).any():
         return found
     found = found.take(np.repeat(np.arange(len(found.kind)), np.where(found.kind == GROOVE, 2, 1)))
-    found.kind[1:][(found.kind[1:] == GROOVE) & (found.link[1:] == found.link[:-1])] = GROOVE_ENDS
+    found.kind[1:][(found.kind[1:] == GROOVE) & (found.joint[1:] == found.joint[:-1])] = GROOVE_ENDS
     return found
 
 
@@ -388,9 +388,9 @@ def write_spring_loads(joints: JointData, pose: FloatArray, rates: FloatArray, l
     for k in range(len(joints.kind)):
         if joints.kind[k] == SPRING:
             anchors, dx, dy = anchor_separation(joints, k, pose)
-            load[joints.link[k], 0], load[joints.link[k], 1] = spring_force(joints, k, anchors, dx, dy, rates)
+            load[joints.joint[k], 0], load[joints.joint[k], 1] = spring_force(joints, k, anchors, dx, dy, rates)
         elif joints.kind[k] == ROTARY_SPRING:
-            load[joints.link[k], 0], load[joints.link[k], 1] = spring_torque(joints, k, pose, rates), 0.0
+            load[joints.joint[k], 0], load[joints.joint[k], 1] = spring_torque(joints, k, pose, rates), 0.0
 
 
 MAX_STRETCH = 0.1

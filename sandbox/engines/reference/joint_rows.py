@@ -213,9 +213,9 @@ def write_joint_impulses(rows: VelocityConstraints, joints: JointData, out: Floa
     """
     along = ((rows.kind == DISTANCE) | (rows.kind == JACOBIAN))[:, None]
     impulse = np.where(along, rows.impulse[:, :1] * rows.normal, rows.impulse)
-    out[joints.link] = impulse
+    out[joints.joint] = impulse
     ends = joints.kind == GROOVE_ENDS
-    out[joints.link[ends]] += impulse[:-1][ends[1:]]  # those across the groove, in the rows before
+    out[joints.joint[ends]] += impulse[:-1][ends[1:]]  # those across the groove, in the rows before
 
 
 @bare_kernel

@@ -72,7 +72,7 @@ class JointSolver:
 
     def __init__(
         self,
-        links: JointArrays,
+        joints: JointArrays,
         inverse_mass: FloatArray,
         inverse_moment: FloatArray,
         bias: float,
@@ -83,7 +83,7 @@ class JointSolver:
         """Create the solver.
 
         Args:
-            links: the joints.
+            joints: of the scene.
             inverse_mass: (N,) 1/kg, 0 for fixed bodies.
             inverse_moment: (N,) 1/(kg·m²), 0 for bodies that do not turn.
             bias: fraction of a joint's error that remains after one second of correction, 0 to 1.
@@ -97,11 +97,11 @@ class JointSolver:
         """
         if method not in METHODS:
             raise ValueError(f"the method of joints must be one of {METHODS}, is {method!r}")
-        self.links, self.method = links, method
+        self.joints, self.method = joints, method
         self._bias, self._iterations, self._max_stretch = bias, iterations, max_stretch
         self.h = math.inf
         """s, step in which the present impulses were found"""
-        self.rebuild(inverse_mass, inverse_moment, np.arange(len(links)))
+        self.rebuild(inverse_mass, inverse_moment, np.arange(len(joints)))
 
     def rebuild(self, inverse_mass: FloatArray, inverse_moment: FloatArray, unbroken: IntArray) -> None:
         """Update after a change of the bodies, or after joints broke. The other joints keep their impulses.
@@ -111,20 +111,20 @@ class JointSolver:
             inverse_moment: (N,) 1/(kg·m²).
             unbroken: indices of the intact joints.
         """
-        memory = np.zeros((2, len(self.links), 2))  # the second constraints of grooves have their own
+        memory = np.zeros((2, len(self.joints), 2))  # the second constraints of grooves have their own
         if math.isfinite(self.h):
-            memory[self._is_second(), self.constraints.link] = self.rows.impulse
+            memory[self._is_second(), self.constraints.joint] = self.rows.impulse
         self.inverse_mass, self.inverse_moment = inverse_mass, inverse_moment
-        self._springs: JointData = select_joints(self.links, *SPRINGS, among=unbroken)
+        self._springs: JointData = select_joints(self.joints, *SPRINGS, among=unbroken)
         self.constraints: JointData = select_joints(
-            self.links, *(CONSTRAINTS + SPRINGS if self.method == "xpbd" else CONSTRAINTS), among=unbroken
+            self.joints, *(CONSTRAINTS + SPRINGS if self.method == "xpbd" else CONSTRAINTS), among=unbroken
         )
         """joints of the rows"""
         if self.method == "relaxation":
             self.constraints = self.constraints.joined(stretch_limits(self._springs, self._max_stretch))
         self.rows: VelocityConstraints = make_velocity_constraints(self.constraints)
-        self.rows.impulse[:] = memory[self._is_second(), self.constraints.link]
-        self._impulse = np.zeros((len(self.links), 2))
+        self.rows.impulse[:] = memory[self._is_second(), self.constraints.joint]
+        self._impulse = np.zeros((len(self.joints), 2))
 
     def _is_second(self) -> IntArray:
         """Return 1 for rows that are the second constraint of a groove, otherwise 0, (K,)."""
@@ -237,7 +237,7 @@ class JointSolver:
         Args:
             x: (2, N, 3) state at which springs are evaluated; the forces of other joints are means over the last step.
         """
-        load: FloatArray = np.zeros((len(self.links), 2))
+        load: FloatArray = np.zeros((len(self.joints), 2))
         if self.method != "xpbd":
             write_spring_loads(self._springs, x[0], x[1], load)
         return load + self.impulse() / self.h
@@ -249,10 +249,10 @@ class JointBreaker:
     The mean is over the whole substep, also if impacts divide it: forces grow as the pieces get shorter.
     """
 
-    def __init__(self, links: JointArrays) -> None:
-        self._strength = links.strength
-        self._breakable: IntArray = np.flatnonzero(np.isfinite(links.strength))
-        self._impulse: FloatArray = np.zeros((len(links), 2))  # N·s or N·m·s, in this substep
+    def __init__(self, joints: JointArrays) -> None:
+        self._strength = joints.strength
+        self._breakable: IntArray = np.flatnonzero(np.isfinite(joints.strength))
+        self._impulse: FloatArray = np.zeros((len(joints), 2))  # N·s or N·m·s, in this substep
 
     @property
     def any_breakable(self) -> bool:

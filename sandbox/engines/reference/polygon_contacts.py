@@ -66,7 +66,7 @@ class WorldPieces:
         self.collision_mask: IntArray = store.collision_mask[self.body]
         self.moves: BoolArray = store.mobile[self.body]
         self.can_touch: BoolArray = store.moving[self.body] & (self.collision_mask > NOTHING)
-        self.excluded: IntArray = excluded_pair_keys(store.links)
+        self.excluded: IntArray = excluded_pair_keys(store.joints)
         if store.has_driven:
             self.can_touch = self.can_touch & ~store.kinematic[self.body]
             self.excluded = np.union1d(self.excluded, kinematic_pair_keys(store))
@@ -85,9 +85,9 @@ class WorldPieces:
         )
 
 
-def excluded_pair_keys(links: JointArrays) -> IntArray:
+def excluded_pair_keys(joints: JointArrays) -> IntArray:
     """Return the keys of the pairs of bodies that joints exclude from collision, (K,), ascending."""
-    return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
+    return np.sort([pair_key(a, b) for a, b in joints.apart().tolist()]).astype(np.int64)
 
 
 def kinematic_pair_keys(store: BodyStore) -> IntArray:

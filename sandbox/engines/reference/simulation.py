@@ -65,7 +65,7 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         self._world = WorldState(self._store, settings)
         self._detection = DETECTIONS[settings.detection]
         self._energy: StepEnergyLedger | None = None
-        self._breaker = JointBreaker(setup.links) if np.isfinite(setup.links.strength).any() else None
+        self._breaker = JointBreaker(setup.joints) if np.isfinite(setup.joints.strength).any() else None
         """finds the joints that break; None if no joint can break any more"""
         self._world.records_joint_load = self._breaker is not None
         self._h = settings.h

@@ -153,13 +153,13 @@ class WorldState:
     def _new_joints(self) -> JointSolver | None:
         """Return a solver of the scene's joints, if it has any."""
         store, settings = self._store, self._settings
-        links = store.setup.links
-        if not len(links):
+        joints = store.setup.joints
+        if not len(joints):
             return None
         assert settings.joints is not None and settings.bias is not None
         cap = math.inf if settings.stretch is None else settings.stretch
         inverse = store.inverse_mass, store.inverse_moment
-        return JointSolver(links, *inverse, settings.bias, settings.iterations, settings.joints, cap)
+        return JointSolver(joints, *inverse, settings.bias, settings.iterations, settings.joints, cap)
 
     def rebuild(self) -> None:
         """Update state, forces, collision data and solver after a change of the body store."""
@@ -188,8 +188,8 @@ class WorldState:
             overlaps = self.pipeline.at_one_way_walls(self.x[0])
             self.walls.begin(overlaps, self.closing_speed(overlaps, self.x))
         if self.joints is not None:
-            self.joints.links = store.setup.links  # motors may have other values
-            self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.linked())
+            self.joints.joints = store.setup.joints  # motors may have other values
+            self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.intact_joints())
         self.forces = forces_on(store, self.field, self.joints, self.x.shape[2])
 
     def _choose_solver(self) -> None:

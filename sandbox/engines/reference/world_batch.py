@@ -206,7 +206,7 @@ class ConvexWorldBatch:
             CompiledStepper.is_suitable(world, store, settings)
             and isinstance(world.pipeline, ConvexPipeline)
             and not store.contact_matrix.mutual
-            and not len(store.links)
+            and not len(store.joints)
             and not store.has_lifetimes
             and world.x.shape[2] == 3
             and _max_contacts(world) <= MAX_CONTACTS

@@ -53,7 +53,7 @@ def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) 
     yield from unsupported_on_surface(setup, bodies)
     for demand in sorted(demands(setup) & AIR):
         yield f"it does not model {demand} on a floor"
-    if len(setup.links) or scene.attractions or scene.thrusts or scene.drives:
+    if len(setup.joints) or scene.attractions or scene.thrusts or scene.drives:
         yield "it does not model joints, attraction, thrusts or drives on a floor"
     if not bodies.round.all():
         yield "it does not model bodies other than balls on a floor"

@@ -100,7 +100,7 @@ def ballistic_collisions(facts: SceneFacts) -> BallisticCollisions | None:
     scene, bodies = facts.scene, facts.bodies
     if not 2 <= len(bodies) <= MAX_BALLS or not bodies.round.all() or bodies.fixed.any() or scene.fixed:
         return None
-    if len(facts.links) or scene.attractions or scene.thrusts or scene.drives or facts.matrix.moving_surfaces:
+    if len(facts.joints) or scene.attractions or scene.thrusts or scene.drives or facts.matrix.moving_surfaces:
         return None
     if not facts.has_no_air or scene.world.bounds is not None:
         return None

@@ -48,7 +48,7 @@ class SceneFacts:
     scene: Scene
     bodies: Bodies
     matrix: ContactMatrix
-    links: JointArrays
+    joints: JointArrays
     thrust: BoolArray
     """(N,) whether a thrust or a drive acts on the body, or it is kinematic"""
 
@@ -56,7 +56,7 @@ class SceneFacts:
     def of(cls, scene: Scene) -> Self:
         """Derive the facts of a scene."""
         bodies = scene.bodies
-        return cls(scene, bodies, contact_matrix(scene), scene.links, thrust_on(scene, bodies))
+        return cls(scene, bodies, contact_matrix(scene), scene.joint_arrays, thrust_on(scene, bodies))
 
     @property
     def world(self) -> World:
@@ -87,13 +87,13 @@ class SceneFacts:
 
         It counts if it neither breaks nor gives way, and connects the body to the world or a static body.
         """
-        found = np.flatnonzero((self.links.a == number) | (self.links.b == number))
+        found = np.flatnonzero((self.joints.a == number) | (self.joints.b == number))
         if len(found) != 1:
             return None
         k = int(found[0])
-        if math.isfinite(self.links.strength[k]) or self.links.is_limited[k]:
+        if math.isfinite(self.joints.strength[k]) or self.joints.is_limited[k]:
             return None
-        joint = self.links.some(np.asarray([k]))
+        joint = self.joints.some(np.asarray([k]))
         (start,), (end,) = joint.ends(self.bodies.position, self.bodies.angle)
         kind, figures = JointKind(int(joint.kind[0])), joint.figures[0]
         if int(joint.b[0]) == number:

@@ -88,13 +88,13 @@ def atwood_machine(facts: SceneFacts, number: int) -> HangingBody | None:
 
 def _only_pulley(facts: SceneFacts, number: int) -> JointArrays | None:
     """Return the unbreakable pulley that is the only joint of a body and of its partner, or None."""
-    links = facts.links
-    found = np.flatnonzero((links.a == number) | (links.b == number))
+    joints = facts.joints
+    found = np.flatnonzero((joints.a == number) | (joints.b == number))
     if len(found) != 1:
         return None
-    pulley = links.some(found)
+    pulley = joints.some(found)
     pair = pulley.a[0], pulley.b[0]
-    shared = np.isin(links.a, pair) | np.isin(links.b, pair)
+    shared = np.isin(joints.a, pair) | np.isin(joints.b, pair)
     if pulley.kind[0] != JointKind.PULLEY or shared.sum() != 1 or math.isfinite(pulley.strength[0]):
         return None
     return None if pulley.anchor_a.any() or pulley.anchor_b.any() else pulley

@@ -177,7 +177,7 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
 
 def _is_driven(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are joined or have a thrust, (N,), so that no formula here applies."""
-    return np.asarray(scene.links.held(len(bodies)) | thrust_on(scene, bodies))
+    return np.asarray(scene.joint_arrays.held(len(bodies)) | thrust_on(scene, bodies))
 
 
 def _solved(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:

@@ -93,7 +93,7 @@ def static_stack(facts: SceneFacts) -> StaticStack | None:
         return None
     if facts.matrix.moving_surfaces:
         return None
-    if len(facts.links) or scene.attractions or scene.thrusts or scene.drives or not facts.has_no_air:
+    if len(facts.joints) or scene.attractions or scene.thrusts or scene.drives or not facts.has_no_air:
         return None
     normal = normal_of(plane)
     if not parallel(facts.gravity, normal) or float(facts.gravity @ normal) >= 0.0:

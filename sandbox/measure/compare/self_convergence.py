@@ -107,7 +107,7 @@ def refine(scene: Scene, settings: Settings, tolerance: float) -> RefinedRun | N
 
 def preferred_settings(scene: Scene) -> tuple[dict[str, object], ...]:
     """Return the choices of methods that converge fastest in a scene, the best first."""
-    if len(scene.links.of(*CONSTRAINT_KINDS, JointKind.MOTOR)):
+    if len(scene.joint_arrays.of(*CONSTRAINT_KINDS, JointKind.MOTOR)):
         return JOINT_SETTINGS, *PREFERENCES
     return PREFERENCES if contact_matrix(scene).touches.any() else (SMOOTH_SETTINGS, *PREFERENCES)
 

@@ -184,7 +184,7 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPai
     for i, j in _near_pairs(bodies, collides, reach):
         if not (immovable[i] and immovable[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
             found.append(((i, j), _initial_clearance(setup, (i, j))))
-    apart = set(map(tuple, setup.links.apart().tolist()))  # joined bodies that do not collide
+    apart = set(map(tuple, setup.joints.apart().tolist()))  # joined bodies that do not collide
     found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
     movable = np.flatnonzero(~immovable & collides)
     for k, thing in enumerate(scene.fixed):

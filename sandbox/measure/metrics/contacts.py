@@ -195,7 +195,7 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
 def _initial_neighbours(scene: Scene) -> list[tuple[int, int]]:
     """Return the pairs of bodies whose bounding discs overlap at the start and whose collisions no joint disables."""
     bodies = scene.bodies
-    apart = {(a, b) for a, b in scene.links.apart().tolist()}
+    apart = {(a, b) for a, b in scene.joint_arrays.apart().tolist()}
     found = []
     for i, j in near_pairs(bodies.position, 2.0 * float(bodies.radius.max())):
         overlapping = np.hypot(*(bodies.position[i] - bodies.position[j]).T) < bodies.radius[i] + bodies.radius[j]

@@ -68,7 +68,7 @@ def energies(
     mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
     moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
     gravity = np.asarray(scene.world.gravity)
-    stored = Potential(setup, bodies, body, trajectory.breaks(len(setup.links)))
+    stored = Potential(setup, bodies, body, trajectory.breaks(len(setup.joints)))
     needed = slice(None) if stored else columns  # a body can be joined to any other
     counted_columns = columns if stored else slice(None)
     size = count if stored or body is None else 1

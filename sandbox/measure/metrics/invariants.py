@@ -75,9 +75,12 @@ def conserves_energy(scene: Scene) -> bool:
         return False
     if scene.bodies.kinematic.any():
         return False
-    springs, motors = scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING), scene.links.of(JointKind.MOTOR)
-    slides = scene.links.of(JointKind.SLIDE)
-    if springs.figures[:, 2].any() or len(motors) or len(slides) or scene.links.is_limited.any():
+    springs, motors = (
+        scene.joint_arrays.of(JointKind.SPRING, JointKind.ROTARY_SPRING),
+        scene.joint_arrays.of(JointKind.MOTOR),
+    )
+    slides = scene.joint_arrays.of(JointKind.SLIDE)
+    if springs.figures[:, 2].any() or len(motors) or len(slides) or scene.joint_arrays.is_limited.any():
         return False
     matrix = contact_matrix(scene)
     elastic = (matrix.surfaces.restitution == 1.0) & matrix.surfaces.fixed_coefficients
@@ -91,8 +94,8 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     kinetic energy and the energy that gravity, springs and attraction gave or took; at least the energy that lifts each
     body by its own width. Energy that explicit Euler adds in free flight, m·g²·h·t/2, does not count.
     """
-    links = scene.links
-    if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(JointKind.MOTOR)):
+    joints = scene.joint_arrays
+    if scene.thrusts or scene.drives or any(scene.world.wind) or len(joints.of(JointKind.MOTOR)):
         return 0.0
     if scene.bodies.kinematic.any():
         return 0.0
@@ -157,10 +160,10 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
 
 def _acts_on_static(scene: Scene) -> bool:
     """Return whether a joint, the wheel of a pulley, or an attraction acts between a moving and a static body."""
-    bodies, links = scene.bodies, scene.links
+    bodies, joints = scene.bodies, scene.joint_arrays
     static = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
     is_attracted = any(not isinstance(each.toward, str) or each.toward in static for each in scene.attractions)
-    is_held = (links.a < 0) | (links.kind == JointKind.PULLEY) | bodies.fixed[links.a] | bodies.fixed[links.b]
+    is_held = (joints.a < 0) | (joints.kind == JointKind.PULLEY) | bodies.fixed[joints.a] | bodies.fixed[joints.b]
     return is_attracted or bool(is_held.any())
 
 
@@ -189,9 +192,9 @@ ANGLE_KINDS = (JointKind.ROTARY_LIMIT, JointKind.GEAR)
 """Kinds of joints whose error is an angle"""
 
 
-def has_constraints(links: JointArrays) -> bool:
+def has_constraints(joints: JointArrays) -> bool:
     """Return whether a joint has an error: one of `CONSTRAINT_KINDS` that does not give way."""
-    return bool((np.isin(links.kind, CONSTRAINT_KINDS) & ~links.is_limited).any())
+    return bool((np.isin(joints.kind, CONSTRAINT_KINDS) & ~joints.is_limited).any())
 
 
 def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
@@ -207,22 +210,22 @@ def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
         trajectory: the run; its first bodies are those of `start`.
         start: scene or setup with the joints.
     """
-    links = Setup.of(start).links
-    found = np.full((len(trajectory.time), len(links)), np.nan)
-    breaks = trajectory.breaks(len(links))
-    step = max(1, CHUNK // max(1, len(links)))
+    joints = Setup.of(start).joints
+    found = np.full((len(trajectory.time), len(joints)), np.nan)
+    breaks = trajectory.breaks(len(joints))
+    step = max(1, CHUNK // max(1, len(joints)))
     for begin in range(0, len(found), step):
         rows = slice(begin, begin + step)
-        there = both_present(links, trajectory.present(rows)) & ~is_broken_at(breaks, trajectory.time[rows])
-        found[rows] = _errors(links, trajectory.position[rows], trajectory.angle[rows], there)
+        there = both_present(joints, trajectory.present(rows)) & ~is_broken_at(breaks, trajectory.time[rows])
+        found[rows] = _errors(joints, trajectory.position[rows], trajectory.angle[rows], there)
     return found
 
 
 def starting_errors(scene: Scene) -> FloatArray:
     """Return the error of each joint at the start of a scene, (J,), as in `joint_errors`."""
-    bodies, links = scene.bodies, scene.links
-    present = np.ones((1, len(links)), np.bool_)
-    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], present)[0])
+    bodies, joints = scene.bodies, scene.joint_arrays
+    present = np.ones((1, len(joints)), np.bool_)
+    return np.asarray(_errors(joints, bodies.position[None], bodies.angle[None], present)[0])
 
 
 class JointError(NamedTuple):
@@ -246,30 +249,30 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> JointError | No
     count, so that with `record_every` larger errors can occur between them. The error of a diverged state is infinite.
     """
     setup = Setup.of(start)
-    links = setup.links
-    if not has_constraints(links) or not len(trajectory.time):
+    joints = setup.joints
+    if not has_constraints(joints) or not len(trajectory.time):
         return None
     errors = joint_errors(trajectory, setup)
     largest: FloatArray = np.where(np.isnan(errors), -1.0, errors).max(axis=0)
     if not (largest >= 0.0).any():
         return None
-    relative = largest / joint_scales(links, setup.bodies)
+    relative = largest / joint_scales(joints, setup.bodies)
     worst = int(relative.argmax())
-    unit = "rad" if links.kind[worst] in ANGLE_KINDS else "m"
-    return JointError(float(relative[worst]), links.names[worst], float(largest[worst]), unit)
+    unit = "rad" if joints.kind[worst] in ANGLE_KINDS else "m"
+    return JointError(float(relative[worst]), joints.names[worst], float(largest[worst]), unit)
 
 
-def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
+def joint_scales(joints: JointArrays, bodies: Bodies) -> FloatArray:
     """Return the scale of the error of each joint, (J,): a length in m, or 1 rad.
 
     It is the first of these lengths that is not `NEGLIGIBLE` against the largest of them: the length of the rod or
     rope, or the bound of the slide; the diameter of the smaller body, and of the larger one; the longer arm of the
     anchors. A body that cannot move does not count beside one that can: a static body may be a point.
     """
-    length = np.where(np.isin(links.kind, (JointKind.ROD, JointKind.PULLEY)), links.figures[:, 0], 0.0)
-    length = np.where(links.kind == JointKind.SLIDE, links.figures[:, 1], length)
-    ends = np.column_stack((links.a, links.b))
-    arms = np.hypot(*np.stack((links.anchor_a, links.anchor_b)).transpose(2, 1, 0))
+    length = np.where(np.isin(joints.kind, (JointKind.ROD, JointKind.PULLEY)), joints.figures[:, 0], 0.0)
+    length = np.where(joints.kind == JointKind.SLIDE, joints.figures[:, 1], length)
+    ends = np.column_stack((joints.a, joints.b))
+    arms = np.hypot(*np.stack((joints.anchor_a, joints.anchor_b)).transpose(2, 1, 0))
     counts = (ends >= 0) & ~bodies.immovable[ends]
     counts |= (ends >= 0) & ~counts.any(axis=1, keepdims=True)
     diameter = 2.0 * bodies.radius[ends]
@@ -277,7 +280,7 @@ def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
     large, arm = (np.where(counts, each, 0.0).max(axis=1) for each in (diameter, arms))
     candidates = np.column_stack((length, small, large, arm))
     first = (candidates > NEGLIGIBLE * candidates.max(axis=1, keepdims=True)).argmax(axis=1)
-    turning = np.isin(links.kind, ANGLE_KINDS)
+    turning = np.isin(joints.kind, ANGLE_KINDS)
     return np.asarray(np.where(turning, 1.0, candidates[np.arange(len(first)), first]))
 
 
@@ -285,34 +288,34 @@ NEGLIGIBLE = 1e-3
 """Fraction of the largest length of a joint and its bodies below which a length is no scale of an error."""
 
 
-def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
-    x, y, _ = links.figures.T
+def _errors(joints: JointArrays, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
+    x, y, _ = joints.figures.T
     # The distances of a diverged state are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
-        first, second = links.ends(position, angle)
+        first, second = joints.ends(position, angle)
         apart = np.hypot(*np.moveaxis(second - first, 2, 0))
-        to_first = np.hypot(*np.moveaxis(first - links.wheels[:, :2], 2, 0))
-        to_second = np.hypot(*np.moveaxis(second - links.wheels[:, 2:], 2, 0))
-        angle_a, angle_b = turned_by(links, angle)
+        to_first = np.hypot(*np.moveaxis(first - joints.wheels[:, :2], 2, 0))
+        to_second = np.hypot(*np.moveaxis(second - joints.wheels[:, 2:], 2, 0))
+        angle_a, angle_b = turned_by(joints, angle)
         by_kind = {
             JointKind.ROD: np.abs(apart - x),
             JointKind.PIVOT: apart,
             JointKind.SLIDE: np.maximum(x - apart, apart - y),
-            JointKind.GROOVE: _from_groove(links, position, angle, second),
+            JointKind.GROOVE: _from_groove(joints, position, angle, second),
             JointKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
             JointKind.GEAR: np.abs(angle_b * y - angle_a - x),
             JointKind.PULLEY: to_first + y * to_second - x,
         }
     found = np.full(present.shape, np.nan)
     for kind, error in by_kind.items():
-        found = np.where(links.kind == kind, np.maximum(np.where(np.isnan(error), math.inf, error), 0.0), found)
-    return np.where(present & ~links.is_limited, found, np.nan)
+        found = np.where(joints.kind == kind, np.maximum(np.where(np.isnan(error), math.inf, error), 0.0), found)
+    return np.where(present & ~joints.is_limited, found, np.nan)
 
 
-def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
+def _from_groove(joints: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
     """Return the distance of points (T, J, 2) from the grooves of their joints, (T, J) m."""
-    start, _ = links.ends(position, angle)
-    rotation, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a
+    start, _ = joints.ends(position, angle)
+    rotation, along = np.where(joints.a >= 0, angle[:, joints.a], 0.0), joints.figures[:, :2] - joints.anchor_a
     line = rotate_points(along, rotation)
     squared = (along * along).sum(axis=1)
     offset = point - start

@@ -57,8 +57,8 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
     if not able.any():
         return None
     touching = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * amount))
-    links = setup.links.of(*CONSTRAINT_KINDS)
-    joined = [edge for edge in zip(links.a.tolist(), links.b.tolist(), strict=True) if edge[0] >= 0]
+    joints = setup.joints.of(*CONSTRAINT_KINDS)
+    joined = [edge for edge in zip(joints.a.tolist(), joints.b.tolist(), strict=True) if edge[0] >= 0]
     normals: dict[int, list[FloatArray]] = {}
     for edge, normal in touching:
         for number in edge:

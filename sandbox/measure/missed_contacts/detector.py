@@ -73,7 +73,7 @@ class Audit:
         scene = setup.scene
         self._scene = scene
         self._static_geometry = _static_geometry(setup)
-        self._apart = setup.links.apart()
+        self._apart = setup.joints.apart()
         self._kinematic = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []

@@ -46,7 +46,7 @@ def initial_contacts(scene: Scene) -> InitialContacts:
     bodies = scene.bodies
     colliding = np.flatnonzero(collide_with_all(bodies) & (bodies.core >= 0.0))
     found: list[tuple[int, int, float]] = []
-    apart = {(a, b) for a, b in scene.links.apart().tolist()}
+    apart = {(a, b) for a, b in scene.joint_arrays.apart().tolist()}
     if len(colliding) < 2 or bodies.round[colliding].all():
         return InitialContacts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
     examined, filters = 0, filter_table(scene, bodies)
@@ -128,7 +128,7 @@ def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
     """Return the number of overlapping pairs of moving balls that can collide, and the deepest of them."""
     bodies, filters = scene.bodies, filter_table(scene, scene.bodies)
     balls = np.flatnonzero(collide_with_all(bodies) & matrix.touches & ~bodies.fixed & bodies.round)
-    first, second = scene.links.apart().T
+    first, second = scene.joint_arrays.apart().T
     joined = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
     count, deepest, examined = 0, (0.0, "", ""), 0
     for i, j in near_pairs(bodies.position[balls], 2.0 * float(bodies.radius[balls].max(initial=0.0))):

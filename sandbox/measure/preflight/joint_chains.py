@@ -48,17 +48,17 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     """
     if settings.joints not in (None, "impulses"):
         return
-    links = scene.links.some(~scene.links.is_limited).of(*IMPULSE_KINDS)
-    if len(links) < 2:
+    joints = scene.joint_arrays.some(~scene.joint_arrays.is_limited).of(*IMPULSE_KINDS)
+    if len(joints) < 2:
         return
     bodies, available = scene.bodies, settings.iterations / settings.h
     solver_bias = BIAS if settings.bias is None else settings.bias
     free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
-    a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
+    a, b = np.where(joints.a >= 0, free[joints.a], -1), free[joints.b]
     group_of = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
     for group in np.unique(group_of).tolist():
         members = np.flatnonzero(group_of == group)
-        some = links.some(members)
+        some = joints.some(members)
         bias = float(np.where(np.isnan(some.bias), solver_bias, some.bias).min())  # of the fastest correction
         rate = (1.0 - bias**settings.h) / settings.h
         inverse = np.where(bodies.immovable, 0.0, 1.0 / bodies.mass)
@@ -112,21 +112,23 @@ def _safe_substep(needed: float, settings: Settings, bias: float) -> float:
     return math.log1p(-settings.iterations / most) / math.log(bias)
 
 
-def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:
+def least_eigenvalue(joints: JointArrays, inverse_mass: FloatArray) -> float:
     """Return λ, the smallest eigenvalue but 0 of the matrix of connected joints, its diagonal scaled to 1.
 
     The joints are assumed to lie in one line, the critical case: one joint is then one row, with 1/m at its bodies and
     −1/m towards the adjacent joints. M^−½ Jᵀ D⁻¹ J M^−½ has the same eigenvalues, and allows redundant joints.
 
     Args:
-        links: joints of one group.
+        joints: those of one group.
         inverse_mass: (N,) 1/kg; 0 for static bodies.
     """
-    known, index = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
+    known, index = np.unique(
+        np.concatenate((np.where(joints.a >= 0, joints.a, joints.b), joints.b)), return_inverse=True
+    )
     index = index.reshape(-1)
-    first, second = index[: len(links)], index[len(links) :]
+    first, second = index[: len(joints)], index[len(joints) :]
     root = np.sqrt(inverse_mass[known])
-    on_a, on_b = -root[first] * (links.a >= 0), root[second]
+    on_a, on_b = -root[first] * (joints.a >= 0), root[second]
     diagonal = on_a**2 + on_b**2
 
     def product(vector: FloatArray) -> FloatArray:
@@ -158,10 +160,10 @@ def _restricted(product: Product, moving: IntArray, count: int) -> Product:
     return inner
 
 
-def _most_unequal(links: JointArrays, inverse_mass: FloatArray) -> tuple[int, float]:
+def _most_unequal(joints: JointArrays, inverse_mass: FloatArray) -> tuple[int, float]:
     """Return the index of the joint between the most unequal moving masses, and their ratio."""
-    first = np.where(links.a >= 0, inverse_mass[links.a], 0.0)
-    second = inverse_mass[links.b]
+    first = np.where(joints.a >= 0, inverse_mass[joints.a], 0.0)
+    second = inverse_mass[joints.b]
     both = (first > 0.0) & (second > 0.0)
     ratio = np.where(both, np.maximum(first, second) / np.where(both, np.minimum(first, second), 1.0), 1.0)
     k = int(ratio.argmax())
@@ -182,18 +184,18 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     pull = math.hypot(*scene.world.gravity)
     if settings.joints not in ("relaxation", "xpbd", "rattle") or pull == 0.0:
         return
-    links, depth = scene.links.of(JointKind.ROD), 0
-    if not len(links):
+    joints, depth = scene.joint_arrays.of(JointKind.ROD), 0
+    if not len(joints):
         return
     is_static = np.append(scene.bodies.immovable, True)  # the world is −1, the last
     reached = is_static.copy()
     while True:  # one joint farther from the static bodies each time
-        next_joints = reached[links.a] ^ reached[links.b]
+        next_joints = reached[joints.a] ^ reached[joints.b]
         if not next_joints.any():
             break
         depth += 1
-        reached[links.a[next_joints]] = reached[links.b[next_joints]] = True
-    length = float(links.figures[:, 0].min())
+        reached[joints.a[next_joints]] = reached[joints.b[next_joints]] = True
+    length = float(joints.figures[:, 0].min())
     fraction = (
         STRETCH_COEFFICIENT * depth * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
     )
@@ -201,11 +203,11 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         excess = fraction / MAX_STRETCH
         iterations, dt = math.ceil(settings.iterations * excess), settings.dt / math.sqrt(excess)
         message = (
-            f"a chain with {links.names[0]!r} hangs {depth:,} joints deep; {settings.joints} with "
+            f"a chain with {joints.names[0]!r} hangs {depth:,} joints deep; {settings.joints} with "
             f"{settings.iterations} iterations every {settings.h:.3g} s stretches it by {fraction:.2g} of a joint's "
             f"length; solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
         )
-        details: Details = {"joints": depth, "joint": links.names[0], "share": fraction, "safe_dt": dt}
+        details: Details = {"joints": depth, "joint": joints.names[0], "share": fraction, "safe_dt": dt}
         yield Diagnostic("chain", message, details)
 
 
@@ -230,20 +232,20 @@ def joint_start_warnings(scene: Scene) -> Iterator[Diagnostic]:
     Anchors count as swapped if a joint with one body holds it at a point far outside of it while the other anchor would
     be within the body; not so for a pivot that starts satisfied, since the other order would violate it.
     """
-    links = scene.links
-    if not len(links):
+    joints = scene.joint_arrays
+    if not len(joints):
         return
     errors = starting_errors(scene)
-    fractions = np.nan_to_num(errors / joint_scales(links, scene.bodies))
-    swapped = _swapped(scene, links) & ~((links.kind == JointKind.PIVOT) & (fractions <= MAX_START_ERROR))
+    fractions = np.nan_to_num(errors / joint_scales(joints, scene.bodies))
+    swapped = _swapped(scene, joints) & ~((joints.kind == JointKind.PIVOT) & (fractions <= MAX_START_ERROR))
     violated = (fractions > MAX_START_ERROR) & ~swapped
     if violated.any():
         worst = int(np.argmax(np.where(violated, fractions, 0.0)))
-        yield _start_warning(links, worst, float(errors[worst]), int(violated.sum()) - 1)
+        yield _start_warning(joints, worst, float(errors[worst]), int(violated.sum()) - 1)
     if swapped.any():
         k, others = int(np.argmax(swapped)), int(swapped.sum()) - 1
-        name, body = links.names[k], scene.bodies.names[int(links.b[k])]
-        x, y = links.anchor_b[k].tolist()
+        name, body = joints.names[k], scene.bodies.names[int(joints.b[k])]
+        x, y = joints.anchor_b[k].tolist()
         message = (
             f"the joint {name!r} is attached to {body!r} at ({x:g}, {y:g}), outside the body and "
             f"{np.hypot(x, y):.3g} m from its centre: {ANCHOR_ORDER}; swapped, they would fit{_and_others(others)}"
@@ -251,9 +253,9 @@ def joint_start_warnings(scene: Scene) -> Iterator[Diagnostic]:
         yield Diagnostic("anchors", message, {"joint": name, "body": body, "others": others})
 
 
-def _start_warning(links: JointArrays, k: int, error: float, others: int) -> Diagnostic:
+def _start_warning(joints: JointArrays, k: int, error: float, others: int) -> Diagnostic:
     """Return the diagnostic of a joint that starts with an error, m or rad."""
-    unit, name = "rad" if links.kind[k] in ANGLE_KINDS else "m", links.names[k]
+    unit, name = "rad" if joints.kind[k] in ANGLE_KINDS else "m", joints.names[k]
     message = (
         f"the joint {name!r} starts with an error of {error:.3g} {unit}{_and_others(others)}; "
         "the first steps correct it, which adds energy"
@@ -266,10 +268,10 @@ def _and_others(count: int) -> str:
     return f" (and {count:,} other{'s' if count > 1 else ''})" if count else ""
 
 
-def _swapped(scene: Scene, links: JointArrays) -> BoolArray:
+def _swapped(scene: Scene, joints: JointArrays) -> BoolArray:
     """Return which joints of one body with the world have anchors that would fit in the other order, (J,)."""
-    radius = scene.bodies.radius[links.b]
-    own_distance, other_distance = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)
-    stated = np.arange(len(links)) < len(scene.joints)
-    applies = stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED_KINDS)
+    radius = scene.bodies.radius[joints.b]
+    own_distance, other_distance = np.hypot(*joints.anchor_b.T), np.hypot(*joints.anchor_a.T)
+    stated = np.arange(len(joints)) < len(scene.joints)
+    applies = stated & (joints.a == WORLD) & np.isin(joints.kind, ANCHORED_KINDS)
     return np.asarray(applies & (own_distance > FAR_ANCHOR_RADII * radius) & (other_distance <= radius))

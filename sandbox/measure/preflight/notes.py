@@ -211,9 +211,9 @@ def _pymunk_dampers(scene: Scene) -> Iterator[Diagnostic]:
     It damps the spin as if the body turned about its centre of mass, and the pivot then adds to it. Measured: a rod of
     1 m on a hinge at its end, c·h/I from 0.009 to 0.6: the error at 0.5 s is 0.6 rad times c·h/I.
     """
-    bodies, links = scene.bodies, scene.links
-    springs = links.of(JointKind.ROTARY_SPRING)
-    pivots = links.of(JointKind.PIVOT)
+    bodies, joints = scene.bodies, scene.joint_arrays
+    springs = joints.of(JointKind.ROTARY_SPRING)
+    pivots = joints.of(JointKind.PIVOT)
     held = np.zeros(len(bodies), np.bool_)
     held[pivots.b[np.hypot(*pivots.anchor_b.T) > 0.0]] = True
     held[pivots.a[(pivots.a >= 0) & (np.hypot(*pivots.anchor_a.T) > 0.0)]] = True

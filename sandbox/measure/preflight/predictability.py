@@ -173,7 +173,13 @@ def lyapunov_time(scene: Scene) -> float | None:
     bodies, world, matrix = scene.bodies, scene.world, contact_matrix(scene)
     movers = matrix.touches & ~bodies.immovable
     count = int(movers.sum())
-    if not matrix.mutual or count < MIN_GAS_BALLS or not bodies.round.all() or len(scene.links) or scene.attractions:
+    if (
+        not matrix.mutual
+        or count < MIN_GAS_BALLS
+        or not bodies.round.all()
+        or len(scene.joint_arrays)
+        or scene.attractions
+    ):
         return None
     if any(world.gravity) or demands(scene) & AIR or bodies.kinematic.any():
         return None

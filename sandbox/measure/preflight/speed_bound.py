@@ -30,16 +30,16 @@ def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
     From each anchor in the world or on a static body, the reach is the sum of the rods, the slides at their longest,
     and the paths through the bodies between their joints.
     """
-    bodies, links = scene.bodies, scene.links
-    links = links.some(~links.is_limited).of(JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE)
-    length = np.where(links.kind == JointKind.ROD, links.figures[:, 0], 0.0)
-    length = np.where(links.kind == JointKind.SLIDE, links.figures[:, 1], length)
-    arm_a, arm_b = (np.hypot(*each.T) for each in (links.anchor_a, links.anchor_b))
+    bodies, joints = scene.bodies, scene.joint_arrays
+    joints = joints.some(~joints.is_limited).of(JointKind.ROD, JointKind.PIVOT, JointKind.SLIDE)
+    length = np.where(joints.kind == JointKind.ROD, joints.figures[:, 0], 0.0)
+    length = np.where(joints.kind == JointKind.SLIDE, joints.figures[:, 1], length)
+    arm_a, arm_b = (np.hypot(*each.T) for each in (joints.anchor_a, joints.anchor_b))
     is_static = np.append(bodies.fixed, True)  # the world is −1, the last
     paths: Paths = [[] for _ in range(len(bodies))]
     begin: list[tuple[int, float, FloatArray]] = []
-    first, second = links.ends(bodies.position, bodies.angle)
-    for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
+    first, second = joints.ends(bodies.position, bodies.angle)
+    for k, (a, b) in enumerate(zip(joints.a.tolist(), joints.b.tolist(), strict=True)):
         if is_static[a] and not is_static[b]:
             begin.append((b, float(length[k] + arm_b[k]), first[k]))
         elif a != WORLD and is_static[b] and not is_static[a]:
@@ -108,7 +108,7 @@ class SpeedBounds:
             found.append("kinematic bodies")
         if self.matrix.moving_surfaces:
             found.append("moving surfaces")
-        if len(scene.links.of(JointKind.MOTOR)):
+        if len(scene.joint_arrays.of(JointKind.MOTOR)):
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")
@@ -131,7 +131,7 @@ class SpeedBounds:
         """(N,) m²/s², square of the speed at the start, with the energy of springs and attraction."""
         scene, bodies = self.scene, self.scene.bodies
         squared = np.square(self.start)
-        springs = scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
+        springs = scene.joint_arrays.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
         if len(springs):
             present = np.ones((1, len(bodies)), np.bool_)
             stored = Potential(scene, bodies).of_springs(
@@ -185,7 +185,7 @@ class SpeedBounds:
                 if float(normal @ self.down) < -1.0 + 1e-12:
                     drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
                     speed = np.where(~self.matrix.touches, speed, np.minimum(speed, self._speed_after(drop)))
-            if len(scene.links) or not bodies.round.all():
+            if len(scene.joint_arrays) or not bodies.round.all():
                 speed = np.minimum(speed, self._speed_after(np.maximum(self._max_fall(), 0.0)))
         return np.where(bodies.kinematic, self.start, self._with_thrust_and_wind(speed))
 
@@ -213,7 +213,7 @@ class SpeedBounds:
         If nothing else can deflect the body, only the component across the plane counts.
         """
         scene, bodies = self.scene, self.scene.bodies
-        others = len(scene.links) or self.matrix.mutual or scene.attractions or scene.thrusts or scene.drives
+        others = len(scene.joint_arrays) or self.matrix.mutual or scene.attractions or scene.thrusts or scene.drives
         if len(scene.fixed) > 1 or others or any(scene.world.wind):
             return self.own
         normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
@@ -296,7 +296,7 @@ class SpeedBounds:
     def _with_thrust_and_wind(self, speed: FloatArray) -> FloatArray:
         """Return speeds with the contributions of thrusts and wind; 0 for static bodies."""
         world, bodies = self.scene.world, self.scene.bodies
-        if (world.has_drag or world.has_damping) and not len(self.scene.links) and not self.scene.attractions:
+        if (world.has_drag or world.has_damping) and not len(self.scene.joint_arrays) and not self.scene.attractions:
             speed = np.minimum(speed, np.maximum(self.start, self._terminal))
         speed = speed + Air.of(world, bodies).speed_by_wind
         speed = speed + self.thrust

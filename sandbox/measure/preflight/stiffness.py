@@ -209,18 +209,18 @@ def fastest_modes(setup: Setup) -> tuple[SpringMode, ...]:
     l₀/l). Other joints are left out: they only add mass, so that the modes are slower than stated.
     """
     bodies = setup.scene.bodies
-    links = setup.scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
-    if not len(links):
+    joints = setup.scene.joint_arrays.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
+    if not len(joints):
         return ()
     free = np.where(bodies.immovable, -1, np.arange(len(bodies)))
-    a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
+    a, b = np.where(joints.a >= 0, free[joints.a], -1), free[joints.b]
     label = connected_groups(a, b, len(bodies))
     group_of = label[np.where(b >= 0, b, a)]
     inverse = np.where(bodies.immovable, 0.0, 1.0) / np.column_stack((bodies.mass, bodies.mass, bodies.moment)).T
     root = np.sqrt(inverse.T)
     found = []
     for group in np.unique(group_of).tolist():
-        members = links.some(np.flatnonzero(group_of == group))
+        members = joints.some(np.flatnonzero(group_of == group))
         rows, stiff, damping = _rows(members, bodies.position, bodies.angle)
         omega = math.sqrt(_largest(members, rows, stiff, root))
         rate = _largest(members, rows, damping, root) if damping.any() else 0.0
@@ -231,12 +231,14 @@ def fastest_modes(setup: Setup) -> tuple[SpringMode, ...]:
     return tuple(found)
 
 
-def _largest(links: JointArrays, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:
+def _largest(joints: JointArrays, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:
     """Return the largest eigenvalue of M⁻¹·Jᵀ·W·J of one group; `root` (N, 3) is M^−½."""
-    known, index = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
+    known, index = np.unique(
+        np.concatenate((np.where(joints.a >= 0, joints.a, joints.b), joints.b)), return_inverse=True
+    )
     index = index.reshape(-1)
-    first, second = np.tile(index[: len(links)], 3), np.tile(index[len(links) :], 3)
-    has_a = np.tile(links.a >= 0, 3)[:, None]
+    first, second = np.tile(index[: len(joints)], 3), np.tile(index[len(joints) :], 3)
+    has_a = np.tile(joints.a >= 0, 3)[:, None]
     # Each row's gradient in coordinates in which all masses are 1.
     on_a, on_b = rows[:, :3] * root[known[first]] * has_a, rows[:, 3:] * root[known[second]]
     size = 3 * len(known)
@@ -257,26 +259,26 @@ def _gathered(first: IntArray, on_a: FloatArray, second: IntArray, on_b: FloatAr
     return total.reshape(-1)
 
 
-def _rows(links: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _rows(joints: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the strains of each spring by the coordinates of both bodies, (3J, 6), and k and c, (3J,).
 
     The strains are along the spring, across it and about it; the coordinates are x, y and angle.
     """
-    first, second = links.ends(position, angle)
-    arm_a = np.where((links.a >= 0)[:, None], first - position[links.a], 0.0)
-    arm_b = second - position[links.b]
+    first, second = joints.ends(position, angle)
+    arm_a = np.where((joints.a >= 0)[:, None], first - position[joints.a], 0.0)
+    arm_b = second - position[joints.b]
     line = second - first
     length = np.hypot(*line.T)
     unit = np.where(length[:, None] > 0.0, line / np.where(length > 0.0, length, 1.0)[:, None], (1.0, 0.0))
     across = np.column_stack((-unit[:, 1], unit[:, 0]))
-    straight = links.kind == JointKind.SPRING
-    rest, stiffness, damping = links.figures.T
+    straight = joints.kind == JointKind.SPRING
+    rest, stiffness, damping = joints.figures.T
     taut = np.clip(1.0 - rest / np.where(length > 0.0, length, np.inf), 0.0, 1.0)
     taut = np.where((length == 0.0) & (rest == 0.0), 1.0, taut)  # a spring of length 0 is isotropic
     rows = [np.column_stack((-n, -_cross(arm_a, n), n, _cross(arm_b, n))) * straight[:, None] for n in (unit, across)]
-    rows.append(np.tile((0.0, 0.0, -1.0, 0.0, 0.0, 1.0), (len(links), 1)) * ~straight[:, None])
+    rows.append(np.tile((0.0, 0.0, -1.0, 0.0, 0.0, 1.0), (len(joints), 1)) * ~straight[:, None])
     stiff = np.concatenate((stiffness * straight, stiffness * taut * straight, stiffness * ~straight))
-    damped = np.concatenate((damping * straight, np.zeros(len(links)), damping * ~straight))
+    damped = np.concatenate((damping * straight, np.zeros(len(joints)), damping * ~straight))
     return np.concatenate(rows), stiff, damped
 
 

@@ -217,7 +217,7 @@ class TrialRun:
         run, bodies = self.run, self.scene.bodies
         if not any(self.scene.world.gravity) or bodies.round.all() or (bodies.velocity[~bodies.fixed] != 0.0).any():
             return
-        if len(self.scene.links) or self.scene.thrusts or self.scene.drives or self.scene.attractions:
+        if len(self.scene.joint_arrays) or self.scene.thrusts or self.scene.drives or self.scene.attractions:
             return
         if bodies.kinematic.any():
             return
@@ -243,7 +243,7 @@ class TrialRun:
     def _energy_gains(self) -> Iterator[Diagnostic]:
         gain = energy_gain(self.run, self.scene)
         if gain > MAX_ENERGY_GAIN:
-            springs = len(self.scene.links.of(JointKind.SPRING, JointKind.ROTARY_SPRING)) > 0
+            springs = len(self.scene.joint_arrays.of(JointKind.SPRING, JointKind.ROTARY_SPRING)) > 0
             message = f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.description}"
             message += self._by_impacts()
             yield Diagnostic("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})

@@ -223,7 +223,7 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     only_two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
     closing = unstruck[:, None] + unstruck
     has_forces = scene.attractions or scene.thrusts or is_driven(scene, bodies).any()
-    if only_two and not len(scene.links) and not has_forces:
+    if only_two and not len(scene.joint_arrays) and not has_forces:
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
     meets = filter_table(scene, bodies).meets(number[:, None], number)

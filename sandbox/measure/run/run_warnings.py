@@ -59,7 +59,7 @@ def joint_order_limit(scene: Scene, joints: str) -> JointOrder | None:
         scene: the scene.
         joints: method, as `solver.joints`.
     """
-    if not len(scene.links.of(*CONSTRAINT_KINDS)):
+    if not len(scene.joint_arrays.of(*CONSTRAINT_KINDS)):
         return None
     order = 2 if joints == "rattle" else 1
     remedy = "" if order == 2 else '; solver.joints = "rattle" gives order 2'
@@ -82,7 +82,7 @@ def _may_gain(run: Trajectory, scene: Scene) -> bool:
 
 
 def _remedy(info: Mapping[str, Any], scene: Scene) -> str:
-    oscillates = len(scene.links) > 0 or bool(scene.attractions)
+    oscillates = len(scene.joint_arrays) > 0 or bool(scene.attractions)
     if info["engine"] == "reference" and info["settings"]["integrator"] == "explicit_euler" and oscillates:
         return "; explicit Euler gains energy in every oscillation: use solver.integrator = 'semi_implicit_euler'"
     return "; use a smaller dt or more substeps"

@@ -169,7 +169,7 @@ def _recorded_run(
     retired = np.full(len(bodies), np.nan)
     for number, time in simulation.retired.items():
         retired[number] = time
-    broken = np.full(len(setup.links), np.nan)
+    broken = np.full(len(setup.joints), np.nan)
     broken[list(simulation.broken)] = list(simulation.broken.values())
     missed_time, missed_pair = audit.missed if audit else (None, None)
     trajectory = Trajectory.from_frames(
@@ -213,7 +213,7 @@ def run_without_frames(
     info = _info(scene, engine, settings, actions, **outcome)
     shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
     frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
-    unbroken = np.full(len(setup.links), np.nan)
+    unbroken = np.full(len(setup.joints), np.nan)
     return Trajectory.from_frames(
         frames, setup.bodies.names, Contacts.none(), np.full(count, np.nan), info, broken_time=unbroken
     )

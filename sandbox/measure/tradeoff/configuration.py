@@ -223,7 +223,7 @@ class SearchSpace:
     def _option_neighbours(self, configuration: Configuration) -> Iterator[Configuration]:
         resolved = self.resolved(configuration)
         for key, values in OPTIONS.items():
-            if key == "joints" and not len(self.scene.links):
+            if key == "joints" and not len(self.scene.joint_arrays):
                 continue
             if key in ("detection", "response", "continuous") and not self.has_contacts:
                 continue
@@ -246,7 +246,7 @@ class SearchSpace:
     def has_coupling(self) -> bool:
         """Whether solver iterations can matter: contacts or joints can depend on each other."""
         matrix = contact_matrix(self.scene)
-        return bool(len(self.scene.links)) or (
+        return bool(len(self.scene.joint_arrays)) or (
             self.has_contacts and (matrix.mutual or len(self.scene.fixed) > 1 or matrix.solids)
         )
 

@@ -121,7 +121,7 @@ def times_of_leaving(scene: Scene, run: Trajectory, down: FloatArray) -> FloatAr
         lowest = max([*depths, float(carrying.max(initial=-np.inf))])
         is_below = depth - bodies.radius > lowest
     able = ~bodies.immovable
-    able[np.concatenate((scene.links.a[scene.links.a >= 0], scene.links.b))] = False
+    able[np.concatenate((scene.joint_arrays.a[scene.joint_arrays.a >= 0], scene.joint_arrays.b))] = False
     # The last frame above decides: a body may be thrown up again from below, as by a thrust.
     above = len(run.time) - (~is_below)[::-1].argmax(axis=0)
     above = np.where(is_below.all(axis=0), 0, above)
@@ -267,7 +267,7 @@ def joints(run: Trajectory, context: EvaluationContext) -> float | None:
 
 def joint_distance(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the largest constraint violation of any joint that is a length, m; None without such joints."""
-    errors = joint_errors(run, context.scene)[:, ~np.isin(context.scene.links.kind, ANGLE_KINDS)]
+    errors = joint_errors(run, context.scene)[:, ~np.isin(context.scene.joint_arrays.kind, ANGLE_KINDS)]
     known = errors[~np.isnan(errors)]
     return float(known.max()) if len(known) else None
 

@@ -102,7 +102,7 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
         doubt = f"no truth is known{f' ({context.doubt})' if context.doubt else ''}"
     else:
         doubt = f"positions are predictable for {context.until:.3g} s of {duration:.4g} s only"
-    if has_constraints(scene.links):
+    if has_constraints(scene.joint_arrays):
         return METRICS["joint_error"], f"{doubt}, and the scene has joints"
     if conserves_energy(scene):
         return METRICS["energy"], f"{doubt}, and energy is conserved"

@@ -174,7 +174,7 @@ def _errors(track: Track, time: FloatArray) -> list[float | None] | None:
 
 def _breaks(run: Trajectory, scene: Scene) -> Mapping[str, float]:
     """Return the times at which joints broke, s, by the numbers of the joints."""
-    times = run.breaks(len(scene.links)).tolist()
+    times = run.breaks(len(scene.joint_arrays)).tolist()
     return {str(k): float(f"{time:.6g}") for k, time in enumerate(times) if time < math.inf}
 
 

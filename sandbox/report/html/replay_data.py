@@ -182,14 +182,14 @@ def _static_bounds(scene: Scene) -> Iterator[FloatArray]:
             yield np.asarray(thing.position) + thing.radius * SIDES
         else:
             assert isinstance(thing, Plane)  # unbounded; `viewport` treats it separately
-    bodies, links = scene.bodies, scene.links
+    bodies, joints = scene.bodies, scene.joint_arrays
     for number in np.flatnonzero(bodies.fixed).tolist():
         yield bodies.position[number] + bodies.radius[number] * SIDES
     for each in scene.attractions:
         if not isinstance(each.toward, str):
             yield np.asarray((each.toward, each.toward))
-    anchors = links.anchor_a[(links.a < 0) & np.isin(links.kind, ANCHORED)]
-    for anchor in (*anchors, *links.wheels[links.kind == JointKind.PULLEY].reshape(-1, 2)):
+    anchors = joints.anchor_a[(joints.a < 0) & np.isin(joints.kind, ANCHORED)]
+    for anchor in (*anchors, *joints.wheels[joints.kind == JointKind.PULLEY].reshape(-1, 2)):
         yield np.asarray((anchor, anchor))
 
 
@@ -269,18 +269,18 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
     those drawn, −1 the world; a joint of a body that is not drawn is omitted, and one to a static body is anchored in
     the world.
     """
-    links, bodies = scene.links, scene.bodies
+    joints, bodies = scene.joint_arrays, scene.bodies
     index_of = np.full(len(bodies) + 1, -2)
     index_of[drawn] = np.arange(len(drawn))
     index_of[-1] = -1
     found = []
-    ends = links.ends(bodies.position, bodies.angle)
-    for k in np.flatnonzero(np.isin(links.kind, list(SYMBOLS)))[:MAX_JOINTS].tolist():
-        row: list[Any] = [int(links.number[k]), SYMBOLS[JointKind(int(links.kind[k]))]]
+    ends = joints.ends(bodies.position, bodies.angle)
+    for k in np.flatnonzero(np.isin(joints.kind, list(SYMBOLS)))[:MAX_JOINTS].tolist():
+        row: list[Any] = [int(joints.number[k]), SYMBOLS[JointKind(int(joints.kind[k]))]]
         anchors: list[float] = []
         for number, anchor, end in (
-            (links.a[k], links.anchor_a[k], ends[0][k]),
-            (links.b[k], links.anchor_b[k], ends[1][k]),
+            (joints.a[k], joints.anchor_a[k], ends[0][k]),
+            (joints.b[k], joints.anchor_b[k], ends[1][k]),
         ):
             if number < 0 or bodies.fixed[number]:
                 row.append(-1)
@@ -290,11 +290,11 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
                 anchors += [_short(value) for value in anchor.tolist()]
         if -2 in row[2:4] or row[2:4] == [-1, -1]:
             continue
-        if links.kind[k] != JointKind.PULLEY:
+        if joints.kind[k] != JointKind.PULLEY:
             found.append([*row, *anchors])
             continue
         number, symbol, a, b = row
-        wheels = links.wheels[k].tolist()
+        wheels = joints.wheels[k].tolist()
         first, second = _moved(wheels[:2], origin), _moved(wheels[2:], origin)
         found.append([number, symbol, -1, a, *first, *anchors[:2]])
         found.append([number, symbol, -1, -1, *first, *second])

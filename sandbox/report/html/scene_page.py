@@ -142,7 +142,7 @@ def _scene_figures(scene: Scene) -> dict[str, Content]:
         "posts": len(scene.posts),
         "pockets": len(scene.pockets),
         "zones": len(scene.zones),
-        "joints": len(scene.links),
+        "joints": len(scene.joint_arrays),
     }
     count = format_plural(len(scene.bodies), "body", "bodies")
     return {
@@ -189,7 +189,7 @@ def run_page(run: Trajectory, replayed: bool = True) -> Page:
 
 def _replay(run: Trajectory, scene: Scene) -> Markup:
     """Return the replay, and beside it the energy where the run has the scene's own bodies and joints."""
-    if len(run.broken_time) not in (0, len(scene.links)):
+    if len(run.broken_time) not in (0, len(scene.joint_arrays)):
         return paragraph("The run changed its joints; `sandbox replay` shows it.")
     name = str(run.info.get("engine") or "truth")
     has_own_bodies = len(run.names) == len(scene.bodies)

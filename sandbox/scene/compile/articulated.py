@@ -92,7 +92,7 @@ def rope_joints(rope: Rope) -> JointArrays:
         figures = length, rope.stiffness, rope.damping
         return JointArrays.alike(JointKind.SPRING, node[:-1], node[1:], figures=figures)
     half, plank = 0.5 * length, np.arange(count)
-    links = JointArrays.alike(JointKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
+    joints = JointArrays.alike(JointKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
     ends: tuple[tuple[RopeEnd, int, Point, int, float], ...] = (
         ("start", 0, rope.start, STARTS_AT, -half),
         ("end", count - 1, rope.end, ENDS_AT, half),
@@ -104,8 +104,8 @@ def rope_joints(rope: Rope) -> JointArrays:
             joint = JointArrays.alike(JointKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
         else:
             continue
-        links = links.joined(joint)
-    return links
+        joints = joints.joined(joint)
+    return joints
 
 
 def cloth_layout(cloth: Cloth) -> Layout:
@@ -121,16 +121,16 @@ def cloth_joints(cloth: Cloth) -> JointArrays:
     """Return the joints of a cloth by the indices of its nodes: rows, columns, diagonals, then next-but-one nodes."""
     across, down = cloth.spacing
     if cloth.kind == "rods":
-        links = _mesh(cloth, 1, 0, across).joined(_mesh(cloth, 0, 1, down))
+        joints = _mesh(cloth, 1, 0, across).joined(_mesh(cloth, 0, 1, down))
     else:
-        links = _mesh(cloth, 1, 0, across, cloth.stiffness).joined(_mesh(cloth, 0, 1, down, cloth.stiffness))
+        joints = _mesh(cloth, 1, 0, across, cloth.stiffness).joined(_mesh(cloth, 0, 1, down, cloth.stiffness))
     if cloth.shear is not None:
         for direction in (1, -1):
-            links = links.joined(_mesh(cloth, direction, 1, math.hypot(across, down), cloth.shear))
+            joints = joints.joined(_mesh(cloth, direction, 1, math.hypot(across, down), cloth.shear))
     if cloth.bend is not None:
-        links = links.joined(_mesh(cloth, 2, 0, 2.0 * across, cloth.bend))
-        links = links.joined(_mesh(cloth, 0, 2, 2.0 * down, cloth.bend))
-    return links
+        joints = joints.joined(_mesh(cloth, 2, 0, 2.0 * across, cloth.bend))
+        joints = joints.joined(_mesh(cloth, 0, 2, 2.0 * down, cloth.bend))
+    return joints
 
 
 def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float | None = None) -> JointArrays:

@@ -349,12 +349,12 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
         touching[np.ix_(fixed_surface, reaching)] = True
         turned |= able & has_friction[np.ix_(surface, fixed_surface)].any(axis=1)
 
-    links, body = setup.links, _body_of_piece(bodies)
-    turnable = _any_of(body, (turned & moving)[kinds.of_piece], len(bodies)) | links.turned(len(bodies))
+    joints, body = setup.joints, _body_of_piece(bodies)
+    turnable = _any_of(body, (turned & moving)[kinds.of_piece], len(bodies)) | joints.turned(len(bodies))
     return ContactMatrix(
         surfaces=surfaces,
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
-        held=links.held(len(bodies)),
+        held=joints.held(len(bodies)),
         can_enter_zone=_can_enter_zone(scene, bodies, filters.layers) & ~is_driven(scene, bodies),
         turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True))
         & ~bodies.fixed

@@ -245,13 +245,13 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
 
 
 def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
-    scene, links = setup.scene, setup.links
-    has_limit = np.isfinite(links.max_force) & (links.kind != JointKind.MOTOR)  # that of a motor is part of motors
+    scene, joints = setup.scene, setup.joints
+    has_limit = np.isfinite(joints.max_force) & (joints.kind != JointKind.MOTOR)  # that of a motor is part of motors
     for demand, applies in (
-        *((demand, links.kind == kind) for kind, demand in DEMAND_OF_JOINT.items()),
+        *((demand, joints.kind == kind) for kind, demand in DEMAND_OF_JOINT.items()),
         (Demand.MAX_FORCE, has_limit),
-        (Demand.MAX_BIAS, np.isfinite(links.max_bias)),
-        (Demand.JOINT_BIAS, np.isfinite(links.bias)),
+        (Demand.MAX_BIAS, np.isfinite(joints.max_bias)),
+        (Demand.JOINT_BIAS, np.isfinite(joints.bias)),
     ):
         count = int(np.count_nonzero(applies))
         yield demand, count > 0, f"{count:,}" if count else "none"

@@ -41,9 +41,9 @@ def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
 
     The bodies that ropes are tied to must exist. Joints between bodies that cannot move are omitted.
     """
-    links = JointArrays.none()
+    joint_arrays = JointArrays.none()
     if not (scene.ropes or scene.cloths or scene.ragdolls):
-        return links
+        return joint_arrays
     first, immovable = 0, np.append(is_immovable(scene, bodies), True)  # the world, −1, selects the last row
     for kind, sources in scene.kinds.items():
         for k, source in enumerate(sources):
@@ -53,8 +53,10 @@ def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
             if isinstance(source, SoftBody) and source.strength is not None:
                 joints = replace(joints, strength=np.full(len(joints), source.strength))
             stem = source.name or default_name(kind, k)
-            links = links.joined(replace(joints, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(joints) + 1))))
-    return links
+            joint_arrays = joint_arrays.joined(
+                replace(joints, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(joints) + 1)))
+            )
+    return joint_arrays
 
 
 def _joints_of(source: BodySource, first: int, bodies: Bodies) -> JointArrays:
@@ -70,29 +72,31 @@ def _joints_of(source: BodySource, first: int, bodies: Bodies) -> JointArrays:
             return JointArrays.none()
 
 
-def _with_body_indices(links: JointArrays, first: int) -> JointArrays:
+def _with_body_indices(joints: JointArrays, first: int) -> JointArrays:
     """Return joints by the indices of a scene's bodies; negative indices stand for the world or the ends of a rope."""
     return replace(
-        links, a=np.where(links.a < 0, links.a, links.a + first), b=np.where(links.b < 0, links.b, links.b + first)
+        joints,
+        a=np.where(joints.a < 0, joints.a, joints.a + first),
+        b=np.where(joints.b < 0, joints.b, joints.b + first),
     )
 
 
-def _attach_rope_ends(links: JointArrays, rope: Rope, bodies: Bodies) -> JointArrays:
+def _attach_rope_ends(joints: JointArrays, rope: Rope, bodies: Bodies) -> JointArrays:
     """Return the joints of a rope with the bodies at its ends, anchored where the ends start."""
     for end, position, placeholder in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
         name = rope.tied(end)
         if name is not None:
             number = bodies.number_of[name]
             anchor = _to_body_frame(position, number, bodies)
-            first, second = links.a == placeholder, links.b == placeholder
-            links = replace(
-                links,
-                a=np.where(first, number, links.a),
-                b=np.where(second, number, links.b),
-                anchor_a=np.where(first[:, None], anchor, links.anchor_a),
-                anchor_b=np.where(second[:, None], anchor, links.anchor_b),
+            first, second = joints.a == placeholder, joints.b == placeholder
+            joints = replace(
+                joints,
+                a=np.where(first, number, joints.a),
+                b=np.where(second, number, joints.b),
+                anchor_a=np.where(first[:, None], anchor, joints.anchor_a),
+                anchor_b=np.where(second[:, None], anchor, joints.anchor_b),
             )
-    return links
+    return joints
 
 
 def _to_body_frame(position: Point, number: int, bodies: Bodies) -> FloatArray:

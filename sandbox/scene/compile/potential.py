@@ -34,10 +34,10 @@ class Potential:
             breaks: (J,) s, time at which each joint broke, inf if it did not; default: none broke.
         """
         setup = Setup.of(start)
-        scene, links = setup.scene, setup.links
-        breaks = np.full(len(links), np.inf) if breaks is None else breaks
+        scene, joints = setup.scene, setup.joints
+        breaks = np.full(len(joints), np.inf) if breaks is None else breaks
         kinds = (JointKind.SPRING, _stretch), (JointKind.ROTARY_SPRING, _turn)
-        self._springs = [(links.of(kind), breaks[links.kind == kind], strain) for kind, strain in kinds]
+        self._springs = [(joints.of(kind), breaks[joints.kind == kind], strain) for kind, strain in kinds]
         number = {name: k for k, name in enumerate(bodies.names)} if scene.attractions else {}
         self._attractions = [
             (each, number.get(each.toward) if isinstance(each.toward, str) else None)
@@ -51,7 +51,7 @@ class Potential:
     @property
     def springs(self) -> bool:
         """Whether there are springs."""
-        return any(len(links) for links, _, _ in self._springs)
+        return any(len(joints) for joints, _, _ in self._springs)
 
     @property
     def attracts(self) -> bool:
@@ -76,14 +76,17 @@ class Potential:
     def of_springs(self, time: FloatArray, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
         """Return the energy of springs in each of T frames, (T,) J; arguments as in `at`."""
         stored = np.zeros(len(position))
-        for links, breaks, strain in self._springs:
-            if len(links):
-                stiffness, stretch = links.figures[:, 1], np.abs(strain(links, position, angle) - links.figures[:, 0])
+        for joints, breaks, strain in self._springs:
+            if len(joints):
+                stiffness, stretch = (
+                    joints.figures[:, 1],
+                    np.abs(strain(joints, position, angle) - joints.figures[:, 0]),
+                )
                 energy = 0.5 * stiffness * np.square(stretch)
-                excess = np.maximum(stretch - links.max_force / stiffness, 0.0)
+                excess = np.maximum(stretch - joints.max_force / stiffness, 0.0)
                 energy -= 0.5 * stiffness * np.square(excess)
-                holds = both_present(links, present) & ~is_broken_at(breaks, time)
-                stored += np.where(holds, energy, 0.0) @ self._fraction(links.a, links.b)
+                holds = both_present(joints, present) & ~is_broken_at(breaks, time)
+                stored += np.where(holds, energy, 0.0) @ self._fraction(joints.a, joints.b)
         return stored
 
     def of_attraction(self, position: FloatArray, present: BoolArray) -> FloatArray:
@@ -124,9 +127,9 @@ class Potential:
         return np.asarray(counted / np.maximum(first.astype(np.float64) + second, 1.0))
 
 
-def both_present(links: JointArrays, present: BoolArray) -> BoolArray:
+def both_present(joints: JointArrays, present: BoolArray) -> BoolArray:
     """Return which joints still have both bodies, (T, J), from the presence of bodies, (T, N)."""
-    return np.asarray(present[:, links.b] & (present[:, links.a] | (links.a < 0)))
+    return np.asarray(present[:, joints.b] & (present[:, joints.a] | (joints.a < 0)))
 
 
 def is_broken_at(breaks: FloatArray, time: FloatArray) -> BoolArray:
@@ -139,16 +142,16 @@ def is_broken_at(breaks: FloatArray, time: FloatArray) -> BoolArray:
     return np.asarray(breaks * (1.0 - ROUNDING) <= time[:, None])
 
 
-def turned_by(links: JointArrays, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def turned_by(joints: JointArrays, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles of the first and second bodies of joints, (T, J) rad each; the world's is 0."""
-    return np.where(links.a >= 0, angle[:, links.a], 0.0), angle[:, links.b]
+    return np.where(joints.a >= 0, angle[:, joints.a], 0.0), angle[:, joints.b]
 
 
-def _stretch(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
-    first, second = links.ends(position, angle)
+def _stretch(joints: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
+    first, second = joints.ends(position, angle)
     return np.asarray(np.hypot(*np.moveaxis(second - first, 2, 0)))
 
 
-def _turn(links: JointArrays, _: FloatArray, angle: FloatArray) -> FloatArray:
-    first, second = turned_by(links, angle)
+def _turn(joints: JointArrays, _: FloatArray, angle: FloatArray) -> FloatArray:
+    first, second = turned_by(joints, angle)
     return np.asarray(second - first)

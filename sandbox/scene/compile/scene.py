@@ -24,7 +24,7 @@ class Scene(SceneDescription, HtmlRepr):
         return start_bodies(self)
 
     @cached_property
-    def links(self) -> "JointArrays":
+    def joint_arrays(self) -> "JointArrays":
         """Joints as arrays; they refer to the indices of `bodies`."""
         from sandbox.scene.compile.joints import compile_joints
 
@@ -63,8 +63,8 @@ class Scene(SceneDescription, HtmlRepr):
         counts += [
             _counted(len(each), kind, f"{kind}s") for kind, each in {**elements, "zone": self.zones}.items() if each
         ]
-        if len(self.links):
-            counts.append(_counted(len(self.links), "joint", "joints"))
+        if len(self.joints):
+            counts.append(_counted(len(self.joints), "joint", "joints"))
         x, y = self.world.gravity
         figures = f"gravity ({x:g}, {y:g}) m/s², duration {self.world.duration:g} s, dt {self.solver.dt:g} s"
         return f"<Scene {short_repr(self.title)}: {', '.join(counts)}\n  {figures}>"

@@ -23,10 +23,10 @@ class Setup:
     """
 
     scene: Scene
-    """the scene; its `bodies` and `links` are those at its start"""
+    """the scene; its `bodies` and `joint_arrays` are those at its start"""
     bodies: Bodies
     """the N bodies that are present, in their state at `time`"""
-    links: JointArrays
+    joints: JointArrays
     """the J unbroken joints, with indices into `bodies`"""
     drives: FloatArray
     """(D, 3) state of each drive: level, torque or pull, rate of the pull"""
@@ -48,7 +48,7 @@ class Setup:
         """Return the start state of a scene, or a setup as it is."""
         if isinstance(start, Setup):
             return start
-        setup = cls(start, start.bodies, start.links, initial_drive_states(start))
+        setup = cls(start, start.bodies, start.joint_arrays, initial_drive_states(start))
         object.__setattr__(setup, "is_start", True)
         return setup
 
@@ -71,10 +71,10 @@ class Setup:
             passing: pairs of a body and a one-way wall that it is passing.
             plane_reach: extent of half-planes.
         """
-        links = self.links.without(broken).among(bodies.names, self.bodies.names).clicked(bodies.angle)
+        joints = self.joints.without(broken).among(bodies.names, self.bodies.names).clicked(bodies.angle)
         drives = initial_drive_states(self.scene) if drives is None else drives
         return replace(
-            self, bodies=bodies, links=links, drives=drives, time=time, passing=passing, plane_reach=plane_reach
+            self, bodies=bodies, joints=joints, drives=drives, time=time, passing=passing, plane_reach=plane_reach
         )
 
     def with_scene(self, scene: Scene) -> Self:
@@ -89,17 +89,17 @@ class Setup:
         """
         spawned = self.bodies.elements[len(self.scene.elements) :]
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        return replace(self, scene=scene, bodies=bodies, links=self._links_of(scene))
+        return replace(self, scene=scene, bodies=bodies, joints=self._joints_of(scene))
 
-    def _links_of(self, scene: Scene) -> JointArrays:
+    def _joints_of(self, scene: Scene) -> JointArrays:
         """Return the joints with the values of the motors of a scene that differ from those of this one."""
         if scene.joints is self.scene.joints:
-            return self.links
-        figures, max_force = self.links.figures.copy(), self.links.max_force.copy()
+            return self.joints
+        figures, max_force = self.joints.figures.copy(), self.joints.max_force.copy()
         for index, (motor, before) in enumerate(zip(scene.joints, self.scene.joints, strict=True)):
             name = motor.name or default_name("joint", index)
-            if motor != before and isinstance(motor, Motor) and name in self.links.names:
-                row = self.links.names.index(name)
+            if motor != before and isinstance(motor, Motor) and name in self.joints.names:
+                row = self.joints.names.index(name)
                 figures[row, 0] = motor.rate
                 max_force[row] = math.inf if motor.max_torque is None else motor.max_torque
-        return replace(self.links, figures=figures, max_force=max_force)
+        return replace(self.joints, figures=figures, max_force=max_force)

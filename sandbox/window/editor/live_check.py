@@ -91,7 +91,7 @@ def check_scene(scene: Scene) -> CheckResult:
     needs = demands(scene)
     lacks = tuple((name, tuple(engine.missing(scene, scene.solver))) for name, engine in ENGINES.items())
     names = tuple(str(demand) for demand in Demand if demand in needs)
-    bodies, joints = len(scene.bodies), len(scene.links)
+    bodies, joints = len(scene.bodies), len(scene.joint_arrays)
     if bodies > MAX_CHECKED_BODIES or joints > MAX_CHECKED_JOINTS:
         note = f"{bodies:,} bodies and {joints:,} joints are too many to be checked while editing; use sandbox check"
         return CheckResult((), names, lacks, note)
@@ -138,13 +138,13 @@ def _static_element(scene: Scene, name: str) -> ElementKey | None:
 
 def _joint_elements(scene: Scene, name: str) -> list[ElementKey | None]:
     """Return the joint of a name, or the body element, such as a cloth, that has it."""
-    links = scene.links
-    if name not in links.names:
+    joints = scene.joint_arrays
+    if name not in joints.names:
         return []
-    index = links.names.index(name)
+    index = joints.names.index(name)
     if index < len(scene.joints):
         return [ElementKey("joint", index)]
-    return [element_of_body(scene, int(links.b[index]))]
+    return [element_of_body(scene, int(joints.b[index]))]
 
 
 # --- Remedies --------------------------------------------------------------------------------------------------------

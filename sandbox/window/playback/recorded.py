@@ -56,7 +56,7 @@ class RecordedRun:
         self._scenes = SceneHistory(self.scene, actions_of_run(trajectory, name))
         self._cached: Frame | None = None  # one picture needs the state of the same time several times
         try:
-            self.breaks: FloatArray = trajectory.breaks(len(self.scene.links))
+            self.breaks: FloatArray = trajectory.breaks(len(self.scene.joint_arrays))
         except ValueError as error:
             raise SceneError([Fault(name, None, "broken_time", str(error))]) from None
         try:

@@ -114,7 +114,7 @@ class Session:
         """the last part of the session that was replaced"""
         self.mark_saved()
         self._all_bodies = self.bodies
-        self._breaks = BreakTimes(len(self.scene.links))
+        self._breaks = BreakTimes(len(self.scene.joint_arrays))
         self._previous = self._frame = self.simulation.frame()
         self.history.store(0, self._frame)
 

@@ -122,9 +122,9 @@ class Snapshot:
     """setup of the running session; None if `bodies` are those of the scene or of a stored run"""
 
     @cached_property
-    def links(self) -> JointArrays:
+    def joints(self) -> JointArrays:
         """The unbroken joints."""
-        return (self.setup or self.scene).links.without(self.broken)
+        return (self.scene.joint_arrays if self.setup is None else self.setup.joints).without(self.broken)
 
 
 @dataclass(frozen=True)

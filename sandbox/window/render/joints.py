@@ -67,14 +67,14 @@ SHADES = np.asarray(
 class JointSegments:
     """The J visible joints and their anchors."""
 
-    links: JointArrays
+    joints: JointArrays
     ends: FloatArray
     """(J, 4) px: anchor on the first body or on the world, then anchor on the second body"""
 
     def of(self, *kinds: JointKind) -> "JointSegments":
         """Return the joints of the given kinds."""
-        which = np.isin(self.links.kind, kinds)
-        return JointSegments(self.links.some(which), self.ends[which])
+        which = np.isin(self.joints.kind, kinds)
+        return JointSegments(self.joints.some(which), self.ends[which])
 
     @property
     def length(self) -> FloatArray:
@@ -84,35 +84,35 @@ class JointSegments:
 
 def joint_segments(view: DrawContext) -> JointSegments:
     """Return the visible joints: unbroken, with both bodies present, and near the surface."""
-    links, frame = view.snapshot.links, view.snapshot.frame
+    joints, frame = view.snapshot.joints, view.snapshot.frame
     count = min(len(frame.position), len(view.snapshot.bodies))
-    if not len(links):
-        return JointSegments(links, np.empty((0, 4)))
+    if not len(joints):
+        return JointSegments(joints, np.empty((0, 4)))
     present = frame.present[:count]
-    has_bodies = (links.b < count) & (links.a < count)
+    has_bodies = (joints.b < count) & (joints.a < count)
     if not has_bodies.all():
-        links = links.some(has_bodies)
-    is_visible = present[links.b] & ((links.a < 0) | present[links.a])
+        joints = joints.some(has_bodies)
+    is_visible = present[joints.b] & ((joints.a < 0) | present[joints.a])
     with np.errstate(invalid="ignore", over="ignore"):
-        a, b = links.ends(frame.position, frame.angle)
+        a, b = joints.ends(frame.position, frame.angle)
         ends = np.hstack((view.camera.to_screen(a), view.camera.to_screen(b)))
         width, height = view.camera.size
         margin = 100.0 * view.ui_scale
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
-        over = links.kind == JointKind.PULLEY
-        for wheel in (links.wheels[over, :2], links.wheels[over, 2:]) if over.any() else ():
+        over = joints.kind == JointKind.PULLEY
+        for wheel in (joints.wheels[over, :2], joints.wheels[over, 2:]) if over.any() else ():
             low[over] = np.minimum(low[over], view.camera.to_screen(wheel))
             high[over] = np.maximum(high[over], view.camera.to_screen(wheel))
         is_visible &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
         is_visible &= np.isfinite(ends).all(axis=1)
         is_visible &= ~over | (np.abs(ends) < SDL_COORDINATE_LIMIT).all(axis=1)
-    return JointSegments(links if is_visible.all() else links.some(is_visible), ends[is_visible])
+    return JointSegments(joints if is_visible.all() else joints.some(is_visible), ends[is_visible])
 
 
 def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
     """Draw rods, strings and springs, and their anchors on the world."""
     fast = joints.of(JointKind.ROD, JointKind.SLIDE, JointKind.SPRING)
-    anchors = fast.ends[fast.links.a < 0, :2]
+    anchors = fast.ends[fast.joints.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(anchors), 3))
     size = np.full(len(anchors), (ANCHOR_RADIUS if len(anchors) <= SOLID_RODS else 0.5 * ANCHOR_RADIUS) * view.ui_scale)
     if len(anchors) <= MAX_HATCHED:
@@ -123,13 +123,13 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     _draw_rods(view, joints.of(JointKind.SLIDE), STRING, 1.4)
     _draw_pulleys(view, joints.of(JointKind.PULLEY), discs)
     springs = joints.of(JointKind.SPRING)
-    if not len(springs.links):
+    if not len(springs.joints):
         return
     shade = strain(springs, view.camera.scale)
-    if len(springs.links) > COILED:
+    if len(springs.joints) > COILED:
         draw_thin_lines(view.surface, springs.ends, packed_pixels(SHADES[shade], view.surface), view.antialias)
         return
-    rest = springs.links.figures[:, 0] * view.camera.scale
+    rest = springs.joints.figures[:, 0] * view.camera.scale
     for k, row in enumerate(springs.ends.tolist()):
         red, green, blue = SHADES[shade[k]].tolist()
         _draw_coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
@@ -148,11 +148,11 @@ def _draw_support(view: DrawContext, anchor: Pixel) -> None:
 
 def _draw_pulleys(view: DrawContext, pulleys: JointSegments, discs: CircleRenderer) -> None:
     """Draw ropes over two wheels each, and the wheels."""
-    if not len(pulleys.links):
+    if not len(pulleys.joints):
         return
-    wheels = [view.camera.to_screen(pulleys.links.wheels[:, side]) for side in (slice(0, 2), slice(2, 4))]
+    wheels = [view.camera.to_screen(pulleys.joints.wheels[:, side]) for side in (slice(0, 2), slice(2, 4))]
     for start, end in ((pulleys.ends[:, :2], wheels[0]), (wheels[0], wheels[1]), (wheels[1], pulleys.ends[:, 2:])):
-        _draw_rods(view, JointSegments(pulleys.links, np.hstack((start, end))), STRING, 1.4)
+        _draw_rods(view, JointSegments(pulleys.joints, np.hstack((start, end))), STRING, 1.4)
     points = np.vstack(wheels)
     points = points[view.inside(points, 10.0 * view.ui_scale)]
     for radius, colour in ((5.0, STRING), (3.4, SURFACE)):
@@ -163,7 +163,7 @@ def _draw_pulleys(view: DrawContext, pulleys: JointSegments, discs: CircleRender
 
 def strain(springs: JointSegments, scale: float) -> IntArray:
     """Return the index into `SHADES` for the strain of each spring, (J,)."""
-    rest = springs.links.figures[:, 0] * scale
+    rest = springs.joints.figures[:, 0] * scale
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         stretch = np.where(rest > 0.0, springs.length / rest - 1.0, 1.0)
         fraction = stretch / (np.abs(stretch) + HALF_COLOUR_STRAIN)
@@ -171,8 +171,8 @@ def strain(springs: JointSegments, scale: float) -> IntArray:
 
 
 def _draw_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, int], width: float) -> None:
-    if len(rods.links) > SOLID_RODS:
-        tones: ColourArray = np.broadcast_to(np.asarray(colour, np.uint8), (len(rods.links), 3))
+    if len(rods.joints) > SOLID_RODS:
+        tones: ColourArray = np.broadcast_to(np.asarray(colour, np.uint8), (len(rods.joints), 3))
         draw_thin_lines(view.surface, rods.ends, packed_pixels(tones, view.surface), view.antialias)
         return
     for ax, ay, bx, by in rods.ends.tolist():
@@ -255,21 +255,21 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
     }
     for kind in (*renderers, JointKind.SPRING, JointKind.PULLEY, JointKind.PIVOT):
         some = joints.of(kind)
-        if len(some.links) > MAX_SYMBOLS:
+        if len(some.joints) > MAX_SYMBOLS:
             tint = np.broadcast_to(
-                np.asarray(mix_colours(BACKGROUND, _TINTS[kind], 0.7), np.uint8), (len(some.links), 3)
+                np.asarray(mix_colours(BACKGROUND, _TINTS[kind], 0.7), np.uint8), (len(some.joints), 3)
             )
             if kind is JointKind.SPRING:
                 tint = SHADES[strain(some, view.camera.scale)]
             draw_thin_lines(view.surface, some.ends, packed_pixels(tint, view.surface), view.antialias)
-        elif len(some.links) and kind in renderers:
+        elif len(some.joints) and kind in renderers:
             renderers[kind](view, some)
         if (
             kind in (JointKind.ROD, JointKind.SLIDE, JointKind.SPRING, JointKind.PULLEY)
-            and 0 < len(some.links) <= MAX_SYMBOLS
+            and 0 < len(some.joints) <= MAX_SYMBOLS
         ):
             _draw_dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
-        if kind in (JointKind.PIVOT, JointKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
+        if kind in (JointKind.PIVOT, JointKind.GROOVE) and 0 < len(some.joints) <= MAX_SYMBOLS:
             _draw_rings(view, some.ends[:, 2:], _TINTS[kind], discs)
 
 
@@ -307,7 +307,7 @@ def _draw_gears(view: DrawContext, gears: JointSegments) -> None:
 def _draw_slides(view: DrawContext, slides: JointSegments) -> None:
     """Draw strings as dashed lines with a tick at each end, brighter if the string is taut."""
     scale, ui_scale = view.camera.scale, view.ui_scale
-    rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
+    rows = zip(slides.ends.tolist(), slides.joints.figures.tolist(), slides.length.tolist(), strict=True)
     for (ax, ay, bx, by), (min_length, max_length, _), length in rows:
         taut = length >= 0.998 * max_length * scale or length <= 1.002 * min_length * scale
         colour = INK if taut else SKY
@@ -320,10 +320,10 @@ def _draw_slides(view: DrawContext, slides: JointSegments) -> None:
 
 def _draw_grooves(view: DrawContext, grooves: JointSegments) -> None:
     """Draw grooves: two parallel lines with round ends."""
-    links, frame = grooves.links, view.snapshot.frame
-    angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
-    position = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
-    (x, y, _), cos, sin = links.figures.T, np.cos(angle), np.sin(angle)
+    joints, frame = grooves.joints, view.snapshot.frame
+    angle = np.where(joints.a < 0, 0.0, frame.angle[joints.a])
+    position = np.where((joints.a < 0)[:, None], 0.0, frame.position[joints.a])
+    (x, y, _), cos, sin = joints.figures.T, np.cos(angle), np.sin(angle)
     with np.errstate(invalid="ignore", over="ignore"):
         ends_b = view.camera.to_screen(position + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
     half = 5.0 * view.ui_scale
@@ -400,13 +400,13 @@ def _draw_ratchets(view: DrawContext, ratchets: JointSegments) -> None:
 
 def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
     """Return the dials of rotary joints: at a pivot of the same two bodies, else at the centre of the second body."""
-    frame, bodies, links = view.snapshot.frame, view.snapshot.bodies, joints.links
-    all_links, pivots = view.snapshot.links, {}
-    for k in np.flatnonzero(all_links.kind == JointKind.PIVOT).tolist():
-        pivots[int(all_links.a[k]), int(all_links.b[k])] = k
-    _, hinge = all_links.ends(frame.position, frame.angle)
+    frame, bodies, joint_arrays = view.snapshot.frame, view.snapshot.bodies, joints.joints
+    all_joints, pivots = view.snapshot.joints, {}
+    for k in np.flatnonzero(all_joints.kind == JointKind.PIVOT).tolist():
+        pivots[int(all_joints.a[k]), int(all_joints.b[k])] = k
+    _, hinge = all_joints.ends(frame.position, frame.angle)
     found = []
-    rows = zip(links.a.tolist(), links.b.tolist(), links.figures.tolist(), strict=True)
+    rows = zip(joint_arrays.a.tolist(), joint_arrays.b.tolist(), joint_arrays.figures.tolist(), strict=True)
     for a, b, figures in list(rows)[:MAX_DIALS]:
         pivot = pivots.get((a, b), pivots.get((b, a)))
         position = frame.position[b] if pivot is None else hinge[pivot]
@@ -422,11 +422,11 @@ def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
 
 def _from_bodies(view: DrawContext, joints: JointSegments) -> FloatArray:
     """Return the centres of the jointed bodies, (J, 4) px; for the world, the anchor."""
-    first = np.where((joints.links.a < 0)[:, None], 0.0, view.snapshot.frame.position[joints.links.a])
+    first = np.where((joints.joints.a < 0)[:, None], 0.0, view.snapshot.frame.position[joints.joints.a])
     ends = np.hstack(
-        (view.camera.to_screen(first), view.camera.to_screen(view.snapshot.frame.position[joints.links.b]))
+        (view.camera.to_screen(first), view.camera.to_screen(view.snapshot.frame.position[joints.joints.b]))
     )
-    ends[:, :2] = np.where((joints.links.a < 0)[:, None], joints.ends[:, :2], ends[:, :2])
+    ends[:, :2] = np.where((joints.joints.a < 0)[:, None], joints.ends[:, :2], ends[:, :2])
     return np.asarray(ends[np.isfinite(ends).all(axis=1)])
 
 

@@ -157,7 +157,7 @@ class OverlayRenderer:
             draw_trails(view, self._points)
         if "shapes" in view.snapshot.overlays and view.snapshot.flames:
             draw_flames(view)
-        if "shapes" in view.snapshot.overlays and len(view.snapshot.links):
+        if "shapes" in view.snapshot.overlays and len(view.snapshot.joints):
             draw_joints(view, joint_segments(view), self._discs)
 
     def above(self, view: DrawContext) -> None:
@@ -171,7 +171,7 @@ class OverlayRenderer:
             self._draw_ghost(view)
         if "bounds" in overlays:
             draw_boxes(view, self._polygons)
-        if "joints" in overlays and len(view.snapshot.links):
+        if "joints" in overlays and len(view.snapshot.joints):
             draw_joint_symbols(view, joint_segments(view), self._discs)
         if drives and "joints" in overlays:
             draw_stops(view)

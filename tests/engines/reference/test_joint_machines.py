@@ -229,6 +229,8 @@ def test_faults_of_pulleys_are_reported(change: dict[str, Any], path: str) -> No
 
 
 def test_last_constraint_of_a_groove_is_its_length() -> None:
-    joints = select_joints(compile_joints(link(JointKind.ROD, -1, 0, 1.0), link(JointKind.GROOVE, -1, 0, 1.0)), *JointKind)
+    joints = select_joints(
+        compile_joints(link(JointKind.ROD, -1, 0, 1.0), link(JointKind.GROOVE, -1, 0, 1.0)), *JointKind
+    )
     assert joints.kind.tolist() == [JointKind.ROD, JointKind.GROOVE, GROOVE_ENDS]
-    assert joints.link.tolist() == [0, 1, 1]
+    assert joints.joint.tolist() == [0, 1, 1]

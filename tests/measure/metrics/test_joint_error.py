@@ -140,11 +140,11 @@ def test_scale_of_an_error_does_not_depend_on_the_order_of_the_bodies_or_on_poin
         for names, ends in ((between, anchors), (between[::-1], anchors[::-1])) if ball else ((between, anchors),):
             joint = {"kind": kind, "between": names, "anchors": ends, **({"length": 0.0} if kind == "rod" else {})}
             scene = from_document({"box": [plank], "ball": ball, "joint": [joint]})
-            found += joint_scales(scene.links, scene.bodies).tolist()
+            found += joint_scales(scene.joint_arrays, scene.bodies).tolist()
     assert found == pytest.approx([math.hypot(0.4, 0.05)] * len(found), rel=1e-12)  # rounding
 
 
 def test_scale_of_an_error_of_points_is_the_longer_arm_of_their_joint() -> None:
     points = [{"name": name, "position": [x, 0.0], "radius": 1e-9} for name, x in (("a", 0.0), ("b", 2.57))]
     scene = from_document({"ball": points, "joint": [{"kind": "pivot", "between": ["a", "b"], "at": [2.57, 0.0]}]})
-    assert joint_scales(scene.links, scene.bodies).tolist() == [2.57]
+    assert joint_scales(scene.joint_arrays, scene.bodies).tolist() == [2.57]

@@ -84,7 +84,7 @@ def test_no_recommended_setting_has_an_objection(scene: Scene, metric: str, tole
         assert chosen.point.metrics["missed_contacts"] == 0.0
         odds = [each.details.get("odds", 1.0) for each in warnings(scene, chosen.point.asked, "pymunk")]
         assert all(float(each) <= MAX_ODDS for each in odds)  # no body of these scenes is faster than at the start
-        if metric == "max_position" and len(scene.links):
+        if metric == "max_position" and len(scene.joint_arrays):
             assert chosen.point.metrics["joint_distance"] <= tolerance
     assert any(point.objections for point in found.points)
     if found.rejected is not None:  # where it is the cheapest, which its time decides

@@ -125,7 +125,7 @@ def test_translation_moves_every_body_of_every_element(shift: tuple[float, float
     moved = after(Similarity(shift=shift), KEYS)
     assert np.abs(moved.bodies.position - SCENE.bodies.position - np.asarray(shift)).max() < ROUNDING
     assert np.array_equal(moved.bodies.angle, SCENE.bodies.angle)
-    assert len(moved.links) == len(SCENE.links)
+    assert len(moved.joint_arrays) == len(SCENE.joint_arrays)
 
 
 def test_masses_follow_the_size_where_a_density_is_stated() -> None:

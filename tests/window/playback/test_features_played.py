@@ -55,16 +55,16 @@ def seek_to(view: LiveView, step: int) -> LiveView:
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_joints_are_shown_until_they_break_and_again_after_seeking_back(engine: str) -> None:
     view = LiveView(Session(CLOTH, engine))
-    assert len(snapshot(view).links) == len(CLOTH.links)
-    joint_counts = [len(snapshot(seek_to(view, step)).links) for step in range(0, 61, 5)]
-    assert joint_counts[0] == len(CLOTH.links) > joint_counts[-1]
+    assert len(snapshot(view).joints) == len(CLOTH.joint_arrays)
+    joint_counts = [len(snapshot(seek_to(view, step)).joints) for step in range(0, 61, 5)]
+    assert joint_counts[0] == len(CLOTH.joint_arrays) > joint_counts[-1]
     assert joint_counts == sorted(joint_counts, reverse=True)
     break_times = view.session.break_times[np.isfinite(view.session.break_times)]
     assert len(break_times) == joint_counts[0] - joint_counts[-1]
     for step in (10, 60, 0, 35):  # back and forth
-        assert len(snapshot(seek_to(view, step)).links) == joint_counts[step // 5]
+        assert len(snapshot(seek_to(view, step)).joints) == joint_counts[step // 5]
     seek_to(view, 0).scrub(0.6)  # scrubbed only: the session is at a time before the breaks
-    assert len(snapshot(view).links) == joint_counts[-1]
+    assert len(snapshot(view).joints) == joint_counts[-1]
     view.close()
 
 
@@ -73,8 +73,8 @@ def test_energy_of_a_live_view_excludes_broken_joints() -> None:
     stored = RecordedView(RecordedRun(trajectory))
     stored.scrub(0.6)
     assert view.energy() == pytest.approx(stored.energy(), rel=1e-12)  # the same frame, computed twice
-    assert snapshot(view).links.names == snapshot(stored).links.names
-    assert len(snapshot(stored).links) < len(CLOTH.links)
+    assert snapshot(view).joints.names == snapshot(stored).joints.names
+    assert len(snapshot(stored).joints) < len(CLOTH.joint_arrays)
     view.close()
 
 
@@ -90,10 +90,10 @@ def test_action_in_the_past_discards_later_breaks() -> None:
 
 def test_joints_keep_their_bodies_after_an_engine_switch_without_broken_ones() -> None:
     view = seek_to(LiveView(Session(CLOTH)), 60)
-    links = snapshot(view).links
+    links = snapshot(view).joints
     view.apply(Switch(time=0.0, engine="reference"))
-    assert np.array_equal(snapshot(view).links.b, links.b)
-    assert len(snapshot(seek_to(view, 0)).links) == len(CLOTH.links)
+    assert np.array_equal(snapshot(view).joints.b, links.b)
+    assert len(snapshot(seek_to(view, 0)).joints) == len(CLOTH.joint_arrays)
     view.close()
 
 

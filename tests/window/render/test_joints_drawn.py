@@ -112,7 +112,7 @@ def test_a_spring_narrows_as_it_stretches():
 
 def test_strain_colours_go_from_blue_over_grey_to_orange():
     model = scene_with(*(KINDS["spring"] | {"rest_length": rest} for rest in (60.0, 6.0, 0.06, 0.0)))
-    held = JointSegments(model.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
+    held = JointSegments(model.joint_arrays, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
     short, rest, long, none = SHADES[strain(held, CAMERA.scale)].astype(int)
     assert np.abs(short - SKY).max() <= 20  # nine tenths of the range
     assert (rest == SHADES[32]).all()
@@ -124,7 +124,7 @@ def test_strain_colours_go_from_blue_over_grey_to_orange():
 def test_springs_of_a_cloth_are_lines():
     grid = {"corner": [-4.0, 4.0], "columns": 20, "rows": 16, "spacing": [0.4, 0.4], "radius": 0.001}
     model = scene(cloth=[grid | {"name": "rag", "stiffness": 1.0, "mass": 1.0}])
-    assert len(model.links) > COILED
+    assert len(model.joint_arrays) > COILED
     picture = render(snapshot(model))
     differ = changed_pixels(picture, render(snapshot(scene(world={}))))
     assert differ[21:170, 68].all(), "a row of it, from its left to its right"

@@ -166,11 +166,11 @@ def _swing(p: Parameters) -> JsonObject:
 
 
 def _spring_energy(scene: Scene) -> float:
-    return 0.5 * float(scene.links.figures[0, 1]) * AMPLITUDE**2
+    return 0.5 * float(scene.joint_arrays.figures[0, 1]) * AMPLITUDE**2
 
 
 def _phase_error(scene: Scene, run: Trajectory) -> float:
-    omega = math.sqrt(float(scene.links.figures[0, 1]))
+    omega = math.sqrt(float(scene.joint_arrays.figures[0, 1]))
     truth = REST + AMPLITUDE * math.cos(omega * scene.world.duration)
     return abs(float(run.position[-1, 0, 0]) - truth) / AMPLITUDE
 
@@ -181,7 +181,7 @@ def _energy_tolerance(scene: Scene, settings: Settings, engine: str) -> float:
     The energy of symplectic schemes rises to 1/(1 − ωh/2) while ωh < 2. A larger rise, or any rise with another scheme,
     is an unstable oscillation. Springs of pymunk are symplectic with every integrator.
     """
-    z = math.sqrt(float(scene.links.figures[0, 1])) * settings.h
+    z = math.sqrt(float(scene.joint_arrays.figures[0, 1])) * settings.h
     grows = engine != "pymunk" and settings.integrator in ("rk4", "explicit_euler")
     return 0.01 if grows or z >= 2.0 else 1.01 / (1.0 - 0.5 * z) - 1.0
 
