@@ -98,10 +98,15 @@ def test_ball_drifts_across_gravity() -> None:
     assert velocity == pytest.approx(np.zeros((4, 2)), abs=1e-13)  # likewise
 
 
-@pytest.mark.parametrize("engine", ABLE)
-def test_flight_with_drag_wind_and_lift_follows_the_closed_form(engine: str) -> None:
+@pytest.mark.parametrize(("engine", "response"), [*((engine, None) for engine in ABLE), ("reference", "penalty")])
+def test_flight_with_drag_wind_and_lift_follows_the_closed_form(engine: str, response: str | None) -> None:
+    """With penalty contacts too: two other balls are pressed together meanwhile."""
     world = {"gravity": [0.0, -9.81], "linear_drag": 0.5, "wind": [4.0, -1.0]}
-    scene = scene_of(ball(), world=world, solver={"dt": 1e-3})
+    more, solver = [], {"dt": 1e-3}
+    if response is not None:
+        solver |= {"response": response, "integrator": "velocity_verlet", "stiffness": 2e4}
+        more = [ball(name=f"b{k}", position=[50.0 + 0.199 * k, 0.0], velocity=[0.0, 0.0]) for k in range(2)]
+    scene = scene_of(ball(), *more, world=world, solver=solver)
     result = run(scene, engine)
     position, velocity = free_flight(result.time, np.array([1.0, 2.0]), np.array([SPEED, 0.0]), scene.world, TURNING)
     # Schemes of order 1: h/2 times the largest acceleration, 20 m/s², over 1 s, and three times the safety.

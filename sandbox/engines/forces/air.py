@@ -23,7 +23,7 @@ from sandbox.arrays import ComplexArray, FloatArray, IntArray, Number
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
 
-Rows = int | slice | IntArray
+BodyRows = int | slice | IntArray
 """One body, or some of them"""
 
 ALL = slice(None)
@@ -57,6 +57,12 @@ class Air(NamedTuple):
             world.linear_drag, world.quadratic_drag, world.damping_rate, *world.wind, lift, bool(np.any(lift != 0.0))
         )
 
+    def for_rows(self, count: int) -> "Air":
+        """Return the air for more rows than there are bodies; those have no lift."""
+        lift = np.zeros(count)
+        lift[: len(self.lift)] = self.lift
+        return self._replace(lift=lift)
+
     @property
     def flows(self) -> bool:
         """Whether a force depends on the velocity through the air."""
@@ -83,7 +89,7 @@ class Air(NamedTuple):
 
 
 def air_law(
-    air: Air, rows: Rows, wx: Number, wy: Number, speed: Number, vx: Number, vy: Number, spin: Number
+    air: Air, rows: BodyRows, wx: Number, wy: Number, speed: Number, vx: Number, vy: Number, spin: Number
 ) -> tuple[Number, Number, Number]:
     """Return the acceleration (x, y), m/s², and the angular acceleration, rad/s².
 

@@ -291,8 +291,8 @@ def empty_manifolds(size: int) -> Manifolds:
         normal=np.empty((size, 2)),
         separation=np.empty(size),
         point=np.empty((size, 2)),
-        anchor=np.empty((size, 2)),
-        offset=np.zeros((size, 2)),  # remains 0 if only discs collide
+        rn=np.empty((size, 2)),
+        rt=np.zeros((size, 2)),  # remains 0 if only discs collide
         friction=np.empty(size),
         slip_target=np.empty(size),
         surface_pair=np.empty(size, np.int64),

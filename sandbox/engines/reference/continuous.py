@@ -50,7 +50,7 @@ def resting_pairs(world: WorldState, h: float) -> IntArray:
     x = world.x
     max_separation = TOUCHING * 2.0 * world.pipeline.max_radius
     contacts = world.pipeline.manifolds(x[0], world.pipeline.candidates(x[0], max_separation), max_separation)
-    distance = contacts.anchor.sum(axis=1)
+    distance = contacts.rn.sum(axis=1)
     still = (contacts.separation <= TOUCHING * distance) & (
         world.closing_speed(contacts, x) * h < MAX_RESTING_APPROACH * distance
     )
@@ -168,7 +168,7 @@ def swept(world: WorldState, h: float) -> Iterator[StepRecord]:
         motion = world.advance(fraction * left)
         contact = pipeline.pair_manifold(motion.placed[0], key)
         if world.closing_speed(contact, motion.placed)[0] <= min(
-            resting_speed, MAX_RESTING_APPROACH * contact.anchor.sum() / left
+            resting_speed, MAX_RESTING_APPROACH * contact.rn.sum() / left
         ):
             resting = np.union1d(resting, [key])
             continue

@@ -422,8 +422,8 @@ class Drives:
         turn = 0.0
         for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
             which = body == hinge.index
-            turn -= float(contacts.anchor[which, side] @ impulse[which, 1])
-            turn -= sign * float(contacts.offset[which, side] @ impulse[which, 0])
+            turn -= float(contacts.rn[which, side] @ impulse[which, 1])
+            turn -= sign * float(contacts.rt[which, side] @ impulse[which, 0])
         return turn / hinge.moment
 
     def place(self, moved: State) -> None:
@@ -481,7 +481,7 @@ class Drives:
         for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
             which = np.isin(body, self._indices)
             rate = mean[body[which]]
-            lever = contacts.anchor[which, side] * across[which] + sign * contacts.offset[which, side] * along[which]
+            lever = contacts.rn[which, side] * across[which] + sign * contacts.rt[which, side] * along[which]
             work += sign * float((impulse_xy[which] * rate[:, :2]).sum()) - float(lever @ rate[:, 2])
         return work
 
@@ -563,6 +563,4 @@ def _press_onto_stop(contacts: Manifolds, index: int, direction: float) -> bool:
     first, second = contacts.first == index, contacts.second == index
     if not (first.any() or second.any()):
         return False
-    return bool(
-        (direction * contacts.offset[first, 0] >= 0.0).all() and (direction * contacts.offset[second, 1] <= 0.0).all()
-    )
+    return bool((direction * contacts.rt[first, 0] >= 0.0).all() and (direction * contacts.rt[second, 1] <= 0.0).all())

@@ -137,11 +137,11 @@ class Manifolds(NamedTuple):
     """(K,) m; negative in overlap"""
     point: FloatArray
     """(K, 2) m, in the middle of the overlap"""
-    anchor: FloatArray
-    """(K, 2) m, component along the normal of each anchor, the vector from a centre to the contact; positive towards
-    the other body"""
-    offset: FloatArray
-    """(K, 2) m, component of each anchor to the left of the normal; 0 for discs"""
+    rn: FloatArray
+    """(K, 2) m, component along the normal of each arm r, the vector from a centre to the contact; positive towards the
+    other body"""
+    rt: FloatArray
+    """(K, 2) m, component of each arm along the tangent, to the left of the normal; 0 for discs"""
     friction: FloatArray
     """(K,) coefficient of friction of the pair"""
     slip_target: FloatArray
@@ -309,14 +309,14 @@ def _write_circle_contact(
     row: int,
     x: float,
     y: float,
-    a_anchor: float,
-    b_anchor: float,
+    rn_a: float,
+    rn_b: float,
     separation: float,
     nx: float,
     ny: float,
 ) -> None:
     out.normal[row, 0], out.normal[row, 1] = nx, ny
     out.separation[row] = separation
-    out.anchor[row, 0], out.anchor[row, 1] = a_anchor, b_anchor
-    middle = a_anchor + 0.5 * separation
+    out.rn[row, 0], out.rn[row, 1] = rn_a, rn_b
+    middle = rn_a + 0.5 * separation
     out.point[row, 0], out.point[row, 1] = x + nx * middle, y + ny * middle

@@ -68,19 +68,19 @@ def _forces(
     """Return the normal and tangential force of contact k, N, and its separation rate and slip, m/s."""
     i, j = contacts.first[k], contacts.second[k]
     nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
-    a, b = contacts.anchor[k, 0], contacts.anchor[k, 1]
-    a_off, b_off = contacts.offset[k, 0], contacts.offset[k, 1]
-    mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
-    turning = inverse_moment[i] * (a * a - a_off * a_off)
-    vx, vy, slip_of_spin = -rates[i, 0], -rates[i, 1], -spin[i] * a
-    roll = spin[i] * a_off
+    rn_a, rn_b = contacts.rn[k, 0], contacts.rn[k, 1]
+    rt_a, rt_b = contacts.rt[k, 0], contacts.rt[k, 1]
+    mass = inverse_mass[i] + inverse_moment[i] * rt_a * rt_a
+    turning = inverse_moment[i] * (rn_a * rn_a - rt_a * rt_a)
+    vx, vy, slip_of_spin = -rates[i, 0], -rates[i, 1], -spin[i] * rn_a
+    roll = spin[i] * rt_a
     if j >= 0:
-        mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
-        turning += inverse_moment[j] * (b * b - b_off * b_off)
+        mass += inverse_mass[j] + inverse_moment[j] * rt_b * rt_b
+        turning += inverse_moment[j] * (rn_b * rn_b - rt_b * rt_b)
         vx += rates[j, 0]
         vy += rates[j, 1]
-        slip_of_spin -= spin[j] * b
-        roll -= spin[j] * b_off
+        slip_of_spin -= spin[j] * rn_b
+        roll -= spin[j] * rt_b
     if mass == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     damper = 2.0 * damping[contacts.surface_pair[k]] * math.sqrt(stiffness / mass)
@@ -146,17 +146,17 @@ def penalty_forces(
     for k in range(len(contacts.key)):
         i, j = contacts.first[k], contacts.second[k]
         nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
-        a, b = contacts.anchor[k, 0], contacts.anchor[k, 1]
-        a_off, b_off = contacts.offset[k, 0], contacts.offset[k, 1]
+        rn_a, rn_b = contacts.rn[k, 0], contacts.rn[k, 1]
+        rt_a, rt_b = contacts.rt[k, 0], contacts.rt[k, 1]
         normal, tangent, _, _ = _forces(contacts, k, rates, spin, inverse_mass, inverse_moment, stiffness, damping)
         x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
         acceleration[i, 0] -= inverse_mass[i] * x
         acceleration[i, 1] -= inverse_mass[i] * y
-        turn[i] -= inverse_moment[i] * (a * tangent - a_off * normal)
+        turn[i] -= inverse_moment[i] * (rn_a * tangent - rt_a * normal)
         if j >= 0:
             acceleration[j, 0] += inverse_mass[j] * x
             acceleration[j, 1] += inverse_mass[j] * y
-            turn[j] -= inverse_moment[j] * (b * tangent + b_off * normal)
+            turn[j] -= inverse_moment[j] * (rn_b * tangent + rt_b * normal)
         acceleration[row[k], 0] += x
         acceleration[row[k], 1] += y
 
@@ -212,7 +212,8 @@ class PenaltyContacts:
         extended = np.concatenate((x, np.zeros((2, rows, x.shape[2]))), axis=1)
         no_forces = np.zeros((rows, x.shape[2]))
         mobile = np.concatenate((np.broadcast_to(u.mobile, (count, 1)), np.zeros((rows, 1))))
-        extended_u = u._replace(constant=np.concatenate((u.constant, no_forces)), mobile=mobile, contacts=forces)
+        constant, air = np.concatenate((u.constant, no_forces)), u.air.for_rows(count + rows)
+        extended_u = u._replace(constant=constant, air=air, mobile=mobile, contacts=forces)
         extended = step(transition, t, extended, extended_u, h)
         self.last = self._active_contacts(extended[0, :count], extended[1, count:, :2], pairs, 3.0 * margin)
         return np.ascontiguousarray(extended[:, :count]), self.last

@@ -354,10 +354,10 @@ def _write(
             out.separation[row] = separation
             out.point[row, 0], out.point[row, 1] = x, y
             # Each anchor ends on the surface of its own body.
-            out.anchor[row, 0] = (x - ax) * nx + (y - ay) * ny - half
-            out.anchor[row, 1] = (bx - x) * nx + (by - y) * ny - half
-            out.offset[row, 0] = (y - ay) * nx - (x - ax) * ny
-            out.offset[row, 1] = (y - by) * nx - (x - bx) * ny
+            out.rn[row, 0] = (x - ax) * nx + (y - ay) * ny - half
+            out.rn[row, 1] = (bx - x) * nx + (by - y) * ny - half
+            out.rt[row, 0] = (y - ay) * nx - (x - ax) * ny
+            out.rt[row, 1] = (y - by) * nx - (x - bx) * ny
             write_surfaces(out, row, query.tangential, surface, other)
         row += 1
     return row

@@ -32,9 +32,9 @@ def approach(contacts: Manifolds, velocity: FloatArray, spin: FloatArray, out: F
         if j >= 0:
             vx += velocity[j, 0]
             vy += velocity[j, 1]
-        out[k] = vx * contacts.normal[k, 0] + vy * contacts.normal[k, 1] + spin[i] * contacts.offset[k, 0]
+        out[k] = vx * contacts.normal[k, 0] + vy * contacts.normal[k, 1] + spin[i] * contacts.rt[k, 0]
         if j >= 0:
-            out[k] -= spin[j] * contacts.offset[k, 1]
+            out[k] -= spin[j] * contacts.rt[k, 1]
 
 
 @bare_kernel
@@ -116,29 +116,33 @@ def solve_contacts_once(
     for k in range(len(contacts.key)):
         i, j = contacts.first[k], contacts.second[k]
         nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
-        a, a_off = contacts.anchor[k, 0], contacts.offset[k, 0]
+        # Effective masses along the normal and the tangent, and the relative velocity at the contact
+        rn_a, rt_a = contacts.rn[k, 0], contacts.rt[k, 0]
         mass = inverse_mass[i]
-        along_mass = mass + inverse_moment[i] * a_off * a_off
-        across_mass = mass + inverse_moment[i] * a * a
+        inverse_normal_mass = mass + inverse_moment[i] * rt_a * rt_a
+        inverse_tangent_mass = mass + inverse_moment[i] * rn_a * rn_a
         vx, vy = -velocity[i, 0], -velocity[i, 1]
-        slip_of_spin, turn = -spin[i] * a, spin[i] * a_off
+        slip_of_spin, turn = -spin[i] * rn_a, spin[i] * rt_a
         if j >= 0:
-            b, b_off = contacts.anchor[k, 1], contacts.offset[k, 1]
+            rn_b, rt_b = contacts.rn[k, 1], contacts.rt[k, 1]
             mass += inverse_mass[j]
-            along_mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
-            across_mass += inverse_mass[j] + inverse_moment[j] * b * b
+            inverse_normal_mass += inverse_mass[j] + inverse_moment[j] * rt_b * rt_b
+            inverse_tangent_mass += inverse_mass[j] + inverse_moment[j] * rn_b * rn_b
             vx += velocity[j, 0]
             vy += velocity[j, 1]
-            slip_of_spin -= spin[j] * b
-            turn -= spin[j] * b_off
+            slip_of_spin -= spin[j] * rn_b
+            turn -= spin[j] * rt_b
         if mass == 0.0:
             continue
-        along = (-(bounce[k] + (vx * nx + vy * ny) + turn)) / along_mass
         old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
+        # Normal impulse: the accumulated one never pulls
+        along = (-(bounce[k] + (vx * nx + vy * ny) + turn)) / inverse_normal_mass
         impulse[k, 0] = max(old_normal + along, 0.0)
+        # Friction impulse: the accumulated one stays within Coulomb's cone
         max_friction = contacts.friction[k] * impulse[k, 0]
-        across = -(vy * nx - vx * ny + slip_of_spin - contacts.slip_target[k]) / across_mass
+        across = -(vy * nx - vx * ny + slip_of_spin - contacts.slip_target[k]) / inverse_tangent_mass
         impulse[k, 1] = min(max(old_tangent + across, -max_friction), max_friction)
+        # Apply the change of both
         normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
         has_changed = has_changed or normal != 0.0 or tangent != 0.0
         _apply_impulse(contacts, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
@@ -162,12 +166,12 @@ def _apply_impulse(
     x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
     velocity[i, 0] -= inverse_mass[i] * x
     velocity[i, 1] -= inverse_mass[i] * y
-    # The anchor has two components, along the normal and across it; of discs only the first is not 0.
-    spin[i] -= inverse_moment[i] * (contacts.anchor[k, 0] * tangent - contacts.offset[k, 0] * normal)
+    # r × J; of discs only rn is not 0
+    spin[i] -= inverse_moment[i] * (contacts.rn[k, 0] * tangent - contacts.rt[k, 0] * normal)
     if j >= 0:
         velocity[j, 0] += inverse_mass[j] * x
         velocity[j, 1] += inverse_mass[j] * y
-        spin[j] -= inverse_moment[j] * (contacts.anchor[k, 1] * tangent + contacts.offset[k, 1] * normal)
+        spin[j] -= inverse_moment[j] * (contacts.rn[k, 1] * tangent + contacts.rt[k, 1] * normal)
 
 
 @bare_kernel
@@ -178,12 +182,12 @@ def work_at(
     i, j = contacts.first[k], contacts.second[k]
     nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
     vx, vy = -velocity[i, 0], -velocity[i, 1]
-    slip_of_spin, turn = -spin[i] * contacts.anchor[k, 0], spin[i] * contacts.offset[k, 0]
+    slip_of_spin, turn = -spin[i] * contacts.rn[k, 0], spin[i] * contacts.rt[k, 0]
     if j >= 0:
         vx += velocity[j, 0]
         vy += velocity[j, 1]
-        slip_of_spin -= spin[j] * contacts.anchor[k, 1]
-        turn -= spin[j] * contacts.offset[k, 1]
+        slip_of_spin -= spin[j] * contacts.rn[k, 1]
+        turn -= spin[j] * contacts.rt[k, 1]
     along = impulse[k, 0] * (vx * nx + vy * ny + turn)
     across = impulse[k, 1] * (vy * nx - vx * ny + slip_of_spin)
     return along, across
@@ -235,27 +239,30 @@ def solve_overlaps(
         for k in range(len(contacts.key)):
             i, j = contacts.first[k], contacts.second[k]
             nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
-            a_off, b_off = contacts.offset[k, 0], contacts.offset[k, 1]
-            mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
-            vx, vy, turn = -pseudo_velocity[i, 0], -pseudo_velocity[i, 1], pseudo_velocity[i, 2] * a_off
+            # Effective mass and separation rate
+            rt_a, rt_b = contacts.rt[k, 0], contacts.rt[k, 1]
+            mass = inverse_mass[i] + inverse_moment[i] * rt_a * rt_a
+            vx, vy, turn = -pseudo_velocity[i, 0], -pseudo_velocity[i, 1], pseudo_velocity[i, 2] * rt_a
             if j >= 0:
-                mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
+                mass += inverse_mass[j] + inverse_moment[j] * rt_b * rt_b
                 vx += pseudo_velocity[j, 0]
                 vy += pseudo_velocity[j, 1]
-                turn -= pseudo_velocity[j, 2] * b_off
+                turn -= pseudo_velocity[j, 2] * rt_b
             if mass == 0.0:
                 continue
+            # Normal impulse: the accumulated one never pulls
             old = total[k]
             total[k] = max(old + (target[k] - (vx * nx + vy * ny) - turn) / mass, 0.0)
             change = total[k] - old
             has_changed = has_changed or change != 0.0
+            # Apply its change
             pseudo_velocity[i, 0] -= inverse_mass[i] * change * nx
             pseudo_velocity[i, 1] -= inverse_mass[i] * change * ny
-            pseudo_velocity[i, 2] += inverse_moment[i] * change * a_off
+            pseudo_velocity[i, 2] += inverse_moment[i] * change * rt_a
             if j >= 0:
                 pseudo_velocity[j, 0] += inverse_mass[j] * change * nx
                 pseudo_velocity[j, 1] += inverse_mass[j] * change * ny
-                pseudo_velocity[j, 2] -= inverse_moment[j] * change * b_off
+                pseudo_velocity[j, 2] -= inverse_moment[j] * change * rt_b
         if not has_changed:
             break
 

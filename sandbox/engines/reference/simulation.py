@@ -404,7 +404,7 @@ def _drop_rounding(
     # A static collider has no row; that of the first body is used for it.
     other = np.where(second >= 0, second, first)
     kick = np.hypot(impulse[:, 0], impulse[:, 1]) * np.maximum(inverse_mass[first], inverse_mass[other])
-    real = contacts.separation < -CONTACT_ROUNDING * contacts.anchor.sum(axis=1)
+    real = contacts.separation < -CONTACT_ROUNDING * contacts.rn.sum(axis=1)
     real |= kick > CONTACT_ROUNDING * (speed[first] + speed[other])
     return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 

@@ -235,8 +235,8 @@ def finish_substep(
         out.normal[:size],
         out.separation[:size],
         out.point[:size],
-        out.anchor[:size],
-        out.offset[:size],
+        out.rn[:size],
+        out.rt[:size],
         out.friction[:size],
         out.slip_target[:size],
         out.surface_pair[:size],
@@ -553,7 +553,7 @@ def log_contacts(bodies: BodyColumns, scratch: StepScratch, log: StepLog, size: 
         other = second if second >= 0 else first
         speed = math.hypot(rates[first, 0], rates[first, 1]) + math.hypot(rates[other, 0], rates[other, 1])
         kick = math.hypot(impulse[k, 0], impulse[k, 1]) * max(inverse_mass[first], inverse_mass[other])
-        overlap = -CONTACT_ROUNDING * (out.anchor[k, 0] + out.anchor[k, 1])
+        overlap = -CONTACT_ROUNDING * (out.rn[k, 0] + out.rn[k, 1])
         if not (out.separation[k] < overlap or kick > CONTACT_ROUNDING * speed):
             continue
         log.pair[row, 0], log.pair[row, 1] = first, second

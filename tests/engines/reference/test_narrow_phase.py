@@ -147,4 +147,4 @@ def test_contact_points_lie_midway_in_the_overlap(x, y, radius, angle, near):
         px, py = contacts.point[0]
         depth_a, depth_b = radius - math.dist((px, py), (x, y)), other - math.dist((px, py), (bx, by))
         assert depth_a == pytest.approx(depth_b, abs=1e-12)  # ulps of 140 m
-        assert contacts.anchor[0].tolist() == [radius, other]
+        assert contacts.rn[0].tolist() == [radius, other]
