@@ -104,7 +104,7 @@ def test_flight_with_drag_wind_and_lift_follows_the_closed_form(engine: str, res
     world = {"gravity": [0.0, -9.81], "linear_drag": 0.5, "wind": [4.0, -1.0]}
     more, solver = [], {"dt": 1e-3}
     if response is not None:
-        solver |= {"response": response, "integrator": "velocity_verlet", "stiffness": 2e4}
+        solver |= {"response": response, "integrator": "velocity_verlet", "stiffness": 2e4, "damping": 1.0}
         more = [ball(name=f"b{k}", position=[50.0 + 0.199 * k, 0.0], velocity=[0.0, 0.0]) for k in range(2)]
     scene = scene_of(ball(), *more, world=world, solver=solver)
     result = run(scene, engine)

@@ -35,7 +35,7 @@ class WarmStarts:
         self.lists_pairs = False
         """whether to list them by pair, for `take`"""
         self.points: dict[int, npt.NDArray[Any]] | None = None
-        """`CONTACT_POINT`s of contacts that began, (C,) by the address of the arbiter; filled if it is a dict"""
+        """`CONTACT_POINT`s of contacts that began with impulses, (C,) by the address of the arbiter; filled if it is a dict"""
         self._began = Listing(BEGINNING)
         space.on_collision(begin=self._begin)
 
@@ -43,7 +43,9 @@ class WarmStarts:
         if self.lists_pairs:
             lib.pmSpaceArbiterIteratorFuncBatched(arbiter._arbiter, self._began.data)
         if self.points is not None:
-            self.points[address_of(arbiter._arbiter)] = points_of(arbiter._arbiter)
+            points = points_of(arbiter._arbiter)
+            if points["jnAcc"].any() or points["jtAcc"].any():
+                self.points[address_of(arbiter._arbiter)] = points
 
     def take(self) -> WarmStart | None:
         """Return and clear the impulses; None if all contacts of the last substep began at 0."""

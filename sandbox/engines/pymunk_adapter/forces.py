@@ -61,9 +61,9 @@ class AttractionField:
         for attraction in self._attracting_points:
             offset = position - np.asarray(attraction.toward, dtype=np.float64)
             distance = np.sqrt((offset * offset).sum(axis=1))
-            is_apart = distance * distance > 0.0
-            with np.errstate(over="ignore"):  # next to the point; such a body leaves the bounds
-                distance = np.where(is_apart, distance, 1.0)
+            is_apart = distance * distance * distance > 0.0  # at the point, or almost, there is no direction
+            distance = np.where(is_apart, distance, 1.0)
+            with np.errstate(over="ignore", invalid="ignore"):  # next to the point; such a body leaves the bounds
                 rate = pull(attraction.strength, attraction.softening, distance) / distance
                 total -= offset * np.where(is_apart, rate, 0.0)[:, None]
         return total
@@ -113,7 +113,7 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
     It never raises: pymunk would only print an exception of a callback and continue.
     """
     distance = math.sqrt(dx * dx + dy * dy)
-    if distance * distance == 0.0:
+    if distance * distance * distance == 0.0:
         return 0.0
     return pull(attraction.strength, attraction.softening, distance) / distance
 

@@ -25,7 +25,7 @@ BALL = {"name": "cue", "position": [0.0, 1.5], "radius": 0.05, "restitution": 0.
 TYPED_OF_BALL = [
     "name", "material", "restitution", "restitution_falloff", "friction", "surface_speed", "surface_velocity", "colour",
     "categories", "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment",
-    "group", "radius", "spin",
+    "lift", "group", "radius", "spin",
 ]  # fmt: skip
 
 
