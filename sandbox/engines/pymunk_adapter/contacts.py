@@ -35,7 +35,7 @@ class WarmStarts:
         self.lists_pairs = False
         """whether to list them by pair, for `take`"""
         self.points: dict[int, npt.NDArray[Any]] | None = None
-        """`CONTACT_POINT`s of contacts that began with impulses, (C,) by the address of the arbiter; filled if it is a dict"""
+        """`CONTACT_POINT`s of contacts that began with impulses, by address of the arbiter; filled if it is a dict"""
         self._began = Listing(BEGINNING)
         space.on_collision(begin=self._begin)
 

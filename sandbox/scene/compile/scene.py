@@ -63,8 +63,8 @@ class Scene(SceneDescription, HtmlRepr):
         counts += [
             _counted(len(each), kind, f"{kind}s") for kind, each in {**elements, "zone": self.zones}.items() if each
         ]
-        if len(self.joints):
-            counts.append(_counted(len(self.joints), "joint", "joints"))
+        if len(self.joint_arrays):
+            counts.append(_counted(len(self.joint_arrays), "joint", "joints"))
         x, y = self.world.gravity
         figures = f"gravity ({x:g}, {y:g}) m/s², duration {self.world.duration:g} s, dt {self.solver.dt:g} s"
         return f"<Scene {short_repr(self.title)}: {', '.join(counts)}\n  {figures}>"
