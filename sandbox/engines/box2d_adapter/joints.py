@@ -13,7 +13,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.box2d_adapter.requirements import MERGED
 from sandbox.engines.box2d_adapter.world import Box2DWorld
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.common.springs import anchors_in_world, spring_law
+from sandbox.engines.common.springs import SpringExtent, rotary_torques, spring_tensions
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 
 SPRINGS = JointKind.SPRING, JointKind.ROTARY_SPRING
@@ -126,44 +126,22 @@ class WorldJoints:
         store = self._store
         springs, rotary = store.joints.of(JointKind.SPRING), store.joints.of(JointKind.ROTARY_SPRING)
         if len(springs):
-            arm_a, vector, along, size = self._spring_state(springs)
-            arm_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)[0]
-            pull = vector / np.where(along > 0.0, along, 1.0)[:, None] * size[:, None]
-            for index, arm, sign in ((springs.b, arm_b, 1.0), (springs.a, arm_a, -1.0)):
+            extent = SpringExtent.of(springs, store.position, store.angle)
+            pull = extent.direction * self._tensions(springs, extent)[:, None]
+            for index, arm, sign in ((springs.b, extent.arm_b, 1.0), (springs.a, extent.arm_a, -1.0)):
                 free = index >= 0
                 np.add.at(force, index[free], sign * pull[free])
                 moment = arm[:, 0] * pull[:, 1] - arm[:, 1] * pull[:, 0]
                 np.add.at(torque, index[free], sign * moment[free])
         if len(rotary):
-            moment = self._rotary_torque(rotary)
+            moment = rotary_torques(rotary, store.angle, store.angular_velocity)
             free = rotary.a >= 0
             np.add.at(torque, rotary.b, moment)
             np.add.at(torque, rotary.a[free], -moment[free])
 
-    def _spring_state(self, springs: JointArrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return first arms (K, 2) and displacements (K, 2), m, lengths (K,), m, and forces (K,), N, of springs."""
-        store = self._store
-        arm_a, point_a = anchors_in_world(springs.a, springs.anchor_a, store.position, store.angle)
-        arm_b, point_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)
-        vector = point_b - point_a
-        length = np.hypot(vector[:, 0], vector[:, 1])
-        velocity = self._anchor_velocity(springs.b, arm_b) - self._anchor_velocity(springs.a, arm_a)
-        rate = np.einsum("kd,kd->k", vector, velocity) / np.where(length > 0.0, length, 1.0)
-        rest, stiffness, damping = springs.figures.T
-        return arm_a, vector, length, np.asarray(spring_law(rest, stiffness, damping, length, rate))
-
-    def _rotary_torque(self, rotary: JointArrays) -> FloatArray:
-        store, on_body = self._store, rotary.a >= 0
-        angle = store.angle[rotary.b] - np.where(on_body, store.angle[rotary.a], 0.0)
-        spin = store.angular_velocity[rotary.b] - np.where(on_body, store.angular_velocity[rotary.a], 0.0)
-        rest, stiffness, damping = rotary.figures.T
-        return np.asarray(spring_law(rest, stiffness, damping, angle, spin))
-
-    def _anchor_velocity(self, index: IntArray, arm: FloatArray) -> FloatArray:
-        """Return the velocities of anchors, (K, 2) m/s; 0 for the world."""
-        store = self._store
-        turning = np.column_stack((-arm[:, 1], arm[:, 0])) * store.angular_velocity[index][:, None]
-        return np.where((index >= 0)[:, None], store.velocity[index] + turning, 0.0)
+    def _tensions(self, springs: JointArrays, extent: SpringExtent) -> FloatArray:
+        """Return the present forces of springs, (K,) N."""
+        return spring_tensions(springs, extent, self._store.velocity, self._store.angular_velocity)
 
     def overloaded(self) -> IntArray:
         """Return the indices of joints whose force exceeds their strength; of rigid ones, that of the last substep."""
@@ -173,10 +151,12 @@ class WorldJoints:
                 force = joint.get_constraint_force()
                 if math.hypot(force.x, force.y) > joints.strength[k] * self._world.scale:
                     found.append(k)
-        intact = self._store.joints
+        store = self._store
         for kind in SPRINGS:
-            springs = intact.of(kind)
-            if len(springs):
-                size = self._spring_state(springs)[3] if kind == JointKind.SPRING else self._rotary_torque(springs)
-                found += springs.number[np.abs(size) > springs.strength].tolist()
+            springs = store.joints.of(kind)
+            if len(springs) and kind == JointKind.SPRING:
+                size = self._tensions(springs, SpringExtent.of(springs, store.position, store.angle))
+            else:
+                size = rotary_torques(springs, store.angle, store.angular_velocity)
+            found += springs.number[np.abs(size) > springs.strength].tolist()
         return np.asarray(sorted(found), np.int64)

@@ -1,8 +1,11 @@
-"""Law of springs and rotary springs with dampers, and the anchors of joints in the world."""
+"""Springs and rotary springs with dampers: their law, and their forces in a state of the bodies."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.geometry.vectors import Component, rotate
 
 
@@ -41,3 +44,63 @@ def anchors_in_world(
         point[has_arm] += arm[has_arm]
     point[is_world] = anchor[is_world]
     return arm, point
+
+
+class SpringExtent(NamedTuple):
+    """K springs in a state of the bodies."""
+
+    arm_a: FloatArray
+    """(K, 2) m, from the centre of the first body to its anchor; 0 for the world"""
+    arm_b: FloatArray
+    """(K, 2) likewise of the second body"""
+    displacement: FloatArray
+    """(K, 2) m, from the first anchor to the second"""
+    length: FloatArray
+    """(K,) m"""
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit vectors from the first anchor to the second, (K, 2); 0 where both coincide."""
+        return np.asarray(self.displacement / np.where(self.length > 0.0, self.length, 1.0)[:, None])
+
+    @classmethod
+    def of(cls, springs: JointArrays, position: FloatArray, angle: FloatArray) -> "SpringExtent":
+        """Return the extent of springs with the bodies at positions (N, 2), m, and angles (N,), rad."""
+        arm_a, point_a = anchors_in_world(springs.a, springs.anchor_a, position, angle)
+        arm_b, point_b = anchors_in_world(springs.b, springs.anchor_b, position, angle)
+        displacement = point_b - point_a
+        return cls(arm_a, arm_b, displacement, np.hypot(displacement[:, 0], displacement[:, 1]))
+
+
+def spring_tensions(springs: JointArrays, extent: SpringExtent, velocity: FloatArray, spin: FloatArray) -> FloatArray:
+    """Return the forces of springs with their dampers, (K,) N; positive if they push the anchors apart.
+
+    Args:
+        springs: K springs.
+        extent: their present extent.
+        velocity: (N, 2) m/s, of all bodies.
+        spin: (N,) rad/s.
+    """
+    second = _anchor_velocity(springs.b, extent.arm_b, velocity, spin)
+    separating = second - _anchor_velocity(springs.a, extent.arm_a, velocity, spin)
+    length = np.where(extent.length > 0.0, extent.length, 1.0)
+    rate = np.einsum("kd,kd->k", extent.displacement, separating) / length
+    rest, stiffness, damping = springs.figures.T
+    return np.asarray(spring_law(rest, stiffness, damping, extent.length, rate))
+
+
+def rotary_torques(springs: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
+    """Return the torques of rotary springs with their dampers on their second bodies, (K,) N·m."""
+    rest, stiffness, damping = springs.figures.T
+    return np.asarray(spring_law(rest, stiffness, damping, relative(springs, angle), relative(springs, spin)))
+
+
+def relative(joints: JointArrays, values: FloatArray) -> FloatArray:
+    """Return values (N,) of second bodies minus those of first bodies, (K,); 0 for the world."""
+    return np.asarray(values[joints.b] - np.where(joints.a >= 0, values[joints.a], 0.0))
+
+
+def _anchor_velocity(index: IntArray, arm: FloatArray, velocity: FloatArray, spin: FloatArray) -> FloatArray:
+    """Return the velocities of anchors, (K, 2) m/s, of joints on bodies with an index (K,); 0 for the world."""
+    turning = np.column_stack((-spin[index] * arm[:, 1], spin[index] * arm[:, 0]))
+    return np.where((index >= 0)[:, None], velocity[index] + turning, 0.0)

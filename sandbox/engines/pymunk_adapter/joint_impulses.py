@@ -5,8 +5,8 @@ from typing import NamedTuple, Self, TypeAlias
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.springs import anchors_in_world
-from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force, relative
+from sandbox.engines.common.springs import SpringExtent, anchors_in_world, relative
+from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force
 from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 
 
@@ -88,16 +88,12 @@ def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: flo
         angle: (N,) rad.
         h: substep, s.
     """
-    joint_arrays = joints.by_kind.springs
-    arm_a, point_a = anchors_in_world(joint_arrays.a, joint_arrays.anchor_a, position, angle)
-    arm_b, point_b = anchors_in_world(joint_arrays.b, joint_arrays.anchor_b, position, angle)
-    displacement = point_b - point_a
-    length = np.hypot(displacement[:, 0], displacement[:, 1])
-    direction = displacement / np.where(length > 0.0, length, 1.0)[:, None]
-    elastic = elastic_force(joint_arrays, length) * h
-    damper = joints.impulses(joint_arrays) - elastic
-    no_torque = np.zeros(len(joint_arrays))
-    spring_ends = joint_arrays.a, joint_arrays.b, arm_a, arm_b
+    springs = joints.by_kind.springs
+    extent = SpringExtent.of(springs, position, angle)
+    direction, elastic = extent.direction, elastic_force(springs, extent.length) * h
+    damper = joints.impulses(springs) - elastic
+    no_torque = np.zeros(len(springs))
+    spring_ends = springs.a, springs.b, extent.arm_a, extent.arm_b
 
     rotary = joints.by_kind.rotary
     rotary_elastic = elastic_force(rotary, relative(rotary, angle)) * h

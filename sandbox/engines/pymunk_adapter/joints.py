@@ -8,7 +8,7 @@ import numpy as np
 import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.springs import anchors_in_world, spring_law
+from sandbox.engines.common.springs import SpringExtent, rotary_torques, spring_law, spring_tensions
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
 
 
@@ -62,30 +62,6 @@ def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body)
             raise ValueError(f"pymunk has no {kind.name.lower()} joints")
 
 
-def spring_force_magnitude(
-    joints: JointArrays, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
-) -> FloatArray:
-    """Return the magnitude of the force of springs, (K,) N.
-
-    Args:
-        joints: K springs.
-        position: (N, 2) m.
-        velocity: (N, 2) m/s.
-        angle: (N,) rad.
-        spin: (N,) rad/s.
-    """
-    arm_a, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
-    arm_b, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
-    displacement = point_b - point_a
-    relative_velocity = _anchor_velocity(joints.b, arm_b, velocity, spin) - _anchor_velocity(
-        joints.a, arm_a, velocity, spin
-    )
-    length = np.hypot(displacement[:, 0], displacement[:, 1])
-    rate = np.einsum("kd,kd->k", displacement, relative_velocity) / np.where(length > 0.0, length, 1.0)
-    rest, stiffness, damping = joints.figures.T
-    return np.asarray(np.minimum(np.abs(spring_law(rest, stiffness, damping, length, rate)), joints.max_force))
-
-
 def spring_forces(joints: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the forces (N, 2), N, of springs on bodies, without their dampers.
 
@@ -94,23 +70,13 @@ def spring_forces(joints: JointArrays, position: FloatArray, angle: FloatArray) 
         position: (N, 2) m.
         angle: (N,) rad.
     """
-    _, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
-    _, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
-    displacement = point_b - point_a
-    length = np.hypot(displacement[:, 0], displacement[:, 1])
+    _, _, displacement, length = SpringExtent.of(joints, position, angle)
     per_length = np.divide(elastic_force(joints, length), length, out=np.zeros_like(length), where=length > 0.0)
     force = displacement * per_length[:, None]
     total = np.zeros((len(position) + 1, 2))  # the last row is the world, −1
     np.add.at(total, joints.b, force)
     np.subtract.at(total, joints.a, force)
     return total[:-1]
-
-
-def spring_torque_magnitude(joints: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
-    """Return the magnitude of the torque of rotary springs, (K,) N·m."""
-    rest, stiffness, damping = joints.figures.T
-    torque = spring_law(rest, stiffness, damping, relative(joints, angle), relative(joints, spin))
-    return np.asarray(np.minimum(np.abs(torque), joints.max_force))
 
 
 def elastic_force(joints: JointArrays, extent: FloatArray) -> FloatArray:
@@ -123,15 +89,9 @@ def elastic_force(joints: JointArrays, extent: FloatArray) -> FloatArray:
     return np.asarray(np.clip(force, -joints.max_force, joints.max_force))
 
 
-def relative(joints: JointArrays, values: FloatArray) -> FloatArray:
-    """Return values (N,) of second bodies minus those of first bodies, (K,); 0 for the world."""
-    return np.asarray(values[joints.b] - np.where(joints.a >= 0, values[joints.a], 0.0))
-
-
-def _anchor_velocity(index: IntArray, arm: FloatArray, velocity: FloatArray, spin: FloatArray) -> FloatArray:
-    """Return the velocities of anchors, (K, 2) m/s, of joints on bodies with an index (K,); 0 for the world."""
-    turning = np.column_stack((-spin[index] * arm[:, 1], spin[index] * arm[:, 0]))
-    return np.where((index >= 0)[:, None], velocity[index] + turning, 0.0)
+def _limited(joints: JointArrays, force: FloatArray) -> FloatArray:
+    """Return the magnitudes of forces or torques (K,), which pymunk limits."""
+    return np.asarray(np.minimum(np.abs(force), joints.max_force))
 
 
 class JointsByKind(NamedTuple):
@@ -219,11 +179,11 @@ class SpaceJoints:
         force = np.asarray([self._constraints[k].impulse for k in rigid.number.tolist()]) / h
         broken = [rigid.number[force > rigid.strength]]
         if len(springs):
-            broken.append(
-                springs.number[spring_force_magnitude(springs, position, velocity, angle, spin) > springs.strength]
-            )
+            tensions = spring_tensions(springs, SpringExtent.of(springs, position, angle), velocity, spin)
+            broken.append(springs.number[_limited(springs, tensions) > springs.strength])
         if len(rotary):
-            broken.append(rotary.number[spring_torque_magnitude(rotary, angle, spin) > rotary.strength])
+            torques = rotary_torques(rotary, angle, spin)
+            broken.append(rotary.number[_limited(rotary, torques) > rotary.strength])
         indices = np.sort(np.concatenate(broken))
         if len(indices):
             self._remove(indices.tolist())
