@@ -81,6 +81,13 @@ def is_inside(edge: FloatArray, first: int, end: int, radius: float, x: float, y
 
 
 @kernel
+def find_zones(edge: FloatArray, first: IntArray, radius: FloatArray, x: float, y: float, out: BoolArray) -> None:
+    """Write which zones contain a point, m."""
+    for z in range(len(radius)):
+        out[z] = is_inside(edge, first[z], first[z + 1], radius[z], x, y)
+
+
+@kernel
 def update_inside(
     position: FloatArray,
     can_enter_zone: BoolArray,
@@ -167,8 +174,9 @@ class ZonedBodyStore(BodyStore):
     def at(self, position: FloatArray) -> list[int]:
         """Return the indices of the zones that contain a point, m, ascending."""
         edge, first, radius, _ = self._shapes
-        x, y = float(position[0]), float(position[1])
-        return [z for z in range(len(radius)) if is_inside(edge, first[z], first[z + 1], radius[z], x, y)]
+        found = np.empty(len(radius), np.bool_)
+        find_zones(edge, first, radius, float(position[0]), float(position[1]), found)
+        return [int(z) for z in np.flatnonzero(found)]
 
     def inside(self, index: int) -> list[int]:
         """Return the zones that contained the centre of a body at the end of the last substep, ascending."""
@@ -244,8 +252,12 @@ class ZonedBodyStore(BodyStore):
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
         """Change the scene, as `BodyStore.change`."""
+        matrix = self.contact_matrix
         super().change(setup, spawned)
-        self._rebuild_zones()
+        if self.contact_matrix is matrix:  # the same bodies, under another gravity
+            self.tracker.rebuild(matrix)
+        else:
+            self._rebuild_zones()
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body and return its index, as `BodyStore.add`."""

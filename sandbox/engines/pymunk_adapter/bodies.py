@@ -10,16 +10,15 @@ import numpy as np
 
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.actions import has_same_bodies
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.requirements import combination_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import Demand, demands, demands_of_body
+from sandbox.scene.compile.demands import Demand, air_demands, demands_of_body
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, World
 
 MAX_OVERLAPPED_BODIES = 100
 """Number of bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
@@ -143,9 +142,9 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.change`, or the settings or pymunk do not support the change.
         """
-        if faults := combination_faults(setup.scene, self._settings, self._demands(setup)):
+        if faults := combination_faults(setup.scene, self._settings, self._demands(setup.scene.world)):
             raise ActionError(faults[0])
-        has_new_bodies = spawned is not None or not has_same_bodies(setup.scene, self.scene)
+        matrix = self.contact_matrix
         self.refresh()
         present_velocity = self.velocity[self.mobile] - self.ahead
         super().change(setup, spawned)
@@ -155,16 +154,16 @@ class PymunkBodies(BodyStore):
                 self.space_bodies.set_velocity(index, self.velocity[index])
         self.particles.world = setup.scene.world
         self.particles.rebuild()
-        if has_new_bodies:
-            self.space_bodies.rebuild(setup.scene, self.bodies, self.contact_matrix)
-        else:
+        if self.contact_matrix is matrix:  # the same bodies, in another world
             self.space_bodies.rebuild_world(setup.scene, self.bodies)
+        else:
+            self.space_bodies.rebuild(setup.scene, self.bodies, self.contact_matrix)
         self.space_bodies.joints.update(setup.joints)
 
-    def _demands(self, setup: Setup) -> frozenset[Demand]:
-        """Return the demands of a setup, and of the bodies that actions have added."""
-        added = [e for e in self.bodies.elements[len(self.setup.bodies.elements) :] if isinstance(e, BodySpec)]
-        return demands(setup).union(*map(demands_of_body, added))
+    def _demands(self, world: World) -> frozenset[Demand]:
+        """Return the demands of the bodies, with those that actions have added, and of a world."""
+        kinematic = {Demand.KINEMATIC} if self.bodies.kinematic.any() else set()
+        return air_demands(world, self.bodies) | kinematic
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body and return its index, as `BodyStore.add`.
@@ -172,7 +171,7 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.add`, or pymunk does not support the body in the scene.
         """
-        wanted = self._demands(self.setup) | demands_of_body(single)
+        wanted = self._demands(self.scene.world) | demands_of_body(single)
         if faults := combination_faults(self.scene, self._settings, wanted):
             raise ActionError(f"pymunk: {faults[0]}")
         self.refresh()

@@ -13,7 +13,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import ALL
-from sandbox.engines.common.colliders import static_colliders
+from sandbox.engines.common.colliders import StaticColliders
 from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.tabletop.collisions import ELASTIC, STILL, Five, collide_balls, collide_cushion, collide_pucks
@@ -42,9 +42,8 @@ class Cushions(NamedTuple):
     """(C,)"""
 
 
-def cushions_of(scene: Scene, surface: IntArray) -> Cushions:
+def cushions_of(scene: Scene, static: StaticColliders, surface: IntArray) -> Cushions:
     """Return the cushions of a scene; `surface` (F,) are the surfaces of its static colliders."""
-    static = static_colliders(scene)
     collider = np.concatenate((static.plane_collider, static.segment_collider))
     height = [collider.height or 0.0 if isinstance(collider, Wall | Post) else 0.0 for collider in scene.fixed]
     return Cushions(

@@ -11,7 +11,7 @@ import numpy as np
 
 from sandbox.action import Action, ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.common.actions import apply_action
+from sandbox.engines.common.actions import apply_action, has_same_bodies
 from sandbox.engines.common.base import SteppedSimulation
 from sandbox.engines.common.body_store import BodyStore, HasBodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
@@ -83,7 +83,7 @@ class TabletopBodyStore(BodyStore):
     def _rebuild_stepper(self) -> None:
         """Update the stepper after a change of the bodies or of the scene."""
         if self.stepper is not None:
-            self.stepper.rebuild(self.scene, self.contact_matrix)
+            self.stepper.rebuild(self.scene, self.contact_matrix, self.static_colliders)
             state = BallArrays(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
             self.stepper.rebuild_arrays(state, self.bodies, self.present, self.held_by_zone)
 
@@ -146,11 +146,13 @@ class TabletopBodyStore(BodyStore):
         Raises:
             ActionError: as `BodyStore.change`, or the scene has something that is not supported on a surface.
         """
-        reason = next(unsupported_by_steppers(setup, self.bodies), None)
-        if reason is not None:
+        has_same = spawned is None and has_same_bodies(setup.scene, self.scene)
+        is_checked = has_same and setup.scene.world is self.scene.world
+        if not is_checked and (reason := next(unsupported_by_steppers(setup, self.bodies), None)):
             raise ActionError(reason)
         super().change(setup, spawned)
-        self._rebuild_stepper()
+        if has_same and self.stepper is not None:  # else it has been rebuilt with the bodies
+            self.stepper.rebuild(self.scene, self.contact_matrix, self.static_colliders)
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body that has been checked, and return its index.

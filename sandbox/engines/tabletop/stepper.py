@@ -18,6 +18,7 @@ from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND
 from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING
+from sandbox.engines.common.colliders import StaticColliders
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, join_batches
 from sandbox.engines.common.state_bounds import first_beyond
 from sandbox.engines.contract import Exhaustion
@@ -98,7 +99,7 @@ class TabletopStepper:
         self._captures: ContactBatch = NO_CONTACTS
         self._max_tests = TESTS_PER_PAIR * PAIRS.value
 
-    def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
+    def rebuild(self, scene: Scene, matrix: ContactMatrix, static: StaticColliders) -> None:
         """Update after a change of the scene's coefficients or surfaces."""
         surfaces, models = matrix.surfaces, scene.contact_models
         self._floor = figures_of(scene.surface)
@@ -111,7 +112,7 @@ class TabletopStepper:
             self._slop,
             self._correction,
         )
-        self._cushions: Cushions = cushions_of(scene, surfaces.of_fixed)
+        self._cushions: Cushions = cushions_of(scene, static, surfaces.of_fixed)
         self._surface: IntArray = surfaces.of_body
 
     def rebuild_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray, held: BoolArray) -> None:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.joint_arrays import JointKind
@@ -16,6 +17,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.world import World
 
 
 class Demand(StrEnum):
@@ -165,12 +167,7 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     gravity = world.gravity != (0.0, 0.0)
     yield Demand.GRAVITY, gravity, f"{list(world.gravity)} m/s²" if gravity else "world.gravity is zero"
 
-    why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
-    yield Demand.DRAG, world.has_drag, why if world.has_drag else "no drag"
-    why = f"{world.damping:g} of every velocity remains after 1 s" if world.has_damping else "no damping"
-    yield Demand.DAMPING, world.has_damping, why
-    lifted = int(np.count_nonzero(bodies.lift))
-    yield Demand.LIFT, lifted > 0, _count(lifted, "body has lift", "bodies have lift", "no body has lift")
+    yield from _air(world, bodies)
 
     free = int((matrix.free & ~bodies.fixed).sum())
     free_text = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
@@ -218,6 +215,21 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         limited > 0,
         _count(limited, "body has a lifetime", "bodies have a lifetime", "no body has a lifetime"),
     )
+
+
+def _air(world: World, bodies: Bodies) -> Iterator[tuple[Demand, bool, str]]:
+    why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
+    yield Demand.DRAG, world.has_drag, why if world.has_drag else "no drag"
+    why = f"{world.damping:g} of every velocity remains after 1 s" if world.has_damping else "no damping"
+    yield Demand.DAMPING, world.has_damping, why
+    lifted = int(np.count_nonzero(bodies.lift))
+    yield Demand.LIFT, lifted > 0, _count(lifted, "body has lift", "bodies have lift", "no body has lift")
+
+
+def air_demands(world: World, bodies: Bodies) -> frozenset[Demand]:
+    """Return the demands of forces that depend on velocity, without those of the rest of a scene, which take longer."""
+    acts = (Demand.DRAG, world.has_drag), (Demand.DAMPING, world.has_damping), (Demand.LIFT, bool(bodies.lift.any()))
+    return frozenset(demand for demand, on in acts if on)
 
 
 def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, bool, str]]:

@@ -9,7 +9,7 @@ from sandbox.engines.common.body_store import ALL, COLLISION_MASKS, FIXED, NOTHI
 from sandbox.engines.common.colliders import static_colliders
 from sandbox.engines.exact.common.requirements import overlap_message, overlapping_collider, touch_tolerance
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
-from sandbox.scene.compile.demands import AIR, curls, demands, demands_of_body, on_floor
+from sandbox.scene.compile.demands import air_demands, curls, demands_of_body, on_floor
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
@@ -87,7 +87,7 @@ class EventDrivenBodies(BodyStore):
                 surfaces; or a ball overlaps a collider that has moved or become solid.
         """
         scene = setup.scene
-        for demand in sorted(demands(setup) & AIR):
+        for demand in sorted(air_demands(scene.world, self.bodies)):
             raise ActionError(f"exact does not model {demand}; pymunk and reference do")
         is_checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
         if not is_checked and on_floor(setup) and (reason := next(unsupported_on_surface(setup, self.bodies), None)):
