@@ -151,8 +151,8 @@ class TabletopBodyStore(BodyStore):
         if not is_checked and (reason := next(unsupported_by_steppers(setup, self.bodies), None)):
             raise ActionError(reason)
         super().change(setup, spawned)
-        if has_same and self.stepper is not None:  # else it has been rebuilt with the bodies
-            self.stepper.rebuild(self.scene, self.contact_matrix, self.static_colliders)
+        if has_same:  # else it has been rebuilt with the bodies
+            self._rebuild_stepper()
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body that has been checked, and return its index.
