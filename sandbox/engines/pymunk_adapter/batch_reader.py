@@ -4,6 +4,7 @@ Reading a space takes longer than a substep of a few bodies. A loop of three cal
 are read as arrays afterwards, takes a tenth of the time of reading after each.
 """
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart
 from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_BODY, LIST_CONTACT, WORD, Listing
 from sandbox.engines.pymunk_adapter.reader import (
@@ -24,6 +25,7 @@ from sandbox.engines.pymunk_adapter.reader import (
     VECTORS,
     VECTORS_OF_TWO_POINTS,
 )
+from sandbox.scene.description.base import Point
 
 OrderOf = Callable[[bytes], IntArray | None]
 """Returns the rows of a list of bodies, given by its ids, in the order of the reader; None if they are in it."""
@@ -39,6 +41,52 @@ MAX_WORDS = 3 << 16
 
 MAX_CONTACTS = (MAX_WORDS // 3) * 2
 """Upper bound of the contacts in a batch, while a substep has no more than half of them."""
+
+
+StateCheck = Callable[[FloatArray], bool]
+"""Returns whether a state (6·R,) has to be checked: a body may have diverged or left `world.bounds`."""
+
+
+def state_check(
+    bodies: int,
+    moving: slice | IntArray,
+    within: Callable[[FloatArray], BoolArray],
+    bound: float,
+    bounds: tuple[Point, Point] | None,
+) -> StateCheck:
+    """Return a check that decides most states by the product of one vector with itself.
+
+    Args:
+        bodies: number of bodies in the space, R.
+        moving: rows of the moving bodies.
+        within: exact test of states (M, 6) of moving bodies, (M,) or (M, 4).
+        bound: states whose vector is shorter than this are within.
+        bounds: of the scene, m; None without any.
+    """
+
+    def is_within(state: FloatArray) -> bool:
+        return bool(within(state.reshape(-1, STATE_WIDTH)[moving]).all())
+
+    if bounds is None:
+        square = bound * bound if bound > 0.0 else -1.0
+        return lambda state: not state.dot(state) <= square and not is_within(state)  # nan: not within
+    low, high = np.asarray(bounds)
+    # An ellipsoid within all bounds, of the states of all moving bodies.
+    centre, scale = np.zeros((2, bodies, STATE_WIDTH))
+    is_inside = bound > float(np.hypot(*np.maximum(np.abs(low), np.abs(high))))
+    centre[moving, 0:2] = 0.5 * (low + high)
+    # slightly larger scale: rounding must not accept a state outside
+    scale[moving] = (*(2.0 * (1.0 + 1e-9) / (high - low)), *([1.0 / bound] * 4)) if is_inside else math.inf
+    centre, scale = centre.reshape(-1), scale.reshape(-1)
+
+    def needs_check(state: FloatArray) -> bool:
+        offset = (state - centre) * scale
+        if offset.dot(offset) <= 1.0:
+            return False
+        position = state.reshape(-1, STATE_WIDTH)[moving, 0:2]
+        return not ((position >= low).all() and (position <= high).all() and is_within(state))
+
+    return needs_check
 
 
 class Batch(NamedTuple):
@@ -86,7 +134,7 @@ class BatchReader:
         until_contact: bool,
         warm_start: Callable[[], WarmStart | None] | None,
         before_substep: Callable[[int, int], None] | None,
-        needs_check: Callable[[FloatArray], bool],
+        needs_check: StateCheck,
     ) -> Batch:
         """Make at most so many steps, until one whose state has to be checked.
 

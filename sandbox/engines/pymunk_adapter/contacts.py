@@ -7,6 +7,7 @@ second time. Without it, the impulses of a run add up to its change of momentum,
 impulse with which each contact begins, in a callback; this works for every shape.
 """
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from pymunk._chipmunk_cffi import lib
 from pymunk.batch import ArbiterFields
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
-from sandbox.engines.common.contact_log import ContactBatch
+from sandbox.engines.common.contact_log import ContactBatch, ContactLog
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, kick_works
 from sandbox.engines.pymunk_adapter.joint_impulses import JointImpulses
 from sandbox.engines.pymunk_adapter.munk2d_memory import CONTACT_POINT, WORD, Listing, address_of, points_of
@@ -269,14 +270,45 @@ class ContactReader:
         """Whether contacts have been read, so that impulses with which they begin are listed."""
         return self._warm_starts is not None and self._warm_starts.lists_pairs
 
-    def touching_in(
+    def read_batch(
+        self, lists: ContactLists, log: ContactLog, times: FloatArray, polygons: bool
+    ) -> Iterator[tuple[int, int]]:
+        """Enter the contacts of a batch into a log, as if they had been read after each substep.
+
+        Args:
+            lists: the contacts.
+            log: the log.
+            times: (B,) s, end of each substep.
+            polygons: as of `touching`.
+
+        Yields:
+            After each substep, or after several with the same pairs: the number of the next substep, and of contacts.
+        """
+        k = 0
+        while k < len(lists):
+            impulses = self._impulses_in(lists, k, polygons) if log.has_distinct_rows else NO_IMPULSES
+            if len(impulses):
+                log.add_impulse_rows(impulses)
+                k, count = k + len(impulses), impulses.size
+            else:
+                contacts = self._touching_in(lists, k, polygons, log.has_distinct_rows)
+                if isinstance(contacts, ContactBatch):
+                    log.record(float(times[k]), contacts)
+                    count = len(contacts.a)
+                else:
+                    log.add_impulses(contacts)
+                    count = len(contacts)
+                k += 1
+            yield k, count
+
+    def _touching_in(
         self, lists: ContactLists, k: int, polygons: bool, impulses_suffice: bool
     ) -> ContactBatch | ComplexArray:
         """Return the contacts of a substep of a batch, as `touching` would have done after it."""
         is_same = self._reader.use_list(lists.words(k), lists.vectors(k), polygons)
         return self._corrected(is_same and impulses_suffice, lists.warm_starts.get(k))
 
-    def impulses_in(self, lists: ContactLists, begin: int, polygons: bool) -> ComplexArray:
+    def _impulses_in(self, lists: ContactLists, begin: int, polygons: bool) -> ComplexArray:
         """Return the impulses (S, K), N·s, of substeps from `begin` on with the same contacts as the last one read.
 
         S is 0 if the contacts of the first of them differ, or need a correction.

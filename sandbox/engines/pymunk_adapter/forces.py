@@ -1,4 +1,4 @@
-"""Air, damping, attraction and thrust on bodies.
+"""Air, damping, attraction, thrust and constant forces on bodies.
 
 `AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
 position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
@@ -16,16 +16,19 @@ Damping is pymunk's own: in a step it multiplies velocities and spins by a facto
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pymunk
-from pymunk._chipmunk_cffi import lib
+from pymunk._chipmunk_cffi import ffi, lib
 
-from sandbox.arrays import FloatArray
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.forces.air import Air, mean_acceleration
 from sandbox.engines.forces.attraction import pull
 from sandbox.engines.forces.thrust import load
+from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
@@ -240,3 +243,122 @@ def damping_factor(damping: float, h: float) -> float:
     space.add(body)
     space.step(h)
     return body.velocity.x
+
+
+class ConstantForces:
+    """Constant force (N) and torque (N·m) on each body, by body index."""
+
+    def __init__(self) -> None:
+        self._action_forces: dict[int, tuple[FloatArray, float]] = {}
+        self._zone_forces: dict[int, FloatArray] = {}
+        self._total: dict[int, tuple[FloatArray, float]] = {}  # sums of both
+        self._prepared: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
+
+    @property
+    def with_zone_force(self) -> list[int]:
+        """Indices of the bodies on which a zone's gravity acts."""
+        return list(self._zone_forces)
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self._total)
+
+    def __len__(self) -> int:
+        return len(self._total)
+
+    def items(self) -> list[tuple[int, tuple[FloatArray, float]]]:
+        """Return index, and force and torque, of each body that has some."""
+        return list(self._total.items())
+
+    def set_force(self, index: int, force: FloatArray, torque: float) -> None:
+        """Apply a force and a torque to a body from now on."""
+        if force.any() or torque:
+            self._action_forces[index] = force, torque
+        else:
+            self._action_forces.pop(index, None)
+        self._sum(index)
+
+    def set_zone_force(self, index: int, force: FloatArray | None) -> None:
+        """Apply a zone's force (2,), N, to a body from now on, in place of any other zone's; None: no zone's."""
+        if force is None and index not in self._zone_forces:
+            return
+        if force is None:
+            del self._zone_forces[index]
+        else:
+            self._zone_forces[index] = force
+        self._sum(index)
+
+    def _sum(self, index: int) -> None:
+        self._prepared = None
+        action, zone_force = self._action_forces.get(index), self._zone_forces.get(index)
+        if action is not None:
+            self._total[index] = action if zone_force is None else (action[0] + zone_force, action[1])
+        elif zone_force is not None:
+            self._total[index] = zone_force, 0.0
+        else:
+            self._total.pop(index, None)
+
+    def drop(self, index: int) -> None:
+        """Remove all forces on a body."""
+        for each in (self._action_forces, self._zone_forces, self._total):
+            each.pop(index, None)
+        self._prepared = None
+
+    @property
+    def total(self) -> Mapping[int, tuple[FloatArray, float]]:
+        """Force and torque on each body that has some, by body index."""
+        return self._total
+
+    def apply(self, body_of: Callable[[int], pymunk.Body]) -> None:
+        """Set forces and torques for the next step, in a scene without air."""
+        if self._prepared is None:
+            self._prepared = [
+                (body_of(index)._body, ffi.new("cpVect *", force.tolist())[0], torque)
+                for index, (force, torque) in self._total.items()
+            ]
+        for record, force, torque in self._prepared:  # pymunk's setters take five times as long
+            lib.cpBodySetForce(record, force)
+            if torque:  # pymunk resets it to 0 after each step
+                lib.cpBodySetTorque(record, torque)
+
+    def apply_with_air(
+        self,
+        body_of: Callable[[int], pymunk.Body],
+        loads: Mapping[int, tuple[float, float, float]],
+        reader: SpaceReader,
+        state: tuple[IntArray, FloatArray],
+        springs: FloatArray | None,
+        air: Air,
+        gravity: Point,
+        h: float,
+    ) -> None:
+        """Set forces and torques for the next step of h, s, in a scene whose air acts.
+
+        Args:
+            body_of: returns a body by its index.
+            loads: force (x, y), N, and torque, N·m, of thrusts, by body index.
+            reader: of the space; it sets the forces on all bodies at once.
+            state: body indices (R,), and position, angle, velocity, spin (R, 6).
+            springs: (R, 2) N, which pymunk itself adds in that step, or None. Drag reduces their effect.
+            air: its coefficients.
+            gravity: m/s².
+            h: substep, s.
+        """
+        indices, values = state
+        mass = np.asarray([body_of(n).mass for n in indices.tolist()])[:, None]
+        mass[np.isinf(mass)] = 0.0  # of bodies moved by a drive or held by a zone: no force affects them
+        applied = np.zeros((len(indices), 2))
+        for row, index in enumerate(indices.tolist()):
+            if mass[row] and (index in self._total or index in loads):
+                constant = self._total[index][0] if index in self._total else 0.0
+                thrust = loads[index][0:2] if index in loads else 0.0
+                applied[row] = np.add(constant, thrust) * (1.0 / mass[row])
+        if springs is not None:
+            spring_acceleration = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
+            applied += spring_acceleration
+        mean = mean_acceleration(air, indices, gravity, values[:, 3:5], values[:, 5], applied, h)
+        reader.set_forces(mass * (mean if springs is None else mean - spring_acceleration))
+        torques = {index: torque for index, (_, torque) in self._total.items()}
+        for index, (_, _, torque) in loads.items():
+            torques[index] = torques.get(index, 0.0) + torque
+        for index, torque in torques.items():
+            body_of(index).torque = torque

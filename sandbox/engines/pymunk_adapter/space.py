@@ -1,18 +1,19 @@
 """Bodies in the pymunk space: their creation, steps and state."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pymunk
+from pymunk._chipmunk_cffi import lib
 
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.forces.air import Air, mean_fraction, rates
-from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader
-from sandbox.engines.pymunk_adapter.body_table import ConstantForces, SpaceBody, SpaceBodyTable
+from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader, StateCheck, state_check
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
@@ -25,11 +26,11 @@ from sandbox.engines.pymunk_adapter.colliders import (
     skip_numbers,
 )
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
-from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
+from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
-from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts
+from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
-from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
+from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
@@ -39,7 +40,20 @@ from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
 
 
-class SpaceBodies(SpaceBodyTable):
+class SpaceBody(NamedTuple):
+    """A body in the space, with its shapes; a body that can touch nothing has none."""
+
+    body: pymunk.Body
+    shapes: tuple[tuple[int, pymunk.Shape], ...]
+    """each shape with its index among the shapes of all bodies"""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is not fixed."""
+        return self.body.body_type != pymunk.Body.STATIC
+
+
+class SpaceBodies:
     """Bodies in a space, addressed by their indices. Static shapes are added when the first body joins."""
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
@@ -49,7 +63,10 @@ class SpaceBodies(SpaceBodyTable):
         self._h = settings.h
         self.air = Air.of(scene.world, setup.bodies)
         """forces that depend on velocity"""
-        super().__init__(new_space(scene, settings))
+        self._space = new_space(scene, settings)
+        self._members: dict[int, SpaceBody] = {}
+        self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of bodies held by zones
+        self._state: tuple[IntArray, FloatArray] | None = None  # as last read; None after a change
         self._reader = SpaceReader(self._space, bool(settings.sleeping))
         self._batch_reader = BatchReader(self._space, self._reader.order_of if settings.sleeping else None)
         self._surface_setter = SurfaceSetter(self._space, settings.h)
@@ -71,7 +88,7 @@ class SpaceBodies(SpaceBodyTable):
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
-        self._needs_check: Callable[[FloatArray], bool] | None = None
+        self._needs_check: StateCheck | None = None
 
     def __len__(self) -> int:
         return self._moving
@@ -106,6 +123,84 @@ class SpaceBodies(SpaceBodyTable):
             walls = {index: each for each, index in self._static_shapes.ids.items()}
             pairs = [(n, walls[wall]) for n, wall in self._setup.passing if n in self._members]
             self._surface_setter.one_way_walls.resume([(self._members[n].body.id, wall) for n, wall in pairs])
+
+    def _body(self, index: int) -> pymunk.Body:
+        return self._members[index].body
+
+    def holds(self, index: int) -> bool:
+        """Return whether a body is in the space."""
+        return index in self._members
+
+    def movable_indices(self) -> list[int]:
+        """Return the indices of the bodies that are not fixed."""
+        return [index for index, member in self._members.items() if member.moves]
+
+    def position_of(self, index: int) -> tuple[float, float]:
+        """Return the position of a body, m."""
+        vector = lib.cpBodyGetPosition(self._members[index].body._body)
+        return vector.x, vector.y
+
+    def moment(self, index: int) -> float:
+        """Return a body's moment of inertia, kg·m²; infinite if nothing in the scene can turn it."""
+        return self._resting[index][1] if index in self._resting else self._members[index].body.moment
+
+    def give_moment(self, index: int, moment: float) -> None:
+        """Set a body's moment of inertia, kg·m², so that it can turn."""
+        if index in self._resting:
+            self._resting[index] = self._resting[index][0], moment
+        else:
+            self._members[index].body.moment = moment
+
+    def set_position(self, index: int, position: FloatArray) -> None:
+        """Set the position of a body, m.
+
+        The next step updates the tree of shapes that are not static. To do it here would change the order of contacts,
+        compared with a game that sets `body.position`.
+        """
+        body = self._members[index].body
+        body.position = float(position[0]), float(position[1])
+        self._update_pose(body)
+
+    def set_angle(self, index: int, angle: float) -> None:
+        """Set the angle of a body, rad; see `set_position`."""
+        body = self._members[index].body
+        body.angle = angle
+        self._update_pose(body)
+
+    def _update_pose(self, body: pymunk.Body) -> None:
+        """Update the tree of static shapes and the state after a body was placed."""
+        if body.body_type == pymunk.Body.STATIC:
+            self._space.reindex_shapes_for_body(body)
+        self._state = None
+
+    def set_velocity(self, index: int, velocity: FloatArray) -> None:
+        """Set the velocity of a body, m/s."""
+        self._members[index].body.velocity = float(velocity[0]), float(velocity[1])
+        self._state = None
+
+    def set_spin(self, index: int, spin: float) -> None:
+        """Set the angular velocity of a body, rad/s."""
+        self._members[index].body.angular_velocity = spin
+        self._state = None
+
+    def hold(self, index: int) -> None:
+        """Hold a body in place, whatever it collides with, until `release`."""
+        if index in self._resting:  # it is kinematic already and has no mass in pymunk
+            return
+        body = self._members[index].body
+        self._resting[index] = body.mass, body.moment
+        body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
+        body.body_type = pymunk.Body.KINEMATIC
+        pymunk.Body.update_position(body, 0.0)  # resets the bias velocity of the overlap correction
+        self._state = None
+
+    def release(self, index: int) -> None:
+        """Release a body that was held."""
+        body = self._members[index].body
+        body.body_type = pymunk.Body.DYNAMIC
+        body.mass, body.moment = self._resting.pop(index)
+        body.force, body.torque = (0.0, 0.0), 0.0  # of thrusts, set while it was held
+        self._state = None
 
     def passing(self) -> IntArray | None:
         """Return the pairs (P, 2) of a body and the one-way wall, −1 − k, that it passes through; None without any."""
@@ -210,7 +305,7 @@ class SpaceBodies(SpaceBodyTable):
         """Add the scene's joints, once; jointed bodies are always in the space."""
         assert self._settings.bias is not None
         if self._members:
-            self.joints.add(joints, lambda index: self._members[index].body, self._settings.bias)
+            self.joints.add(joints, self._body, self._settings.bias)
 
     @property
     def asleep(self) -> BoolArray | None:
@@ -285,7 +380,7 @@ class SpaceBodies(SpaceBodyTable):
             self._apply_air(*self._read())
             return
         if self.constant_forces:
-            self.constant_forces.apply(self._members)
+            self.constant_forces.apply(self._body)
         if self.thrusts:
             self.thrusts.apply(time, self._h, self.constant_forces.total)
 
@@ -351,41 +446,14 @@ class SpaceBodies(SpaceBodyTable):
         self._state = self._reader.moving_indices, batch.states[-1]
         return batch
 
-    def _state_check(self) -> Callable[[FloatArray], bool]:
-        """Return a function of a list of all bodies (6·R,): whether one may have left `world.bounds` or diverged.
-
-        It is kept until bodies or bounds change. It decides most states by the product of one vector with itself.
-        """
-        if self._needs_check is not None:
-            return self._needs_check
-        moving, within, bounds = self._reader.moving_rows, self._static_shapes.within, self._scene.world.bounds
-        bound = self._static_shapes.quick_bound
-
-        def is_within(state: FloatArray) -> bool:
-            return bool(within(state.reshape(-1, STATE_WIDTH)[moving]).all())
-
-        if bounds is None:
-            square = bound * bound if bound > 0.0 else -1.0
-            self._needs_check = lambda state: not state.dot(state) <= square and not is_within(state)  # nan: not within
-            return self._needs_check
-        low, high = np.asarray(bounds)
-        # An ellipsoid within all bounds, of the states of all moving bodies.
-        centre, scale = np.zeros((2, self._reader.body_count, STATE_WIDTH))
-        is_inside = bound > float(np.hypot(*np.maximum(np.abs(low), np.abs(high))))
-        centre[moving, 0:2] = 0.5 * (low + high)
-        # slightly larger scale: rounding must not accept a state outside
-        scale[moving] = (*(2.0 * (1.0 + 1e-9) / (high - low)), *([1.0 / bound] * 4)) if is_inside else math.inf
-        centre, scale = centre.reshape(-1), scale.reshape(-1)
-
-        def needs_check(state: FloatArray) -> bool:
-            offset = (state - centre) * scale
-            if offset.dot(offset) <= 1.0:
-                return False
-            position = state.reshape(-1, STATE_WIDTH)[moving, 0:2]
-            return not ((position >= low).all() and (position <= high).all() and is_within(state))
-
-        self._needs_check = needs_check
-        return needs_check
+    def _state_check(self) -> StateCheck:
+        """Return the check of states after each step of a batch; it is kept until bodies or bounds change."""
+        if self._needs_check is None:
+            reader, static = self._reader, self._static_shapes
+            self._needs_check = state_check(
+                reader.body_count, reader.moving_rows, static.within, static.quick_bound, self._scene.world.bounds
+            )
+        return self._needs_check
 
     def write_states(
         self,
@@ -405,39 +473,14 @@ class SpaceBodies(SpaceBodyTable):
         position[:, self._reader.slots] = states[..., 0:2]
 
     def read_batch(self, lists: ContactLists, log: ContactLog, times: FloatArray) -> Iterator[tuple[int, int]]:
-        """Enter the contacts of a batch into a log, as if they had been read after each substep.
-
-        Args:
-            lists: the contacts.
-            log: the log.
-            times: (B,) s, end of each substep.
-
-        Yields:
-            After each substep, or after several with the same pairs: the number of the next substep, and of contacts.
-        """
-        reader, polygons = self.contact_reader, self._polygons
-        k = 0
-        while k < len(lists):
-            impulses = reader.impulses_in(lists, k, polygons) if log.has_distinct_rows else NO_IMPULSES
-            if len(impulses):
-                log.add_impulse_rows(impulses)
-                k, count = k + len(impulses), impulses.size
-            else:
-                contacts = reader.touching_in(lists, k, polygons, log.has_distinct_rows)
-                if isinstance(contacts, ContactBatch):
-                    log.record(float(times[k]), contacts)
-                    count = len(contacts.a)
-                else:
-                    log.add_impulses(contacts)
-                    count = len(contacts)
-                k += 1
-            yield k, count
+        """Enter the contacts of a batch into a log, as `ContactReader.read_batch`."""
+        return self.contact_reader.read_batch(lists, log, times, self._polygons)
 
     def _apply_air(self, indices: IntArray, state: FloatArray) -> None:
         """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene whose air acts."""
         springs, loads = self._springs(indices, state), self.thrusts.loads
         self.constant_forces.apply_with_air(
-            self._members, loads, self._reader, (indices, state), springs, self.air, self._scene.world.gravity, self._h
+            self._body, loads, self._reader, (indices, state), springs, self.air, self._scene.world.gravity, self._h
         )
         if self.field.attracts:
             fractions = mean_fraction(rates(self.air, indices, state[:, 3:5], state[:, 5]), self._h).tolist()
