@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import MAX_SLOP, Settings
 
@@ -54,12 +53,12 @@ def setting_faults(
     ]
 
 
-def slop_of(start: Scene | Setup) -> float:
+def slop_of(setup: Setup) -> float:
     """Return the default slop, m: the overlap that is not corrected.
 
     It follows from the thinnest body that can collide.
     """
-    bodies = Setup.of(start).bodies
+    bodies = setup.bodies
     can_collide = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
     min_thickness = float(bodies.thin[can_collide].min()) if can_collide.any() else 1.0
     return min(SLOP_PER_RADIUS * min_thickness, MAX_SLOP)

@@ -3,7 +3,6 @@
 import numpy as np
 
 from sandbox.resource_limits import PAIRS, STEP_WORK
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
@@ -14,9 +13,8 @@ DETECTION_COST = 10
 """Cost of finding one contact in a substep, in iterations of one contact."""
 
 
-def overload(start: Scene | Setup, settings: Settings) -> list[str]:
+def overload(setup: Setup, settings: Settings) -> list[str]:
     """Return why a step would take too long: because of its iterations, or of its attractions."""
-    setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies
     can_collide = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
     is_moving = can_collide & ~bodies.fixed

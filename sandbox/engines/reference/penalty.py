@@ -22,7 +22,6 @@ from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.velocity_solver import ImpulseSolution, ImpulseSolver, Motion, SpringContacts
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.drives import mounts
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import MAX_STIFFNESS, Settings
 
@@ -323,9 +322,8 @@ DAMPER = 1.3
 """Factor of the damping ratio by which ω·h is divided if the damper limits the step"""
 
 
-def smallest_reduced_mass(start: Scene | Setup) -> float:
+def smallest_reduced_mass(setup: Setup) -> float:
     """Return the smallest reduced mass, kg, of a pair that can collide; for two equal balls half the mass."""
-    setup = Setup.of(start)
     scene, matrix, bodies = setup.scene, contact_matrix(setup), setup.bodies
     mass, moving, hinged = bodies.mass, ~(bodies.fixed | bodies.kinematic), False
     if scene.drives:
@@ -343,10 +341,10 @@ def smallest_reduced_mass(start: Scene | Setup) -> float:
     return float(masses.min()) * (0.5 if matrix.ball_ball or hinged else 1.0)
 
 
-def default_stiffness(start: Scene | Setup, settings: Settings) -> float:
+def default_stiffness(setup: Setup, settings: Settings) -> float:
     """Return the default stiffness, N/m, for the step and damping of the settings."""
-    stiffest_damper = max(_dampings(contact_matrix(start), settings), default=0.0)
-    own = smallest_reduced_mass(start) * (DEFAULT_FREQUENCY / max(1.0, DAMPER * stiffest_damper) / settings.h) ** 2
+    stiffest_damper = max(_dampings(contact_matrix(setup), settings), default=0.0)
+    own = smallest_reduced_mass(setup) * (DEFAULT_FREQUENCY / max(1.0, DAMPER * stiffest_damper) / settings.h) ** 2
     return min(own, MAX_STIFFNESS)
 
 
@@ -358,14 +356,14 @@ def _dampings(matrix: ContactMatrix, settings: Settings) -> list[float]:
     return [damping_of(max(e, MIN_RESTITUTION)) for e in restitution.tolist()]
 
 
-def instability(start: Scene | Setup, settings: Settings, stiffness_stated: bool = True) -> str | None:
+def instability(setup: Setup, settings: Settings, stiffness_stated: bool = True) -> str | None:
     """Return why penalty springs are unstable or impossible with the settings; None if they are stable.
 
     The stiffest case is a ball between several springs: two to static colliders, six in a close packing. There its
     frequency is √3 times that of a pair (ω² = 6 k/m in the mode of the shortest waves; 2 k/m for a pair).
     """
     assert settings.stiffness is not None and settings.integrator is not None
-    matrix = contact_matrix(start)
+    matrix = contact_matrix(setup)
     if not matrix.touching.any():
         return None
     table = matrix.surfaces.restitution[matrix.touching]
@@ -377,7 +375,7 @@ def instability(start: Scene | Setup, settings: Settings, stiffness_stated: bool
         )
     dampings = _dampings(matrix, settings)
     neighbours = np.sqrt(3.0) if matrix.ball_ball else np.sqrt(2.0)
-    frequency = neighbours * np.sqrt(settings.stiffness / smallest_reduced_mass(start))
+    frequency = neighbours * np.sqrt(settings.stiffness / smallest_reduced_mass(setup))
     worst = max(dampings, key=lambda z: _amplification(settings, frequency, neighbours * z, settings.h))
     if _amplification(settings, frequency, neighbours * worst, settings.h) <= 1.0 + ROUNDING:
         return None

@@ -12,12 +12,11 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 
 
-def unsupported_on_surface(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+def unsupported_on_surface(setup: Setup, bodies: Bodies | None = None) -> Iterator[str]:
     """Yield the features that no engine supports on a surface, with the scene's bodies or with given ones.
 
     Pucks have upright sides, so that pucks of different radii collide horizontally. Balls of different radii do not.
     """
-    setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     if scene.world.gravity != (0.0, 0.0):
         yield "it does not model world.gravity in the plane of a floor"
@@ -46,9 +45,8 @@ def on_floor(start: Scene | Setup) -> bool:
     return (scene.surface is not None or bool(scene.pockets)) and has_floor(start)
 
 
-def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+def unsupported_by_steppers(setup: Setup, bodies: Bodies | None = None) -> Iterator[str]:
     """Yield the features that no time-step solver supports on a surface, with the scene's bodies or with given ones."""
-    setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     yield from unsupported_on_surface(setup, bodies)
     for demand in sorted(demands(setup) & AIR):

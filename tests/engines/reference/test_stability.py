@@ -11,6 +11,7 @@ from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.penalty import smallest_reduced_mass
 from sandbox.engines.registry import ENGINES
+from sandbox.scene.compile.setup import Setup
 from tests.engines.builders import EARTH, FLOOR, ball, scene_of, simulation_of
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
@@ -117,9 +118,9 @@ def test_unsupported_settings_are_refused_with_a_reason(choice, reason):
 
 
 def test_smallest_reduced_mass_is_that_of_the_lightest_pair():
-    assert smallest_reduced_mass(falling_balls(mass=3.0)) == 3.0
-    assert smallest_reduced_mass(falling_balls(mass=3.0, count=2)) == 1.5
-    assert smallest_reduced_mass(scene_of(ball(0, 0, collides="none"))) == 1.0
+    assert smallest_reduced_mass(Setup.of(falling_balls(mass=3.0))) == 3.0
+    assert smallest_reduced_mass(Setup.of(falling_balls(mass=3.0, count=2))) == 1.5
+    assert smallest_reduced_mass(Setup.of(scene_of(ball(0, 0, collides="none")))) == 1.0
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
