@@ -346,7 +346,7 @@ class SwitchableSimulation:
             Divergence: the state is not finite, or exceeds the bounds.
             Exhaustion: the step needs more memory or work than its limit.
         """
-        self._advance(1.0, self._segment.simulation.step)
+        self._make_step(1.0, self._segment.simulation.step)
 
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
@@ -384,14 +384,14 @@ class SwitchableSimulation:
             ValueError: `part` is out of range.
         """
         length = 1.0 if self.makes_whole_steps else part
-        self._advance(length, lambda: self._segment.simulation.finish(part))
+        self._make_step(length, lambda: self._segment.simulation.finish(part))
 
     @property
     def makes_whole_steps(self) -> bool:
         """Whether no step is shorter than dt, so that a run may end after its duration."""
         return self._segment.simulation.makes_whole_steps
 
-    def _advance(self, part: float, advance: Callable[[], None]) -> None:
+    def _make_step(self, part: float, advance: Callable[[], None]) -> None:
         """Apply the mouse joints, and advance the engine, for a fraction of a step."""
         simulation = self._segment.simulation
         if self._pulls.any:

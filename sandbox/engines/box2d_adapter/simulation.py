@@ -135,7 +135,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         for index in np.flatnonzero((force.any(axis=1) | (torque != 0.0)) & moving).tolist():
             self._world.push(index, force[index], float(torque[index]))
 
-    def _advance(self, part: float) -> None:
+    def _make_step(self, part: float) -> None:
         """Advance by a fraction of dt: in one step of Box2D, or in one for each substep if forces vary."""
         substeps = self._settings.substeps
         count = substeps if self._has_varying_forces else 1

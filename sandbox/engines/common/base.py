@@ -230,7 +230,7 @@ class SteppedSimulation(BaseSimulation):
         """
         with self._lock, np.errstate(all="ignore"):  # `_finish_step` reports a state that is not finite
             self._check_running()
-            self._advance(1.0)
+            self._make_step(1.0)
             self._steps += 1
             self._finish_step()
 
@@ -246,16 +246,16 @@ class SteppedSimulation(BaseSimulation):
         with self._lock, np.errstate(all="ignore"):
             self._check_running()
             if self.makes_whole_steps:
-                self._advance(1.0)
+                self._make_step(1.0)
                 self._steps += 1
             else:
-                self._advance(part)
+                self._make_step(part)
                 self._part = part
             self._finish_step()
             self._ended = True
 
     @abstractmethod
-    def _advance(self, part: float) -> None:
+    def _make_step(self, part: float) -> None:
         """Advance the bodies by a fraction of dt, 0 < part <= 1."""
 
     @abstractmethod

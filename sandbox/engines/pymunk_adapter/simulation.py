@@ -167,7 +167,7 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
         """
         with self._lock:
             self._check_running()
-            self._advance(self._settings.substeps)
+            self._make_step(self._settings.substeps)
             self._steps += 1
             self._check_state()
             self._retire()
@@ -221,7 +221,7 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
         )
         recorder, lists = self._recorder, batch.contacts
         if recorder is not None and lists is not None and (observed or recorder.has_new(lists)):
-            # The time of a substep is that of `_advance`: counted from the start of its step.
+            # The time of a substep is that of `_make_step`: counted from the start of its step.
             step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
             starts = (self._steps + step_index) * self._settings.dt + k * h
             pairs = recorder.record_lists(lists, starts + h, observed)
@@ -364,7 +364,7 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
         if self._store.ended:
             raise RuntimeError("the simulation has ended; its state can be read, but it cannot continue")
 
-    def _advance(self, substeps: int) -> None:
+    def _make_step(self, substeps: int) -> None:
         """Advance by some substeps from the start of a step. Particles and the space are independent of each other."""
         # An observer gets all bodies after each substep, and the ledger needs them all too.
         with_particles = self._observer is not None or self._ledger is not None

@@ -115,10 +115,10 @@ class CompiledStepper:
             top=float(high[1]),
         )
         self._bodies, self._walls = _body_columns(world, store), _wall_columns(store, pipeline.segment_boxes)
-        self._advance: Callable[..., tuple[int, int, int, int]] = advance_balls
+        self._kernel: Callable[..., tuple[int, int, int, int]] = advance_balls
         self._shapes: BallColumns | PieceColumns
         if isinstance(pipeline, ConvexPipeline):
-            self._advance, self._shapes = advance_pieces, _piece_columns(pipeline)
+            self._kernel, self._shapes = advance_pieces, _piece_columns(pipeline)
         else:
             self._shapes = _ball_columns(pipeline, store)
         self._log = StepLog(
@@ -226,7 +226,7 @@ class CompiledStepper:
         if observed:
             path[0] = x[0, :, :2]
         warm_start = min(numbers.h / memory.h, 1.0)
-        made, rest, written, code = self._advance(
+        made, rest, written, code = self._kernel(
             *self.constants,
             state,
             self._scratch,

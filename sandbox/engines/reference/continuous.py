@@ -107,18 +107,18 @@ def bisect(world: WorldState, h: float) -> Iterator[StepRecord]:
     left, resting_speed = h, world.resting_speed(h)
     for _ in range(MAX_IMPACTS):
         resting = resting_pairs(world, left)
-        colliding = new_contacts(world, world.advance(left), resting, resting_speed)
+        colliding = new_contacts(world, world.integrate(left), resting, resting_speed)
         if not colliding.size:
             break
         low, high = 0.0, left
         while high - low > BISECTION_TOLERANCE * h:
             middle = 0.5 * (low + high)
-            found = new_contacts(world, world.advance(middle), resting, resting_speed)
+            found = new_contacts(world, world.integrate(middle), resting, resting_speed)
             if found.size:
                 colliding, high = found, middle
             else:
                 low = middle
-        motion = world.advance(low)
+        motion = world.integrate(low)
         colliding = simultaneous_contacts(world, motion.placed, colliding)
         yield world.impact(motion, persistent_contacts(world, motion, resting, colliding), colliding, low)
         left -= low
@@ -149,7 +149,7 @@ def _max_displacement(world: WorldState, h: float) -> float:
 
     The speeds at both ends count too, because a body that rises and falls back in h has moved without a displacement.
     """
-    pipeline, x, moved = world.pipeline, world.x, world.advance(h).placed
+    pipeline, x, moved = world.pipeline, world.x, world.integrate(h).placed
     still = np.zeros_like(x[1])
     displacements = (x[0], moved[0]), (still, h * x[1]), (still, h * moved[1])
     return max(pipeline.max_displacement(start, end) for start, end in displacements)
@@ -162,10 +162,10 @@ def swept(world: WorldState, h: float) -> Iterator[StepRecord]:
     left, resting_speed = h, world.resting_speed(h)
     resting = resting_pairs(world, left)
     for _ in range(MAX_IMPACTS):
-        fraction, key = pipeline.first_touch(world.x[0], world.advance(left).placed[0], resting)
+        fraction, key = pipeline.first_touch(world.x[0], world.integrate(left).placed[0], resting)
         if key < 0:
             break
-        motion = world.advance(fraction * left)
+        motion = world.integrate(fraction * left)
         contact = pipeline.pair_manifold(motion.placed[0], key)
         if world.closing_speed(contact, motion.placed)[0] <= min(
             resting_speed, MAX_RESTING_APPROACH * contact.rn.sum() / left

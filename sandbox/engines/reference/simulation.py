@@ -201,7 +201,7 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         if self._observer is not None:
             observe_path(self._observer, starts, result.path, pairs)
 
-    def _advance(self, part: float) -> None:
+    def _make_step(self, part: float) -> None:
         """Advance by the whole substeps in a fraction of dt, then by a shorter one."""
         whole, rest = divmod(part * self._settings.substeps, 1.0)
         begin, h = self._steps * self._settings.dt, self._h

@@ -1,6 +1,6 @@
 """The world of a running simulation, and one step of it with discrete collision detection.
 
-    motion = world.advance(h)                          forces and free motion
+    motion = world.integrate(h)                        forces and free motion
     contacts = world.solver.detect(motion)             broad phase, filter, narrow phase
     solution = world.solver.solve(motion, contacts, h) contacts, joints and stops
     world.solver.correct(solution, h)                  overlap, for the next step
@@ -94,7 +94,7 @@ def step(world: "WorldState", h: float) -> StepRecord:
         Exhaustion: there are too many contacts for the limits of work or memory.
     """
     # 1. Forces and free motion without contacts, with joints that are solved by positions
-    motion = world.advance(h)
+    motion = world.integrate(h)
     # 2. Detect: broad phase, filter, narrow phase
     contacts = world.solver.detect(motion)
     # 3. Solve: impulses of contacts, joints and stops, warm-started by those of the last step
@@ -277,7 +277,7 @@ class WorldState:
         assert self._settings.integrator is not None
         return INTEGRATORS[self._settings.integrator].fraction
 
-    def advance(self, h: float) -> Motion:
+    def integrate(self, h: float) -> Motion:
         """Return the motion of all bodies over h, s, without contact impulses. The present state is not changed."""
         return self.solver.integrate(self.x, self.forces, self.time, h)
 

@@ -235,7 +235,7 @@ class SteppedTabletopSimulation(HasBodyStore, SteppedSimulation):
         """Work counters since the start. Collisions are resolved one by one, without iterations."""
         return {"substeps": self.substeps, **self._detector.work}
 
-    def _advance(self, part: float) -> None:
+    def _make_step(self, part: float) -> None:
         """Advance by the whole substeps in a fraction of dt, then by a shorter one."""
         whole, rest = divmod(part * self._settings.substeps, 1.0)
         begin = self._steps * self._settings.dt

@@ -236,7 +236,7 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         """Return the angular velocity about x and y, (N, 2) rad/s, for scenes that have one."""
         return None
 
-    def _advance(self, part: float) -> None:
+    def _make_step(self, part: float) -> None:
         """Process all events in a fraction of dt; between calls of the event loop check the limits and grow the log."""
         until = (self._steps + part) * self._settings.dt
         start, compile_start = perf_counter(), COMPILE_CLOCK.seconds
