@@ -174,6 +174,21 @@ def test_ledger_closes_with_drag_and_every_other_force(drag, fixed):
     assert account[Cause.DRAG] != 0.0
 
 
+def test_ledger_closes_with_drag_where_a_spring_presses_balls_into_a_floor():
+    """The correction of overlap moves the ends of the spring after its force in the step was predicted."""
+    balls = [
+        {**ball(name, x, y), "radius": 0.1, "collides": "all"} for name, x, y in (("a", 0.0, 0.02), ("c", 0.15, 0.05))
+    ]
+    floor = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    scene = scene_of(
+        {"linear_drag": 30.0},
+        ball=balls,
+        plane=[floor],
+        joint=[spring("a", "c", 3000.0, 0.5, anchors=[[0.0, 0.0], [0.0, 0.0]])],
+    )
+    closed_account(scene, 100)
+
+
 def test_forces_are_unscaled_without_drag():
     """Without drag a mass on a spring follows semi-implicit Euler exactly."""
     held = spring("a", None, 50.0, anchors=[[0.0, 0.0], [0.0, 0.0]])

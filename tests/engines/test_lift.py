@@ -7,13 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sandbox.action import ActionError, Force, Spawn
+from sandbox.action import ActionError, Force, Remove, SetParameter, Spawn
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
 from sandbox.measure.analytic import free_flight, unsupported_reason
 from sandbox.measure.metrics.invariants import conserves_energy, momentum_drift
+from sandbox.measure.preflight.checks import warnings
+from sandbox.measure.preflight.speed_bound import unknown_speeds
 from sandbox.measure.run.runner import run
 from sandbox.pymunk_export.obstacles import obstacles
 from sandbox.scene.compile.scene import Scene
@@ -88,7 +90,7 @@ def test_flight_in_closed_form_agrees_with_an_integration() -> None:
 
 
 def test_ball_drifts_across_gravity() -> None:
-    """Released at rest, it follows a cycloid with the mean velocity g/Ω to the right: it does not fall."""
+    """Released at rest, it does not fall: it follows a cycloid with the mean velocity g/Ω, to the left of gravity."""
     period = 2.0 * math.pi / TURNING
     world = World(gravity=(0.0, -9.81))
     times = period * np.arange(4.0)
@@ -224,6 +226,48 @@ def test_spawn_of_lift_that_an_engine_does_not_model_leaves_the_simulation_uncha
     with pytest.raises(ActionError, match=reason):
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(5.0, 5.0), radius=0.1, lift=0.1)))
     assert simulation.state_hash() == before
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
+def test_spawn_of_lift_on_a_surface_is_refused(engine: str) -> None:
+    scene = scene_of(ball(lift=0.0), surface={"sliding_friction": 0.2})
+    with pytest.raises(ActionError, match="does not model lift"):
+        start(scene, engine).apply(Spawn(time=0.0, ball=Ball(position=(5.0, 5.0), radius=0.1, lift=0.1)))
+
+
+@pytest.mark.parametrize("engine", ABLE)
+def test_lift_of_a_removed_body_counts_no_more(engine: str) -> None:
+    simulation = start(scene_of(ball(), ball(name="b", position=[9.0, 9.0], lift=0.0)), engine)
+    simulation.apply(Remove(time=0.0, body="a"))
+    simulation.apply(SetParameter(time=0.0, path="world.damping", value=0.5))  # pymunk refuses it together with lift
+    for _ in range(100):
+        simulation.step()
+    assert simulation.frame().velocity[1, 0] == pytest.approx(0.5 * SPEED, rel=0.005)  # box2d: 1/(1 + λh) a step
+
+
+def test_lift_on_a_driven_body_is_an_error() -> None:
+    drive = {"kind": "stroke", "name": "d", "body": "a", "rate": 1.0, "pivot": [1.0, 2.0], "stops": [0.0, 1.0]}
+    with pytest.raises(SceneError, match="has lift, which has no effect on a driven body"):
+        scene_of(ball(velocity=[0.0, 0.0], angular_velocity=0.0), drive=[drive])
+
+
+def test_no_speed_is_known_where_lift_meets_wind() -> None:
+    """In the air's frame a wall moves, and a bounce on it adds speed each time."""
+    wall = {"name": "w", "point": [3.0, 0.0], "normal": [-1.0, 0.0], "restitution": 1.0}
+    assert unknown_speeds(scene_of(ball(), world={"wind": [2.0, 0.0]}, plane=[wall])) == ("lift in wind",)
+    assert unknown_speeds(scene_of(ball(), plane=[wall])) == ()
+
+
+def test_ball_that_lift_turns_into_a_plane_is_bounded_by_its_speed() -> None:
+    """It starts along the plane, and meets it at its full speed."""
+    plane = {"name": "p", "point": [-1.5, 0.0], "normal": [1.0, 0.0]}
+    straight = ball(velocity=[-30.0, 0.0], lift=0.0)
+    along = ball(velocity=[0.0, 30.0], lift=0.3)
+    scenes = scene_of(straight, plane=[plane]), scene_of(along, plane=[plane])
+    expected, found = (
+        [each.kind for each in warnings(scene, scene.solver.replace(dt=0.05), "reference")] for scene in scenes
+    )
+    assert found == expected != []
 
 
 @pytest.mark.parametrize("key", ["fixed", "kinematic"])

@@ -91,7 +91,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         Box2D has drag in still air, and damping. With wind, quadratic drag or lift, the air is a force, constant during
         a substep.
         """
-        self._air = air = Air.of(scene.world, self._store.bodies)
+        self._air = air = Air.of(scene.world, self._store.bodies, self._store.present)
         self._world.set_gravity(scene.world.gravity)
         is_still = air.is_linear and not any(scene.world.wind)
         self._has_air_forces = air.flows and not is_still

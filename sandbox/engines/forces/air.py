@@ -14,12 +14,11 @@ speed, and it is stable at any h. Forces that balance each other, springs and th
 h.
 """
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from sandbox.arrays import ComplexArray, FloatArray, IntArray, Number
+from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Number
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
 
@@ -50,12 +49,11 @@ class Air(NamedTuple):
     """whether a body has lift"""
 
     @classmethod
-    def of(cls, world: World, bodies: Bodies | None = None) -> "Air":
-        """Return the air of a world and its bodies; without bodies, of one that has no lift."""
+    def of(cls, world: World, bodies: Bodies | None = None, among: BoolArray | IntArray | slice = ALL) -> "Air":
+        """Return the air of a world for some of its bodies; without bodies, for one that has no lift."""
         lift = NO_LIFT if bodies is None else bodies.lift
-        return cls(
-            world.linear_drag, world.quadratic_drag, world.damping_rate, *world.wind, lift, bool(np.any(lift != 0.0))
-        )
+        has_lift = bool(lift[among].any())
+        return cls(world.linear_drag, world.quadratic_drag, world.damping_rate, *world.wind, lift, has_lift)
 
     def for_rows(self, count: int) -> "Air":
         """Return the air for more rows than there are bodies; those have no lift."""
@@ -77,15 +75,6 @@ class Air(NamedTuple):
     def is_linear(self) -> bool:
         """Whether x and y are independent of each other."""
         return self.quadratic_drag == 0.0 and not self.depends_on_spin
-
-    @property
-    def speed_by_wind(self) -> float:
-        """Upper bound of the speed that wind adds, m/s.
-
-        Drag moves v on the line from its start to the wind, so that it adds at most the wind's speed. Lift turns w,
-        which may have been the start velocity minus the wind, and becomes that sum plus the wind.
-        """
-        return (2.0 if self.depends_on_spin else 1.0) * math.hypot(self.wind_x, self.wind_y) if self.flows else 0.0
 
 
 def air_law(

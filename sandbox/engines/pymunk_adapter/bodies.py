@@ -11,6 +11,7 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.forces.air import Air
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.requirements import combination_faults
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
@@ -68,7 +69,7 @@ class PymunkBodies(BodyStore):
         super().__init__(setup, settings.h)
         self.velocity[~self.bodies.fixed] += self.ahead
         self.space_bodies.layer = self.layer
-        self.space_bodies.rebuild(self.scene, self.bodies, self.contact_matrix)
+        self.space_bodies.rebuild(self.scene, self._air, self.contact_matrix)
         self.distribute(np.arange(len(self.bodies)))
 
     def _derive_solver_arrays(self) -> None:
@@ -155,15 +156,19 @@ class PymunkBodies(BodyStore):
         self.particles.world = setup.scene.world
         self.particles.rebuild()
         if self.contact_matrix is matrix:  # the same bodies, in another world
-            self.space_bodies.rebuild_world(setup.scene, self.bodies)
+            self.space_bodies.rebuild_world(setup.scene, self._air)
         else:
-            self.space_bodies.rebuild(setup.scene, self.bodies, self.contact_matrix)
+            self.space_bodies.rebuild(setup.scene, self._air, self.contact_matrix)
         self.space_bodies.joints.update(setup.joints)
 
     def _demands(self, world: World) -> frozenset[Demand]:
         """Return the demands of the bodies, with those that actions have added, and of a world."""
-        kinematic = {Demand.KINEMATIC} if self.bodies.kinematic.any() else set()
-        return air_demands(world, self.bodies) | kinematic
+        kinematic = {Demand.KINEMATIC} if (self.bodies.kinematic & self.present).any() else set()
+        return air_demands(world, self.bodies, self.present) | kinematic
+
+    @property
+    def _air(self) -> Air:
+        return Air.of(self.scene.world, self.bodies, self.present)
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body and return its index, as `BodyStore.add`.
@@ -178,7 +183,7 @@ class PymunkBodies(BodyStore):
         index = super().add(single, name)
         self.velocity[index] += np.zeros(2) if single.fixed else self.ahead
         self.space_bodies.layer = self.layer
-        self.space_bodies.rebuild(self.scene, self.bodies, self.contact_matrix)
+        self.space_bodies.rebuild(self.scene, self._air, self.contact_matrix)
         self.space_bodies.add_missing_shapes(self.bodies)
         touching = np.flatnonzero(self.present & ~self.contact_matrix.free).tolist()
         outside = [n for n in touching if n != index and not self.space_bodies.holds(n)]

@@ -286,7 +286,9 @@ class PymunkEnergyLedger:
         velocity[kinematic] = 0.5 * (before.velocity[kinematic] + now.velocity[kinematic])
         spin[kinematic] = 0.5 * (before.spin[kinematic] + now.spin[kinematic])
         joints = p.space_bodies.joints.by_kind
-        spring_force = spring_forces(joints.springs, now.position, now.angle) if len(joints.springs) else None
+        # as the space predicted them before the step, for the air that reduces their effect
+        drifted = before.position + before.velocity * p.h, before.angle + before.spin * p.h
+        spring_force = spring_forces(joints.springs, *drifted) if len(joints.springs) else None
         applied = applied_impulses(p, before, included, spring_force, p.h)
         applied.angular[~self._can_turn()] = 0.0
         by_stiffness: tuple[JointImpulses, ...]

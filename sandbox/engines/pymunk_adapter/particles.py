@@ -103,7 +103,7 @@ class Particles:
         world = self.world
         self._has_force = any(force.any() for force, _ in self._forces.values())
         self._has_torque = any(torque for _, torque in self._forces.values())
-        self._air = Air.of(world, self._bodies)
+        self._air = Air.of(world, self._bodies, self.indices)
         self._damping_factor = damping_factor(world.damping, self._h) if world.has_damping else 1.0
         self.can_turn = bool(self._spin[self.indices].any()) or self._has_torque
         self._kick: FloatArray = (np.asarray(world.gravity) + 0.0) * self._h

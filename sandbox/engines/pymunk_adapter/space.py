@@ -328,10 +328,10 @@ class SpaceBodies:
             len(member.shapes) > 1 for member in self._members.values()
         )
 
-    def rebuild(self, scene: Scene, bodies: Bodies, matrix: ContactMatrix) -> None:
+    def rebuild(self, scene: Scene, air: Air, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's coefficients, walls, surfaces, bodies or world."""
         self._static_shapes.reshape(self._scene, scene)
-        self.rebuild_world(scene, bodies)
+        self.rebuild_world(scene, air)
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch = matrix.touches
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
@@ -346,10 +346,10 @@ class SpaceBodies:
             self.drives.add_callbacks(self._collision_types)
         self._static_shapes.rebuild(scene, self._surface_of_fixed)
 
-    def rebuild_world(self, scene: Scene, bodies: Bodies) -> None:
+    def rebuild_world(self, scene: Scene, air: Air) -> None:
         """Update after a change of the scene's gravity or air, or of its bodies."""
         self._scene, self._needs_check = scene, None
-        self.air = Air.of(scene.world, bodies)
+        self.air = air
         self.field.fractions.clear()
         gravity = gravity_of(scene.world, self.air)
         if self._space.gravity != gravity:  # to set it wakes bodies

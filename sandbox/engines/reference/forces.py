@@ -35,7 +35,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         forces.append(joints.forces_at)
     return Inputs(
         constant,
-        Air.of(store.scene.world, store.bodies),
+        Air.of(store.scene.world, store.bodies, store.present),
         moving.astype(np.float64),
         forces=tuple(forces),
         damped_forces=bool(springs.figures[:, 2].any()),

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.forces.air import Air
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointKind
@@ -112,6 +111,8 @@ class SpeedBounds:
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")
+        if bodies.lift.any() and any(scene.world.wind):  # it keeps the speed through the air, which walls do not
+            found.append("lift in wind")
         return tuple(found)
 
     @cached_property
@@ -214,7 +215,7 @@ class SpeedBounds:
         """
         scene, bodies = self.scene, self.scene.bodies
         others = len(scene.joint_arrays) or self.matrix.mutual or scene.attractions or scene.thrusts or scene.drives
-        if len(scene.fixed) > 1 or others or any(scene.world.wind):
+        if len(scene.fixed) > 1 or others or any(scene.world.wind) or bodies.lift.any():
             return self.own
         normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
         pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
@@ -298,7 +299,8 @@ class SpeedBounds:
         world, bodies = self.scene.world, self.scene.bodies
         if (world.has_drag or world.has_damping) and not len(self.scene.joint_arrays) and not self.scene.attractions:
             speed = np.minimum(speed, np.maximum(self.start, self._terminal))
-        speed = speed + Air.of(world, bodies).speed_by_wind
+        if world.has_drag:
+            speed = speed + math.hypot(*world.wind)
         speed = speed + self.thrust
         return np.where(bodies.fixed, 0.0, speed)
 

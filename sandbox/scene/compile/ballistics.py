@@ -22,7 +22,7 @@ def free_flight(
     exact parabola.
 
     With lift, k is k − iΩ and vectors are complex numbers. Without gravity, drag and wind that is a circle of radius
-    |v₀/Ω|, with gravity a cycloid that drifts at g/Ω, to the right of gravity for Ω > 0.
+    |v₀/Ω|, with gravity a cycloid that drifts at g/Ω, to the left of gravity for Ω > 0.
 
     Args:
         time: (T,) s since the start.

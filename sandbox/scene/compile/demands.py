@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.arrays import BoolArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.derived import derived_once
@@ -226,9 +227,16 @@ def _air(world: World, bodies: Bodies) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.LIFT, lifted > 0, _count(lifted, "body has lift", "bodies have lift", "no body has lift")
 
 
-def air_demands(world: World, bodies: Bodies) -> frozenset[Demand]:
-    """Return the demands of forces that depend on velocity, without those of the rest of a scene, which take longer."""
-    acts = (Demand.DRAG, world.has_drag), (Demand.DAMPING, world.has_damping), (Demand.LIFT, bool(bodies.lift.any()))
+def air_demands(world: World, bodies: Bodies, among: BoolArray | slice = slice(None)) -> frozenset[Demand]:
+    """Return the demands of forces that depend on velocity, without those of the rest of a scene, which take longer.
+
+    Args:
+        world: drag and damping.
+        bodies: all.
+        among: bodies that are present.
+    """
+    has_lift = bool(bodies.lift[among].any())
+    acts = (Demand.DRAG, world.has_drag), (Demand.DAMPING, world.has_damping), (Demand.LIFT, has_lift)
     return frozenset(demand for demand, on in acts if on)
 
 

@@ -178,6 +178,8 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
         yield "body", f"{drive.body!r} has a fixed rotation; remove `fixed_rotation`, because the drive turns the body"
     if any(single.velocity) or single.angular_velocity:
         yield "body", f"{drive.body!r} has an initial velocity; a driven body must start at rest"
+    if single.lift:
+        yield "body", f"{drive.body!r} has lift, which has no effect on a driven body; remove `lift`"
     if any(thrust.body == drive.body for thrust in scene.thrusts):
         yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
 

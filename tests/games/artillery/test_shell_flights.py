@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from sandbox.engines.reference.integrators import INTEGRATORS, transition
-from sandbox.games.artillery.ballistics import Flight, crossing, first_strike, inputs_of, landing, rk4
+from sandbox.games.artillery.ballistics import Flight, crossing, first_strike, inputs_of, landing, plain_air, rk4
 from sandbox.games.artillery.landing_error import exact_landing
 from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
@@ -29,7 +29,7 @@ def test_scalar_rk4_equals_that_of_the_reference_engine() -> None:
     air, h = World(gravity=(0.4, -G), linear_drag=0.03, quadratic_drag=0.002, wind=(6.0, -1.0)), 0.05
     point, state = (3.0, 7.0, 40.0, 55.0), np.array([[[3.0, 7.0]], [[40.0, 55.0]]])
     for _ in range(200):
-        point = rk4(air, point, h)
+        point = rk4(air, plain_air(air), point, h)
         state = INTEGRATORS["rk4"].step(transition, 0.0, state, inputs_of(air, 1), h)
     assert point == pytest.approx(state.reshape(-1).tolist(), rel=1e-12)  # rounding of 200 steps
 

@@ -87,8 +87,8 @@ class EventDrivenBodies(BodyStore):
                 surfaces; or a ball overlaps a collider that has moved or become solid.
         """
         scene = setup.scene
-        for demand in sorted(air_demands(scene.world, self.bodies)):
-            raise ActionError(f"exact does not model {demand}; pymunk and reference do")
+        for demand in sorted(air_demands(scene.world, self.bodies, self.present)):
+            raise ActionError(f"exact does not model {demand}")
         is_checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
         if not is_checked and on_floor(setup) and (reason := next(unsupported_on_surface(setup, self.bodies), None)):
             raise ActionError(reason)
@@ -113,7 +113,7 @@ class EventDrivenBodies(BodyStore):
                 on a `[surface]`, or the scene would have more different surfaces than allowed.
         """
         for demand in sorted(demands_of_body(single)):
-            raise ActionError(f"exact does not model {demand}; pymunk, reference and box2d do")
+            raise ActionError(f"exact does not model {demand}")
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]
