@@ -264,10 +264,22 @@ def test_ball_that_lift_turns_into_a_plane_is_bounded_by_its_speed() -> None:
     straight = ball(velocity=[-30.0, 0.0], lift=0.0)
     along = ball(velocity=[0.0, 30.0], lift=0.3)
     scenes = scene_of(straight, plane=[plane]), scene_of(along, plane=[plane])
-    expected, found = (
-        [each.kind for each in warnings(scene, scene.solver.replace(dt=0.05), "reference")] for scene in scenes
-    )
-    assert found == expected != []
+    for scene in scenes:
+        assert "depth" in {each.kind for each in warnings(scene, scene.solver.replace(dt=0.05), "reference")}
+
+
+@pytest.mark.parametrize("turn", [0.005, 0.05, 0.5, 3.0])
+@pytest.mark.parametrize("integrator", ["explicit_euler", "velocity_verlet", "leapfrog", "rk4"])
+def test_change_of_speed_by_a_scheme_is_predicted(integrator: str, turn: float) -> None:
+    """`check` warns exactly where a run of 100 steps changes the speed by more than a tenth."""
+    scene = scene_of(ball(lift=turn / (SPIN * 0.01)), solver={"integrator": integrator})
+    found = [each for each in warnings(scene, scene.solver, "reference") if each.kind == "lift"]
+    speed = float(np.hypot(*run(scene, "reference").velocity[-1, 0]))
+    assert bool(found) == (not SPEED / 1.1 <= speed <= 1.1 * SPEED)
+    if found:
+        dt = float(found[0].message.split("dt <= ")[1].split(" s")[0])
+        kept = run(scene.with_duration(dt * round(1.0 / dt)), "reference", dt=dt)
+        assert np.hypot(*kept.velocity[-1, 0]) == pytest.approx(SPEED, rel=0.101)  # three digits of dt
 
 
 @pytest.mark.parametrize("key", ["fixed", "kinematic"])

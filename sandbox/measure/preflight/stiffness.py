@@ -1,4 +1,4 @@
-"""Stability limits of the substep: springs, rotary springs and close orbits.
+"""Stability limits of the substep: springs, rotary springs, lift and close orbits.
 
 The orbit of each body about each centre alone is considered (Kepler's, without softening), at its closest distance:
 there the attraction a rotates the velocity v by a·h/v in a substep. If a body flies straight through a softened centre,
@@ -167,6 +167,48 @@ def damper_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         )
         details: Details = {"joint": mode.joint, "damping_h": damped, "limit": limit, "safe_dt": safe}
         yield Diagnostic("spring", message, details)
+
+
+MAX_SPEED_CHANGE = 0.1
+"""Largest relative change of a speed by the scheme over a run that is not worth a warning."""
+
+LIFT_GROWTH: dict[str, Callable[[complex], complex]] = {
+    "explicit_euler": lambda z: 1.0 + z,
+    "semi_implicit_euler": lambda z: 1.0 + z,
+    "velocity_verlet": lambda z: 1.0 + z + z**2 / 2.0,
+    "leapfrog": lambda z: 1.0 + z + z**2 / 2.0,
+    "rk4": lambda z: 1.0 + z + z**2 / 2.0 + z**3 / 6.0 + z**4 / 24.0,
+}
+"""Factor of the velocity in a substep under lift alone, by z = i·s·ω·h: lift itself turns it by e^z."""
+
+
+def lift_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
+    """Yield a diagnostic if the reference engine's scheme changes the speed of a body with lift noticeably.
+
+    pymunk and box2d turn velocities exactly. Drag limits the growth, so that scenes with drag get none.
+    """
+    bodies = scene.bodies
+    turning = np.where(bodies.immovable, 0.0, np.abs(bodies.lift * bodies.angular_velocity))
+    if not turning.any() or scene.world.has_drag:
+        return
+    name, fastest = bodies.names[int(turning.argmax())], float(turning.max())
+    growth = LIFT_GROWTH[settings.integrator or "explicit_euler"]
+
+    def change(h: float) -> float:
+        """Return the natural logarithm of the factor by which the speed changes over the run."""
+        return abs(math.log(abs(growth(1j * fastest * h)))) * scene.world.duration / h
+
+    if change(settings.h) <= math.log1p(MAX_SPEED_CHANGE):
+        return
+    safe = settings.h
+    while change(safe) > math.log1p(MAX_SPEED_CHANGE):
+        safe *= 0.99
+    message = (
+        f"lift turns the velocity of {name!r} by {fastest * settings.h:.3g} rad in a substep, whose length the scheme "
+        f"changes: by a factor of {math.exp(min(change(settings.h), 700.0)):.3g} over the run; "
+        f"dt <= {floor_3_digits(safe * settings.substeps)} s keeps it within {100.0 * MAX_SPEED_CHANGE:g} %"
+    )
+    yield Diagnostic("lift", message, {"body": name, "turn": fastest * settings.h})
 
 
 class SpringMode(NamedTuple):
