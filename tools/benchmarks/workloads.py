@@ -245,7 +245,7 @@ def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
         simulation = ReferenceEngine().start(which)
         h = which.solver.h
         world = WorldState(BodyStore(Setup.of(which), h), simulation.settings)
-        motion = world.advance(h)
+        motion = world.integrate(h)
         contacts = world.solver.detect(motion)
 
         def resolve() -> None:
@@ -254,7 +254,7 @@ def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
             world.commit(motion, solution, h)
 
         stages = {
-            "move": lambda: world.advance(h),
+            "move": lambda: world.integrate(h),
             "look": lambda: world.solver.detect(motion),
             "resolve": resolve,
             "step": simulation.step,
