@@ -152,11 +152,11 @@ class WorldJoints:
                 if math.hypot(force.x, force.y) > joints.strength[k] * self._world.scale:
                     found.append(k)
         store = self._store
-        for kind in SPRINGS:
-            springs = store.joints.of(kind)
-            if len(springs) and kind == JointKind.SPRING:
-                size = self._tensions(springs, SpringExtent.of(springs, store.position, store.angle))
-            else:
-                size = rotary_torques(springs, store.angle, store.angular_velocity)
-            found += springs.number[np.abs(size) > springs.strength].tolist()
+        springs, rotary = store.joints.of(JointKind.SPRING), store.joints.of(JointKind.ROTARY_SPRING)
+        if len(springs):
+            tensions = self._tensions(springs, SpringExtent.of(springs, store.position, store.angle))
+            found += springs.number[np.abs(tensions) > springs.strength].tolist()
+        if len(rotary):
+            torques = rotary_torques(rotary, store.angle, store.angular_velocity)
+            found += rotary.number[np.abs(torques) > rotary.strength].tolist()
         return np.asarray(sorted(found), np.int64)

@@ -125,11 +125,11 @@ class ForceField:
         self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
         self.thrust_indices: IntArray = np.asarray(which, np.int64)
         """(T,) index of each thrust in the scene"""
-        number_of_thrust = np.asarray([number[t.body] for t in thrusts], np.int64)
-        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in number_of_thrust.tolist()]
+        body = np.asarray([number[t.body] for t in thrusts], np.int64)
+        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in body.tolist()]
         points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
         self.thrusts = ThrustColumns(
-            body=number_of_thrust,
+            body=body,
             point=np.asarray(points, np.float64).reshape(-1, 2),
             force=np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2),
             begin=np.asarray([t.begin for t in thrusts], np.float64),

@@ -42,15 +42,11 @@ def free_flight(
     if np.any(turning):
         return _lifted_flight(time, position, velocity, world, np.asarray(turning, dtype=np.float64))
     x, v = np.asarray(position, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
-    t = np.asarray(time, dtype=np.float64).reshape(-1, *(1,) * x.ndim)
     rate = world.linear_drag + world.damping_rate
-    z = rate * t
-    phi_1, phi_2 = _phi(z)
     pull, wind = np.asarray(world.gravity), np.asarray(world.wind)
     if world.has_damping:  # without damping the wind moves a body at its own velocity in the end
         wind = wind * (world.linear_drag / rate)
-    flown = x + v * (t * phi_1) + pull * (t * t * phi_2) + wind * (t * z * phi_2)
-    return flown, v * np.exp(-z) + pull * (t * phi_1) + wind * -np.expm1(-z)
+    return _flown(time, x, v, rate, pull, wind)
 
 
 def _lifted_flight(
@@ -60,13 +56,20 @@ def _lifted_flight(
     if world.has_damping:
         raise ValueError("free flight with lift and damping, which slows the spin, has no closed form")
     x, v = (np.asarray(each, dtype=np.float64) @ (1.0, 1.0j) for each in (position, velocity))
+    flown = _flown(time, x, v, world.linear_drag - 1j * turning, complex(*world.gravity), complex(*world.wind))
+    positions, velocities = (np.stack((each.real, each.imag), axis=-1) for each in flown)
+    return positions, velocities
+
+
+def _flown(
+    time: FloatArray, x: npt.NDArray[Any], v: npt.NDArray[Any], rate: Any, pull: Any, wind: Any
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """Return positions and velocities by the formulas of `free_flight`; vectors are rows, or complex numbers."""
     t = np.asarray(time, dtype=np.float64).reshape(-1, *(1,) * x.ndim)
-    z = (world.linear_drag - 1j * turning) * t
+    z = rate * t
     phi_1, phi_2 = _phi(z)
-    pull, wind = complex(*world.gravity), complex(*world.wind)
     flown = x + v * (t * phi_1) + pull * (t * t * phi_2) + wind * (t * z * phi_2)
-    rate = v * np.exp(-z) + pull * (t * phi_1) + wind * -np.expm1(-z)
-    return np.stack((flown.real, flown.imag), axis=-1), np.stack((rate.real, rate.imag), axis=-1)
+    return flown, v * np.exp(-z) + pull * (t * phi_1) + wind * -np.expm1(-z)
 
 
 def free_rotation(time: FloatArray, angle: FloatArray, spin: FloatArray, world: World) -> tuple[FloatArray, FloatArray]:
