@@ -59,7 +59,8 @@ class Audit:
 
     This is exact for discs. Of any other body, the radius is `Bodies.core`, the largest disc about the centre of mass
     inside the body: a passage through it was missed with certainty, so that there are no false alarms, but a contact
-    with a corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs
+    with a corner only is not counted; `with_slender_passages` adds the passages of the ends of slender bodies. A body
+    with a core of 0, whose centre of mass lies outside, is left out. Pairs
     whose collisions a joint or their categories disable, bodies of one group, bodies on different layers or that change
     their layer within the substep, and bodies that strokes and plungers move through static objects do not count.
     Neither do kinematic bodies that pass through static objects or each other.
@@ -155,6 +156,13 @@ class Audit:
     def missed(self) -> tuple[FloatArray, IntArray]:
         """Return `times` and `pairs`."""
         return self.times, self.pairs
+
+    def can_collide(self, first: IntArray, second: IntArray) -> BoolArray:
+        """Return which pairs of body indices (K,), (K,) can collide, of those whose contacts are audited."""
+        i, j = first - self._offset, second - self._offset
+        able = (np.minimum(i, j) >= 0) & (np.maximum(i, j) < len(self._core))
+        able[able] = self._can_collide(i[able], j[able])
+        return able
 
     def _classify_bodies(self, bodies: Bodies) -> None:
         """Derive the collision classes of the bodies, and the smallest displacement that can miss a contact."""

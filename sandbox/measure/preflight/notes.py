@@ -287,7 +287,7 @@ def _audit(scene: Scene) -> Iterator[Diagnostic]:
         return
     message = (
         f"missed contacts are a lower bound: of the {count:,} bodies that are not balls, only passages of the largest "
-        "inscribed disc about the centre of mass are counted"
+        "inscribed disc about the centre of mass, and through the axis of slender bodies, are counted"
     )
     if without:
         message += f"; {without:,} have no such disc and are not counted"

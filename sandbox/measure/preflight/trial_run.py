@@ -19,12 +19,13 @@ from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, start
 from sandbox.formatting import format_fraction, format_quantity
 from sandbox.measure.metrics.invariants import conserves_energy, energy_drift, energy_gain
+from sandbox.measure.missed_contacts.slender_bodies import MAX_TURN, is_slender
 from sandbox.measure.preflight.checks import ITERATED, warnings
 from sandbox.measure.preflight.diagnostic import Detail, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import initial_contacts
 from sandbox.measure.preflight.predictability import event_warning
 from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
-from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY, collide_with_all
+from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
 from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
@@ -60,8 +61,6 @@ MAX_STACK_DISPLACEMENT = 0.5
 NAMING_KINDS = frozenset({"tunnelling", "depth"})
 """Kinds for which a trial run names each body at risk with its own speed, and the formulas only bounds."""
 
-SLENDER = 4.0
-"""A body is slender if its bounding radius is more than this many times that of its largest inscribed disc."""
 MAX_SPEED_UP = 2.0
 """Factor by which impacts may make bodies faster in the rest of a scene than in its first part."""
 
@@ -111,39 +110,13 @@ class TrialRun:
         return MAX_SPEED_UP * fastest * self.settings.h > reach
 
     def is_blind_to(self, predicted: Diagnostic) -> bool:
-        """Return whether the audit cannot see the predicted tunnelling: it follows the largest inscribed disc only.
-
-        The ends of a slender body pass through others unseen. It counts if one was near enough and fast enough for it.
-        """
+        """Return whether the audit could not follow the ends of slender bodies, which may be what tunnels."""
         bodies, run = self.scene.bodies, self.run
-        if predicted.kind != "tunnelling" or predicted.details["thing"] != ANOTHER_BODY:
+        slender = is_slender(bodies) & ~bodies.fixed
+        if predicted.kind != "tunnelling" or predicted.details["thing"] != ANOTHER_BODY or not slender.any():
             return False
-        slender = ~bodies.fixed & (bodies.radius > SLENDER * bodies.core) & collide_with_all(bodies)
-        if not slender.any():
-            return False
-        reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
-        others, named = np.flatnonzero(collide_with_all(bodies)), bodies.number_of[str(predicted.details["ball"])]
-        with np.errstate(over="ignore", invalid="ignore"):
-            turning = np.abs(run.angular_velocity) * bodies.radius
-            for n in np.flatnonzero(slender).tolist():
-                apart = others[(others != n) & ((others == named) | (n == named))]
-                offset = run.position[:, apart] - run.position[:, n : n + 1]
-                # of the other body relative to the point of this one that faces it
-                spin = run.angular_velocity[:, n : n + 1, None]
-                distance = np.hypot(offset[..., 0], offset[..., 1])
-                arm = (
-                    offset
-                    * (np.minimum(distance, bodies.radius[n]) / np.where(distance > 0.0, distance, 1.0))[..., None]
-                )
-                facing = np.stack((-arm[..., 1], arm[..., 0]), axis=-1) * spin
-                velocity = run.velocity[:, apart] - run.velocity[:, n : n + 1] - facing
-                closing = np.hypot(velocity[..., 0], velocity[..., 1])
-                closing += np.where(bodies.round[apart], 0.0, turning[:, apart])  # a disc's spin moves no end
-                gap = distance - bodies.radius[apart] - bodies.radius[n]
-                # Their ends may have met within a step next to a frame, at the speed for which the formula warns.
-                if ((closing * self.settings.h > reach) & (gap < closing * self.settings.dt)).any():
-                    return True
-        return False
+        turn = np.abs(np.diff(run.angle[:, slender], axis=0))
+        return bool(run.info["settings"]["record_every"] > 1) or bool((turn > MAX_TURN).any())
 
     def findings(self) -> Iterator[Diagnostic]:
         """Yield a diagnostic for each problem that occurred."""

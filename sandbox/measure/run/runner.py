@@ -21,6 +21,7 @@ from sandbox.games.session import HeadlessGame
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.invariants import joint_error
 from sandbox.measure.missed_contacts import Audit
+from sandbox.measure.missed_contacts.slender_bodies import with_slender_passages
 from sandbox.measure.run.loop import RunCallbacks, RunEnd, WorkCallback, run_loop
 from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
 from sandbox.measure.run.run_warnings import run_warnings
@@ -182,6 +183,7 @@ def _recorded_run(
         missed_pair=missed_pair,
         broken_time=broken,
     )
+    trajectory = trajectory if audit is None else audit.with_slender_passages(trajectory)
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     worst = joint_error(trajectory, setup)
@@ -306,3 +308,7 @@ class TimedAudit:
     def missed(self) -> tuple[FloatArray, IntArray]:
         """Times, (M,) s, and pairs, (M, 2), of the missed contacts."""
         return self._audit.missed()
+
+    def with_slender_passages(self, run: Trajectory) -> Trajectory:
+        """Return a run of the simulation with the passages through slender bodies among its missed contacts."""
+        return with_slender_passages(run, self._simulation.bodies, self._audit.can_collide)

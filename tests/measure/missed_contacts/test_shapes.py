@@ -8,6 +8,7 @@ import pytest
 import sandbox
 from sandbox.measure.missed_contacts.contact_history import ContactHistory
 from sandbox.measure.run.runner import run
+from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_document, loads
 from sandbox.trajectory import Trajectory
 
@@ -155,3 +156,22 @@ def test_plane_of_another_layer_is_not_missed(engine: str) -> None:
         run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": [ball], "plane": [PLANE]}), engine)
         assert run.missed_contacts == 0
         assert len(run.contact_time) == (layer == "up")
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
+@pytest.mark.parametrize("shape", ["box", "capsule"])
+def test_end_of_a_turning_bar_that_passes_a_ball_within_a_step_is_missed(engine: str, shape: str) -> None:
+    """The axis is at the angle 1/6 + spin·t: it passes the ball, 1.5 m out at 1 rad, in the step from (5/6)/spin."""
+    size = {"size": [4.0, 0.06]} if shape == "box" else {"length": 4.0, "radius": 0.03}
+    spin, dt = 20.0, 1 / 60
+    bar = {"name": "bar", "position": [0.0, 0.0], "kinematic": True, "angle": 1 / 6, "angular_velocity": spin, **size}
+    ball = {"name": "ball", "position": [1.5 * np.cos(1.0), 1.5 * np.sin(1.0)], "radius": 0.03}
+    world = {"gravity": [0.0, 0.0], "duration": 0.1}
+    scene = from_document({"world": world, "solver": {"dt": dt}, shape: [bar], "ball": [ball]})
+    found = run(scene, engine)
+    assert found.missed_pair.tolist() == [[0, 1]]
+    assert found.missed_time[0] <= (5 / 6) / spin < found.missed_time[0] + dt
+    assert run(scene, engine, dt=1e-3).missed_contacts == 0  # 3 cm a step, less than the two are wide
+    assert run(scene, engine, record_every=2).missed_contacts == 0  # a lower bound: not followed
+    apart = from_document({**to_document(scene), "ball": [{**ball, "collides": "fixed"}]})
+    assert run(apart, engine).missed_contacts == 0
