@@ -1,8 +1,9 @@
 """JSON documents from dataclasses: the values of a document, and its JSON Schema from the same types.
 
 A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field; the
-properties that a class lists in `json_properties` follow the fields. JSON has no number for nan and infinity: they
-become null, so that every float may be null in the schema.
+properties that a class lists in `json_head` precede the fields, those in `json_properties` follow them; each is listed
+by name or as (key, name). JSON has no number for nan and infinity: they become null, so that every float may be null in
+the schema.
 """
 
 import math
@@ -86,7 +87,7 @@ def to_json(value: Any) -> Any:
 
 
 def _object(value: Any) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    found = {key: to_json(getattr(value, name)) for key, name in _properties(type(value), "json_head")}
     for each in fields(value):
         key, omit, inline, optional = _options(each)
         own = getattr(value, each.name)
@@ -96,9 +97,14 @@ def _object(value: Any) -> dict[str, Any]:
             found |= to_json(own)
         else:
             found[str(key)] = to_json(own)
-    for name in getattr(value, "json_properties", ()):
-        found[name] = to_json(getattr(value, name))
+    for key, name in _properties(type(value), "json_properties"):
+        found[key] = to_json(getattr(value, name))
     return found
+
+
+def _properties(cls: type, listed: str) -> list[tuple[str, str]]:
+    """Return key and name of each property that a class lists."""
+    return [(each, each) if isinstance(each, str) else each for each in getattr(cls, listed, ())]
 
 
 def json_schema(document: type, *, is_open: bool = False) -> dict[str, Any]:
@@ -120,6 +126,13 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     properties: dict[str, Any] = {}
     required: list[str] = []
     is_open = False
+
+    def add_properties(listed: str) -> None:
+        for key, name in _properties(cls, listed):
+            properties[key] = _schema(get_type_hints(getattr(cls, name).fget)["return"], definitions)
+            required.append(key)
+
+    add_properties("json_head")
     for name, (key, omit, inline, optional) in _members(cls):
         if omit:
             continue
@@ -133,9 +146,7 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
             is_open |= inner["additionalProperties"]
         else:
             is_open = True  # the keys of a mapping are not known
-    for name in getattr(cls, "json_properties", ()):
-        properties[name] = _schema(get_type_hints(getattr(cls, name).fget)["return"], definitions)
-        required.append(name)
+    add_properties("json_properties")
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": is_open}
 
 

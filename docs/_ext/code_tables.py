@@ -19,7 +19,7 @@ from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import ENGINES
 from sandbox.games.billiards.view.controls import CUE_KEY_HELP
 from sandbox.games.registry import RULES, required_rules
-from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.resource_limits import LIMITS
 from sandbox.run_file import KINDS, OPTIONAL, SHAPES
 from sandbox.scene.compile.demands import Demand

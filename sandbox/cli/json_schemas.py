@@ -8,7 +8,7 @@ from sandbox.jsonable import json_schema
 DOCUMENTS = {
     "advise": "sandbox.measure.advice.result:AdviceDocument",
     "check": "sandbox.cli.check:CheckDocument",
-    "compare": "sandbox.measure.compare.result:ComparisonDocument",
+    "compare": "sandbox.measure.compare.result:Comparison",
     "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
     "match": "sandbox.cli.games:MatchDocument",
     "run": "sandbox.cli.run_tables:RunsDocument",

@@ -37,10 +37,10 @@ from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
 from sandbox.measure.compare import compare
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
 from sandbox.measure.tradeoff.result import Tradeoff

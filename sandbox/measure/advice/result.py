@@ -7,7 +7,7 @@ from typing import Any, Literal
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
-from sandbox.measure.tradeoff.metrics import WorstError
+from sandbox.measure.compare.metrics import WorstError
 from sandbox.scene.description.world import Settings
 
 FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]

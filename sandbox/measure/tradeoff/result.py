@@ -11,10 +11,10 @@ from sandbox.formatting import format_quantity
 from sandbox.html_repr import HtmlRepr
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.metrics import Metric
 from sandbox.measure.tradeoff.objective import pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.measure.compare.metrics import METRICS, times_of_leaving, worst_error
 from sandbox.measure.preflight import warnings
 from sandbox.measure.run.runner import run
-from sandbox.measure.tradeoff.metrics import METRICS, times_of_leaving, worst_error
 from sandbox.measure.tradeoff.objections import MAX_ODDS, SPEED_MARGIN, ErrorLimits, find_objections
 from sandbox.measure.tradeoff.study import tradeoff
 from sandbox.scene.compile.scene import Scene

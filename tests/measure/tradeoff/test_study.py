@@ -12,13 +12,13 @@ import pytest
 import sandbox
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.measure.compare.ground_truth import truth_of
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.preflight import warnings
 from sandbox.measure.seeds import with_seed
 from sandbox.measure.tradeoff import Tradeoff, tradeoff
 from sandbox.measure.tradeoff import study as module
 from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.objective import UnknownMetricError
 from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, NOISE_FACTOR
 from sandbox.measure.tradeoff.study import setting_warnings
