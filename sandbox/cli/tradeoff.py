@@ -113,7 +113,7 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
             click.echo(_long_legend(found))
     splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
     proposed = [each.sentence for each in found.proposals]
-    for line in [*_failures(found), *splits, *found.answers(), *_notes(found), *proposed, *_solver(found)]:
+    for line in [*_failures(found), *splits, *found.sentences, *_notes(found), *proposed, *_solver(found)]:
         click.echo(line)
 
 

@@ -88,7 +88,7 @@ def test_no_recommended_setting_has_an_objection(scene: Scene, metric: str, tole
             assert chosen.point.metrics["joint_distance"] <= tolerance
     assert any(point.objections for point in found.points)
     if found.rejected is not None:  # where it is the cheapest, which its time decides
-        assert found.rejected.point.objections[0] in found.answers()[-1]
+        assert found.rejected.point.objections[0] in found.sentences[-1]
 
 
 @given(st.floats(0.1, 100.0))
