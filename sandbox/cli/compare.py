@@ -300,7 +300,7 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         path, remarks = read.path, read.remarks
         variants = _variants(options.scene, options.overrides, axes)
     if options.tolerance is not None and not math.isfinite(options.tolerance):
-        faults.append(Fault("--tolerance", None, "", f"is {options.tolerance} m; it must be finite"))
+        faults.append(Fault.of("--tolerance", f"is {options.tolerance} m; it must be finite"))
     with collect_errors(faults):
         require_folder(options.out)
     smallest = None
@@ -308,11 +308,11 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         smallest = Path(options.minimise or f"{Path(path or options.scene).stem}.min.toml")
         faults += faults_of(smallest, path, options.force)
         if options.sweeps:
-            faults.append(Fault("--minimise", None, "", "works on a single scene; leave out --sweep"))
+            faults.append(Fault.of("--minimise", "works on a single scene; leave out --sweep"))
     elif options.force:
-        faults.append(Fault("--force", None, "", "works only together with --minimise"))
+        faults.append(Fault.of("--force", "works only together with --minimise"))
     if options.out is not None and any(not key.startswith("solver.") for key, _ in axes):
-        faults.append(Fault("--out", None, "", "draws a single scene; sweep only keys of solver, or leave out --out"))
+        faults.append(Fault.of("--out", "draws a single scene; sweep only keys of solver, or leave out --out"))
     if options.out is not None and not faults:
         with collect_errors(faults):
             make_folder(options.out)

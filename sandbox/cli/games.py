@@ -216,7 +216,7 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
     with collect_errors(faults, "--engine", (UnknownEngineError,)):
         engine_named(options.engine)
     if options.time_limit is not None and math.isnan(options.time_limit):
-        faults.append(Fault("--time-limit", None, "", "is not a number; it must be greater than 0"))
+        faults.append(Fault.of("--time-limit", "is not a number; it must be greater than 0"))
     count = 2
     with collect_errors(faults, "--players", (GameError,)):
         count = len(parse_bots(options.players))
@@ -225,9 +225,7 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
         require_folder(options.out)
         scene = load(scene_path(options.scene), options.overrides)
     if scene is not None and scene.surface is None:
-        faults.append(
-            Fault(options.scene, None, "", f"is not a billiard table: it has no [surface]; tables are {TABLES}")
-        )
+        faults.append(Fault.of(options.scene, f"is not a billiard table: it has no [surface]; tables are {TABLES}"))
     elif scene is not None:
         with collect_errors(faults, options.scene, (GameError,)):
             Match.begin(scene, options.game, count, **options.terms)
