@@ -10,10 +10,10 @@ DOCUMENTS = {
     "check": "sandbox.cli.check:CheckDocument",
     "compare": "sandbox.measure.compare.result:ComparisonDocument",
     "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
-    "match": "sandbox.cli.games:MatchDocument",
+    "match": "sandbox.cli.games:MatchResult",
     "run": "sandbox.cli.run_tables:RunsDocument",
     "runs": "sandbox.cli.runs:StoredRunsDocument",
-    "shots": "sandbox.games.billiards.shots.study:StudyDocument",
+    "shots": "sandbox.games.billiards.shots.study:ShotStudy",
     "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
 }
 """Dataclass of the document of each command, as `module:class`."""

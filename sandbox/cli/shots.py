@@ -25,6 +25,7 @@ from sandbox.games.billiards.shots.monte_carlo import DEFAULT_COUNT
 from sandbox.games.billiards.shots.predictability import PERTURBATION, TOLERANCE, By
 from sandbox.games.billiards.shots.shot import NoSuchShotError, ShotSetup, Spread, shot_setup
 from sandbox.games.billiards.shots.study import ShotStudy, pot_of, study_shot
+from sandbox.jsonable import to_json
 from sandbox.progress import Progress
 from sandbox.scene.errors import Fault
 from sandbox.scene.files.load import load
@@ -176,7 +177,7 @@ def shots_command(**given: Any) -> int:
         found = _study(request.shot, request, options)
     except Exhaustion as error:
         return _failed(options, "failed", str(error))
-    document = {"scene": options.scene, "status": "ok", "reason": None, **found.document()}
+    document = {"scene": options.scene, "status": "ok", "reason": None, **to_json(found)}
     if options.as_json:
         print_json(document)
     elif not options.quiet:

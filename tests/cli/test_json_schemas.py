@@ -76,6 +76,25 @@ def test_document_has_the_fields_of_the_dataclass_in_order() -> None:
     json.dumps(document, allow_nan=False)
 
 
+@dataclass(frozen=True)
+class Listed:
+    size: int
+    hidden: object
+    name: str
+
+    json_members: ClassVar = ("name", "area", "size")
+    json_name: ClassVar = "Square"
+
+    @property
+    def area(self) -> int:
+        return self.size**2
+
+
+def test_listed_members_are_in_the_order_of_the_list() -> None:
+    assert list(to_json(Listed(3, object(), "n")).items()) == [("name", "n"), ("area", 9), ("size", 3)]
+    assert list(json_schema(Listed)["properties"]) == ["name", "area", "size"]
+
+
 def test_value_that_json_cannot_hold_is_refused() -> None:
     with pytest.raises(TypeError, match="complex"):
         to_json([1j])

@@ -4,12 +4,10 @@
 only during shots, and each player receives the `Match` at its turn.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
-
-from pydantic import TypeAdapter
 
 from sandbox.action import Action, Move
 from sandbox.engines.contract import Divergence, Exhaustion
@@ -96,42 +94,6 @@ class FrameRecord:
         """
         script = FrameScript(self.turns)
         return play_frame(self.first, (script, script), self.session.engine, most=len(self.turns))
-
-    def document(self) -> "FrameDocument":
-        """Return the frame as it appears in JSON documents, without the session."""
-        plain: list[dict[str, object]] = _TURNS.dump_python(self.turns, mode="json", exclude_defaults=True)
-        state = self.match.state
-        return FrameDocument(
-            game=self.match.rules.name,
-            winner=state.winner,
-            over=state.over,
-            unfinished=self.unfinished,
-            scores=state.scores,
-            shots=len(self.shots),
-            duration=self.session.duration,
-            state_hash=self.session.state_hash,
-            turns=plain,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrameDocument:
-    """JSON document of a frame."""
-
-    game: str
-    winner: int | None
-    """seat, or player in a match of several frames"""
-    over: bool
-    unfinished: str | None
-    """why the frame was abandoned"""
-    scores: Sequence[int]
-    """by seat"""
-    shots: int
-    duration: float
-    """s"""
-    state_hash: str | None
-    turns: Sequence[Mapping[str, object]]
-    """every decision and shot, without default values"""
 
 
 class FrameScript:
@@ -310,6 +272,3 @@ class MatchTable:
 
     def _run_rules(self, contacts: Contacts) -> Sequence[Action]:
         return self._game.on_step(self._simulation.time, self._simulation.frame(), contacts)
-
-
-_TURNS = TypeAdapter(tuple[FrameTurn, ...])

@@ -111,6 +111,18 @@ class RestStatistics:
     """m, standard deviation of x and y"""
 
 
+@dataclass(frozen=True)
+class BallOdds:
+    """Odds of one ball."""
+
+    potted: Proportion
+    """frequency of falling into any pocket"""
+    pockets: Mapping[str, Proportion]
+    """by the names of the pockets into which it fell"""
+    rest: RestStatistics | None
+    """final position; None if it never remained on the table"""
+
+
 @dataclass(frozen=True, eq=False)
 class Odds(HtmlRepr):
     """Results of M strokes with random errors at a table of N balls.
@@ -134,6 +146,19 @@ class Odds(HtmlRepr):
     """number of miscues"""
     interrupted: bool = False
     """whether Ctrl-C was pressed before all shots were played"""
+
+    json_members: ClassVar = (
+        "count",
+        "seed",
+        "spread",
+        "interrupted",
+        "miscues",
+        "unfinished",
+        "scratch",
+        "any_pot",
+        "balls",
+    )
+    json_name: ClassVar = "OddsDocument"
 
     def __repr__(self) -> str:
         """Return the shot, the number of strokes, and the odds of a pot and of a scratch."""
@@ -199,49 +224,15 @@ class Odds(HtmlRepr):
         (x, y), (dx, dy) = stayed.mean(axis=0).tolist(), stayed.std(axis=0).tolist()
         return RestStatistics(len(stayed), (x, y), (dx, dy))
 
-    def document(self) -> "OddsDocument":
-        """Return the odds as they appear in JSON documents, without the single shots."""
-        balls = {}
+    @property
+    def balls(self) -> Mapping[str, BallOdds]:
+        """Odds of each ball by its name."""
+        odds_of = {}
         for ball in self.shot.table.names:
             into = {pocket: self.chance(ball, pocket) for pocket in self.shot.pockets}
             pockets = {pocket: chance for pocket, chance in into.items() if chance.hits}
-            balls[ball] = BallOdds(self.chance(ball), pockets, self.rest(ball))
-        return OddsDocument(
-            count=self.count,
-            seed=self.seed,
-            spread=self.spread,
-            interrupted=self.interrupted,
-            miscues=self.miscues,
-            unfinished=self.unfinished,
-            scratch=self.scratch,
-            any_pot=self.any_pot,
-            balls=balls,
-        )
-
-
-@dataclass(frozen=True)
-class BallOdds:
-    """JSON document of the odds of one ball."""
-
-    potted: Proportion
-    pockets: Mapping[str, Proportion]
-    """by the names of the pockets into which it fell"""
-    rest: RestStatistics | None
-
-
-@dataclass(frozen=True)
-class OddsDocument:
-    """JSON document of the odds of a shot."""
-
-    count: int
-    seed: int
-    spread: Spread
-    interrupted: bool
-    miscues: int
-    unfinished: int
-    scratch: Proportion
-    any_pot: Proportion
-    balls: Mapping[str, BallOdds]
+            odds_of[ball] = BallOdds(self.chance(ball), pockets, self.rest(ball))
+        return odds_of
 
 
 def odds(

@@ -65,7 +65,7 @@ def test_odds_are_bit_identical_on_any_number_of_threads_and_extend_smaller_ense
     one, five = (odds(scene, spread=every, count=301, threads=n) for n in (1, 5))
     assert one.batch.position.tobytes() == five.batch.position.tobytes()
     assert one.batch.pocket.tobytes() == five.batch.pocket.tobytes()
-    assert to_json(one.document()) == to_json(five.document())
+    assert to_json(one) == to_json(five)
     more = odds(scene, spread=every, count=400)
     assert more.errors[:301].tobytes() == one.errors.tobytes()
     other = odds(scene, spread=every, count=301, seed=8)
@@ -92,7 +92,7 @@ def test_miscues_are_counted_as_trials_without_a_pot() -> None:
 
 
 def test_document_has_every_field() -> None:
-    found = to_json(odds(straight_pot(0.5, 1.0), count=50).document())
+    found = to_json(odds(straight_pot(0.5, 1.0), count=50))
     figures = {"count", "seed", "spread", "miscues", "unfinished", "interrupted"}
     assert set(found) == {*figures, "scratch", "any_pot", "balls"}
     into = found["balls"]["object"]["pockets"]["hole"]
@@ -160,7 +160,7 @@ def test_no_window_where_no_aim_pots_the_ball() -> None:
     found = windows(scene_with(ball("object", 0.5), pocket("hole", -0.5, 0.5), shot()), "object", "hole", shots=101)
     assert found.found == ()
     assert found.nearest is None
-    assert found.document().within is False
+    assert found.within is False
 
 
 def test_windows_are_the_same_on_any_number_of_threads() -> None:
