@@ -39,7 +39,7 @@ from sandbox.scene.files.load import load
 from sandbox.signals import reraise_interrupt
 
 if TYPE_CHECKING:
-    from sandbox.games.artillery.landing_error import LandingErrorTable
+    from sandbox.measure.landing_error import LandingErrorTable
 
 
 TABLES = "8-ball, 9-ball, snooker, three-cushion, …"
@@ -363,7 +363,7 @@ def miss_command(
 
     Gravity, drag and wind are those of SCENE, a file or the name of a shipped scene.
     """
-    from sandbox.games.artillery.landing_error import STEPS, landing_error_table  # imports the engines
+    from sandbox.measure.landing_error import STEPS, landing_error_table  # imports the engines
 
     try:
         read = load(scene_path(scene), overrides)
@@ -377,10 +377,7 @@ def miss_command(
             [Fault(scene, None, "" if falls else "world.gravity", str(error))], as_json, scene=scene
         )
     if as_json:
-        rows = [row._asdict() for row in found.rows]
-        refusals = [{"engine": engine, "reason": reason} for engine, reason in found.refused]
-        truth = {"range": found.range, "time": found.time}
-        print_json({"scene": scene, **truth, "rows": rows, "refused": refusals, "interrupted": found.interrupted})
+        print_json({"scene": scene, **to_json(found)})
     else:
         _print_landing_errors(scene, read, found, f"{speed:g} m/s at {angle:g}°")
     if found.interrupted:
@@ -403,7 +400,7 @@ def _print_landing_errors(name: str, scene: Scene, found: "LandingErrorTable", s
     add_columns(table, ("engine", "integrator"))
     add_columns(table, (f"dt {dt:.4g} s" for dt in dts), "right")
     for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
-        errors = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
+        errors = {row.dt: row.range_error for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
         cells = [f"{'+' if errors[dt] >= 0 else '−'}{format_deviation(abs(errors[dt]))}" for dt in dts if dt in errors]
         # A deviation below the resolution is "less than …", without a sign.
         table.add_row(engine, integrator or "", *(cell[1:] if cell[1:2] == "l" else cell for cell in cells))

@@ -13,7 +13,7 @@ DOCUMENTS = {
     "match": "sandbox.cli.games:MatchResult",
     "run": "sandbox.cli.run_tables:RunsDocument",
     "runs": "sandbox.cli.runs:StoredRunsDocument",
-    "shots": "sandbox.games.billiards.shots.study:ShotStudy",
+    "shots": "sandbox.measure.shots.study:ShotStudy",
     "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
 }
 """Dataclass of the document of each command, as `module:class`."""

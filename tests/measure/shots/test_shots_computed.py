@@ -8,14 +8,15 @@ import pytest
 from scipy.optimize import brentq
 
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.shots.aim_windows import END_ACCURACY, windows
-from sandbox.games.billiards.shots.monte_carlo import odds, wilson
-from sandbox.games.billiards.shots.sensitivity import Slope, sensitivity
-from sandbox.games.billiards.shots.shot import NoSuchShotError, Spread, Variable, shot_setup
 from sandbox.jsonable import to_json
+from sandbox.measure.proportion import wilson_interval
+from sandbox.measure.shots.aim_windows import END_ACCURACY, windows
+from sandbox.measure.shots.monte_carlo import odds
+from sandbox.measure.shots.sensitivity import Slope, sensitivity
+from sandbox.measure.shots.shot import NoSuchShotError, Spread, Variable, shot_setup
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke, struck
-from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
+from tests.measure.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
@@ -31,7 +32,7 @@ def test_probability_is_that_of_the_window_under_a_normal_error(aim: float) -> N
     known = error.cdf(window.high) - error.cdf(window.low)
     found = odds(scene, spread=Spread(aim=sigma, speed=0.0), count=1600)
     chance = found.chance("object", "hole")
-    low, high = wilson(chance.hits, chance.trials, SIGMAS)
+    low, high = wilson_interval(chance.hits, chance.trials, SIGMAS)
     assert low < known < high
     assert found.chance("object").hits == chance.hits
     assert found.miscues == found.unfinished == 0

@@ -17,7 +17,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
-from sandbox.games.billiards.shots.shot import UNITS, VARIABLES, ShotSetup, Variable, shot_setup
+from sandbox.measure.shots.shot import UNITS, VARIABLES, ShotSetup, Variable, shot_setup
 from sandbox.scene.compile.scene import Scene
 
 

@@ -5,18 +5,18 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from sandbox.echo import short_repr
-from sandbox.games.billiards.shots.aim_windows import Windows, windows
-from sandbox.games.billiards.shots.monte_carlo import DEFAULT_COUNT, Odds, odds
-from sandbox.games.billiards.shots.predictability import (
+from sandbox.jsonable import in_json
+from sandbox.measure.shots.aim_windows import Windows, windows
+from sandbox.measure.shots.monte_carlo import DEFAULT_COUNT, Odds, odds
+from sandbox.measure.shots.predictability import (
     PERTURBATION,
     TOLERANCE,
     By,
     Horizon,
     horizon,
 )
-from sandbox.games.billiards.shots.sensitivity import Slope, sensitivity
-from sandbox.games.billiards.shots.shot import NoSuchShotError, ShotSetup, Spread
-from sandbox.jsonable import in_json
+from sandbox.measure.shots.sensitivity import Slope, sensitivity
+from sandbox.measure.shots.shot import NoSuchShotError, ShotSetup, Spread
 from sandbox.progress import ProgressCallback
 
 

@@ -16,14 +16,14 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.common.requirements import overlap_of
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
-from sandbox.games.billiards.shots.shot import (
+from sandbox.jsonable import in_json
+from sandbox.measure.shots.shot import (
     ShotSetup,
     Spread,
     perturb_stroke,
     shot_setup,
     without_miscues,
 )
-from sandbox.jsonable import in_json
 from sandbox.scene.compile.scene import Scene
 
 SAMPLE_TIMES = 4000

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.games.billiards.shots.shot import ShotSetup, shot_setup
 from sandbox.jsonable import in_json
+from sandbox.measure.shots.shot import ShotSetup, shot_setup
 from sandbox.scene.compile.scene import Scene
 
 DEFAULT_REACH = 0.1

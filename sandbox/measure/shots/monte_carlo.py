@@ -1,10 +1,5 @@
-"""Success odds and final positions of a shot under execution noise, by Monte Carlo.
+"""Success odds and final positions of a shot under execution noise, by Monte Carlo."""
 
-Source of the confidence interval: E. B. Wilson 1927, J. Am. Stat. Assoc. 22, 209; unlike p ± z √(p(1−p)/n), it also
-holds near 0 and 1.
-"""
-
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import ClassVar
@@ -15,88 +10,24 @@ from sandbox.arrays import FloatArray
 from sandbox.echo import short_repr
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.shots import ShotBatch
-from sandbox.games.billiards.shots.shot import (
+from sandbox.html_repr import HtmlRepr
+from sandbox.measure.proportion import Proportion
+from sandbox.measure.shots.shot import (
     ShotSetup,
     Spread,
     perturb_stroke,
     shot_setup,
     without_miscues,
 )
-from sandbox.html_repr import HtmlRepr
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.compile.scene import Scene
 from sandbox.signals import defer_interrupt
-
-Z_95 = 1.959963984540054
-"""half width of the 95 % interval in standard deviations"""
-
-
-def wilson(hits: int, trials: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the Wilson score interval of a probability, (0, 1) without trials.
-
-    Args:
-        hits: number of trials with the event.
-        trials: number of trials.
-        z: half width in standard deviations; default: 95 %.
-
-    Raises:
-        ValueError: `hits` is negative or exceeds `trials`.
-    """
-    if not 0 <= hits <= trials:
-        raise ValueError(f"{hits} of {trials} is not a count of trials")
-    if trials == 0:
-        return 0.0, 1.0
-    fraction, square = hits / trials, z * z / trials
-    middle = (fraction + 0.5 * square) / (1.0 + square)
-    half = math.sqrt(fraction * (1.0 - fraction) * square + 0.25 * square * square) / (1.0 + square)
-    low = 0.0 if hits == 0 else middle - half  # rounding would leave 1e-19
-    return low, 1.0 if hits == trials else middle + half
-
 
 DEFAULT_COUNT = 10_000
 """Default number of shots: the standard error of a probability of one half is 0.5 %, its 95 % interval ±1 %."""
 
 SHOTS_PER_CHECK = 512
 """Shots of a thread between two checks for Ctrl-C: 0.2 s for break shots."""
-
-
-@dataclass(frozen=True)
-class Proportion:
-    """Frequency of an event in a number of shots."""
-
-    hits: int
-    """number of shots with the event"""
-    trials: int
-    """number of shots"""
-
-    json_properties: ClassVar = ("probability", "low", "high")
-
-    @property
-    def probability(self) -> float:
-        """Estimate of the probability, hits / trials; nan without trials."""
-        return self.hits / self.trials if self.trials else math.nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the probability (Wilson 1927)."""
-        return wilson(self.hits, self.trials)
-
-    @property
-    def low(self) -> float:
-        """Lower end of the 95 % confidence interval."""
-        return self.interval[0]
-
-    @property
-    def high(self) -> float:
-        """Upper end of the 95 % confidence interval."""
-        return self.interval[1]
-
-    def __str__(self) -> str:
-        """Return the probability with its confidence interval, in per cent."""
-        if not self.trials:
-            return "unknown"
-        low, high = self.interval
-        return f"{100.0 * self.probability:.1f} % (95 % interval {100.0 * low:.1f} to {100.0 * high:.1f} %)"
 
 
 @dataclass(frozen=True)
