@@ -71,8 +71,6 @@ class FrameTurn:
 class FrameRecord:
     """Played frame, as an immutable value."""
 
-    first: Match
-    """match at the start"""
     match: Match
     """match at the end"""
     turns: tuple[FrameTurn, ...]
@@ -85,36 +83,6 @@ class FrameRecord:
     def shots(self) -> tuple[FrameTurn, ...]:
         """The turns with a shot."""
         return tuple(turn for turn in self.turns if turn.plan is not None)
-
-    def replayed(self) -> "FrameRecord":
-        """Return the frame that the same turns lead to in a new simulation.
-
-        Raises:
-            GameError: the turns cannot be repeated, because the versions differ.
-        """
-        script = FrameScript(self.turns)
-        return play_frame(self.first, (script, script), self.session.engine, most=len(self.turns))
-
-
-class FrameScript:
-    """Player that repeats recorded turns."""
-
-    def __init__(self, turns: Sequence[FrameTurn]) -> None:
-        self._turns = iter(turns)
-
-    def decide(self, match: Match) -> Decision:
-        """Return the next decision."""
-        turn = next(self._turns, None)
-        if turn is None or turn.decision is None or turn.player != match.turn:
-            raise GameError("the frame does not reach this decision")
-        return turn.decision
-
-    def plan(self, match: Match) -> FramePlan:
-        """Return the next shot."""
-        turn = next(self._turns, None)
-        if turn is None or turn.plan is None or turn.player != match.turn:
-            raise GameError("the frame does not reach this shot")
-        return turn.plan
 
 
 def play_frame(
@@ -147,7 +115,7 @@ def play_frame(
     if len(players) != match.state.players:
         raise GameError(f"the match has {match.state.players} players, not {len(players)}")
     table = MatchTable(match, engine)
-    first, turns = match, list[FrameTurn]()
+    turns: list[FrameTurn] = []
     unfinished: str | None = None
     start_time = perf_counter()
     while not table.match.over:
@@ -178,7 +146,7 @@ def play_frame(
             on_turn(turns[-1], table.match)
     recording = table.recording()
     table.close()
-    return FrameRecord(first, table.match, tuple(turns), recording, unfinished)
+    return FrameRecord(table.match, tuple(turns), recording, unfinished)
 
 
 class MatchTable:

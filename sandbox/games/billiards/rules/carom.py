@@ -47,7 +47,6 @@ class Carom(Ruleset[CaromState]):
 
     rack = "carom"
     cue_balls = WHITES
-    kind = CaromState
 
     def __init__(self, name: str, cushions: int, distance: int) -> None:
         """Define a game.

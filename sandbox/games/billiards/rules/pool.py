@@ -98,7 +98,6 @@ class EightBall(Ruleset[EightBallState]):
 
     name = "8-ball"
     rack = "8-ball"
-    kind = EightBallState
 
     def start(self, players: int = 2) -> EightBallState:
         """Return the state before the break."""
@@ -239,7 +238,6 @@ class NineBall(Ruleset[NineBallState]):
 
     name = "9-ball"
     rack = "9-ball"
-    kind = NineBallState
 
     def start(self, players: int = 2) -> NineBallState:
         """Return the state before the break."""
@@ -336,7 +334,6 @@ class FreePlay(Ruleset[FreePlayState]):
 
     name = "free"
     rack = "8-ball"
-    kind = FreePlayState
 
     def start(self, players: int = 2, balls: tuple[str, ...] = EIGHT_BALL_NAMES, cue: str = "cue") -> FreePlayState:
         """Return the state before the first shot.

@@ -181,7 +181,6 @@ class Snooker(Ruleset[SnookerState]):
 
     name = "snooker"
     rack = "snooker"
-    kind = SnookerState
 
     def start(self, players: int = 2, misses: bool = False) -> SnookerState:
         """Return the state before the first stroke.
