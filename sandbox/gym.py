@@ -167,7 +167,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         levels = self._levels_of(action)
         before, failed = episode.rules.score, None
         try:
-            episode.press(levels)
+            episode.set_levels(levels)
             episode.advance(self.every)
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
