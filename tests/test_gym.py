@@ -226,7 +226,7 @@ def test_steps_that_the_rules_do_not_see_change_nothing(
 ) -> None:
     """All numbers of an episode equal those of an episode whose rules are called after every step."""
     if name == "empty tank":
-        monkeypatch.setattr(landing, "TANK", 5.0)
+        monkeypatch.setattr(landing, "TANK_CAPACITY", 5.0)
     quiet, called = (SandboxEnv("landing", engine, every=every) for _ in range(2))
     quiet.action_space.seed(4)
     actions, end = EPISODES.get(name) or ([quiet.action_space.sample() for _ in range(1000)], None)

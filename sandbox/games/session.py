@@ -3,7 +3,7 @@
 `GameSession` sets the times of actions, passes the player's actions to the rules, and records the inputs. In the replay
 of a recorded game it repeats the recorded inputs, and detects when the rules act differently than in the recording.
 `HeadlessGame` is a session of a run without a window, played by a policy or replayed. `SteppedGame` is a session with a
-simulation of its own, which its caller advances: an episode of an environment, or a frame of billiards.
+simulation of its own, which its caller advances: an episode of an environment, or a match between bots.
 
 `LampRecorder` and `LampLog` record which lamps were lit at which time. They are stored with a run, because viewing a
 run does not execute the rules.

@@ -8,7 +8,7 @@ from sandbox.games.billiards.bot import MAX_AIM_ERROR, MIN_AIM_ERROR, BilliardsB
 from sandbox.games.billiards.headless import play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
-from sandbox.games.billiards.shot_search import ease, pot_options
+from sandbox.games.billiards.shot_search import best_pot_chance, pot_options
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
 from tests.games.billiards.tables_by_hand import changed_match, match, table
@@ -73,14 +73,14 @@ def test_ball_in_hand_is_placed_where_a_pot_is_easier() -> None:
     assert plan.place is not None
     assert now.refusal(plan.place) is None
     before, after = match_with_one_at((0.9, 2.0), (0.3, 0.5)), match_with_one_at((0.9, 2.0), plan.place)
-    assert ease(after, 0.01) > ease(before, 0.01)
+    assert best_pot_chance(after, 0.01) > best_pot_chance(before, 0.01)
 
 
 def test_snookered_bot_hits_the_ball_on() -> None:
     # The 1 lies behind a row of other balls: it can be hit only by a cushion.
     row = {str(k): (0.36 + 0.06 * k, 1.2) for k in range(2, 10)}
     now = changed_match(match("9-ball"), {**row, "1": (0.7, 1.6), "cue": (0.7, 0.9)}, opening=False, in_hand=None)
-    assert ease(now, 0.001) == 0.0
+    assert best_pot_chance(now, 0.001) == 0.0
     plan = BilliardsBot(1.0, 1).intend(now)
     outcome = Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True))).shoot(plan.stroke)
     after = now.played(outcome.contacts, outcome.position, plan.call)
@@ -88,7 +88,7 @@ def test_snookered_bot_hits_the_ball_on() -> None:
     assert not after.verdict.fouls
 
 
-def test_ease_is_the_pot_probability_under_normal_errors() -> None:
+def test_chance_of_a_pot_is_the_pot_probability_under_normal_errors() -> None:
     """Straight pot, where the error of the object ball is that of the contact point: erf(δ / √2 σ)."""
     layout = TableGeometry.of(table("9-ball"))
     radius = layout.radius[0]

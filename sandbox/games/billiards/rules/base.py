@@ -190,7 +190,7 @@ class RulesState:
     """index of the winner; None for a draw, or if a single player has lost"""
 
     def __post_init__(self) -> None:
-        counted(self.players)
+        checked_players(self.players)
         if not 0 <= self.turn < self.players == len(self.scores):
             raise GameError(f"turn {self.turn} and {len(self.scores)} scores do not fit {self.players} players")
 
@@ -213,7 +213,7 @@ class RulesState:
         return tuple(ball for ball in self.table if ball not in balls)
 
 
-def counted(players: int) -> int:
+def checked_players(players: int) -> int:
     """Return a valid number of players unchanged.
 
     Raises:
