@@ -1,10 +1,9 @@
 """JSON documents from dataclasses: the values of a document, and its JSON Schema from the same types.
 
-A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field; the
-properties that a class lists in `json_properties` follow the fields. If a class lists fields and properties in
-`json_members`, its documents have these in that order, and no others. `json_name` is the name of a class in schemas, by
-default the name of the class. JSON has no number for nan and infinity: they become null, so that every float may be
-null in the schema.
+A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field. The
+fields and properties that a class lists in `json_head` precede the other fields, the properties in `json_properties`
+follow them; each is listed by name or as (key, name). `json_name` is the name of a class in schemas; default: the name
+of the class. JSON has no number for nan and infinity: they become null, so that every float may be null in the schema.
 """
 
 import math
@@ -46,15 +45,20 @@ class JsonField(NamedTuple):
     optional: bool = False
 
 
-def _members(cls: Any) -> dict[str, JsonField]:
-    """Return the members of a class that documents have, in order, and how they appear, with their keys."""
+def _members(cls: Any) -> list[tuple[str, JsonField]]:
+    """Return the fields and properties that the documents of a class have, in order, and how they appear, with keys."""
     if is_dataclass(cls):
         options: dict[str, JsonField] = {each.name: each.metadata.get("json", JsonField()) for each in fields(cls)}
     else:
         options = dict.fromkeys(cls.model_fields if issubclass(cls, BaseModel) else cls._fields, JsonField())
-    names = getattr(cls, "json_members", (*options, *getattr(cls, "json_properties", ())))
-    found = {name: options.get(name, JsonField()) for name in names}
-    return {name: each._replace(key=each.key or name) for name, each in found.items() if not each.omit}
+    head, last = getattr(cls, "json_head", ()), getattr(cls, "json_properties", ())
+    found = []
+    for each in (*head, *(name for name in options if name not in head), *last):
+        key, name = (None, each) if isinstance(each, str) else each
+        option = options.get(name, JsonField())
+        if not option.omit:
+            found.append((name, option._replace(key=key or option.key or name)))
+    return found
 
 
 def finite(value: float | None) -> float | None:
@@ -94,7 +98,7 @@ def to_json(value: Any) -> Any:
 
 def _object(value: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
-    for name, (key, _, inline, optional) in _members(type(value)).items():
+    for name, (key, _, inline, optional) in _members(type(value)):
         own = getattr(value, name)
         if own is None and (optional or inline):
             continue
@@ -124,7 +128,7 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     properties: dict[str, Any] = {}
     required: list[str] = []
     is_open = False
-    for name, (key, _, inline, optional) in _members(cls).items():
+    for name, (key, _, inline, optional) in _members(cls):
         hint = hints[name] if name in hints else get_type_hints(getattr(cls, name).fget)["return"]
         inlined = _without_none(hint)
         if not inline:

@@ -201,7 +201,7 @@ class Recording:
             faults = [Fault(file, None, ".".join(("settings", *map(str, e["loc"]))), e["msg"]) for e in error.errors()]
             raise SceneError(faults) from None
         except ValueError as error:
-            raise SceneError([Fault(file, None, "", f"cannot be read as a session: {error}")]) from None
+            raise SceneError([Fault.of(file, f"cannot be read as a session: {error}")]) from None
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -217,11 +217,11 @@ class Recording:
         try:
             refusal = SESSION_SIZE.refusal("its size is", file.stat().st_size)  # 0 for a pipe
             if refusal is not None:
-                raise SceneError([Fault(str(path), None, "", refusal)])
+                raise SceneError([Fault.of(str(path), refusal)])
             text = read_limited(file, SESSION_SIZE.value).decode("utf-8")
         except (OSError, ValueError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or error
-            raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
+            raise SceneError([Fault.of(str(path), f"cannot be read: {reason}")]) from None
         return cls.from_json(text, str(path))
 
 

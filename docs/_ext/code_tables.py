@@ -20,7 +20,7 @@ from sandbox.engines.registry import ENGINES
 from sandbox.game_names import games_with_rules
 from sandbox.games.billiards.view.controls import CUE_KEY_HELP
 from sandbox.games.registry import required_rules
-from sandbox.measure.tradeoff.metrics import METRICS
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.resource_limits import LIMITS
 from sandbox.run_file import KINDS, OPTIONAL, SHAPES
 from sandbox.scene.compile.demands import Demand

@@ -31,9 +31,9 @@ def find_run(text: str) -> Path:
             return stored
     except (OSError, ValueError) as error:  # such as a name longer than any file's
         reason = (error.strerror if isinstance(error, OSError) else None) or error
-        raise SceneError([Fault(text, None, "", f"cannot be read: {reason}")]) from None
+        raise SceneError([Fault.of(text, f"cannot be read: {reason}")]) from None
     message = "no such run; `sandbox run SCENE --out DIR` stores runs as DIR/ID.npz"
-    raise SceneError([Fault(text, None, "", message)])
+    raise SceneError([Fault.of(text, message)])
 
 
 def read_run(path: Path, name: str) -> Trajectory | Recording:
@@ -59,9 +59,9 @@ def read_run(path: Path, name: str) -> Trajectory | Recording:
             raise ValueError("is neither a stored run (.npz) nor a recorded session (.json)")
         return Trajectory.load(path)
     except OSError as error:
-        raise SceneError([Fault(name, None, "", f"cannot be read: {error.strerror or error}")]) from None
+        raise SceneError([Fault.of(name, f"cannot be read: {error.strerror or error}")]) from None
     except ValueError as error:
-        raise SceneError([Fault(name, None, "", str(error).removeprefix(f"{path}").lstrip(": "))]) from None
+        raise SceneError([Fault.of(name, str(error).removeprefix(f"{path}").lstrip(": "))]) from None
 
 
 def _only_run(folder: Path, text: str) -> Path:
@@ -70,10 +70,10 @@ def _only_run(folder: Path, text: str) -> Path:
         return runs[0]
     if not runs:
         message = "contains no run; `sandbox run SCENE --out DIR` stores runs"
-        raise SceneError([Fault(text, None, "", message)])
+        raise SceneError([Fault.of(text, message)])
     some = ", ".join(str(folder / run.stem) for run in runs[:MAX_NAMED_RUNS])
     if len(runs) > MAX_NAMED_RUNS:
         from sandbox.batch.store import DATABASE  # 8 ms of sqlite3, for this message alone
 
         some += f" …; the table `runs` of {folder / DATABASE} lists all with scene, engine and settings"
-    raise SceneError([Fault(text, None, "", f"contains {len(runs):,} runs; name one: {some}")])
+    raise SceneError([Fault.of(text, f"contains {len(runs):,} runs; name one: {some}")])

@@ -11,9 +11,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal, Self
 
-from sandbox.action import actions_to_json, in_order
+from sandbox.action import in_order
 from sandbox.batch.run_row import ReplayResult, RunRow, details_of
-from sandbox.batch.store import Store, StoreError, run_id
+from sandbox.batch.store import Store, run_id
 from sandbox.batch.stored_run import StoredRun
 from sandbox.engines.registry import engine_named
 from sandbox.games.players import PlayerSpec
@@ -21,10 +21,8 @@ from sandbox.measure.run.bounded_run import RunTimeoutError, clock_without_compi
 from sandbox.measure.run.runner import run, run_without_frames
 from sandbox.progress import Progress
 from sandbox.provenance import versions
-from sandbox.resource_limits import TooLargeError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.scene.files.document import to_document
 from sandbox.trajectory import Trajectory
 
 Values = tuple[tuple[str, Any], ...]
@@ -120,11 +118,15 @@ class RunRecord:
     """the run, if it was computed in this process"""
     replay: ReplayResult | None = None
     """comparison with the recording; None if the run is no replay"""
+    has_game: bool = False
+    """whether a player played a game"""
 
     @classmethod
     def of(cls, job: Job, stored: StoredRun, path: Path | None, **more: Any) -> Self:
         """Return the record of a job."""
-        return cls(job.label, job.point, stored, path, replay=job.replay_of(stored), **more)
+        return cls(
+            job.label, job.point, stored, path, replay=job.replay_of(stored), has_game=job.player is not None, **more
+        )
 
     @property
     def id(self) -> str:
@@ -134,9 +136,7 @@ class RunRecord:
     @property
     def is_plain(self) -> bool:
         """Whether the run is ok, and neither a replay, nor a game, nor in the place of a damaged one."""
-        is_usual = self.stored.status == "ok" and self.damaged is None and self.replay is None
-        has_no_game = '"game": {' not in (self.stored.details or "")  # parsing it would take longer than the store
-        return is_usual and has_no_game
+        return self.stored.status == "ok" and self.damaged is None and self.replay is None and not self.has_game
 
     @property
     def has_trajectory(self) -> bool:
@@ -252,22 +252,14 @@ def fetch(job: Job, store: Store, options: RunOptions) -> RunRecord | str | None
 
     Raises:
         StoreError: the store cannot be used, or the file of this run cannot be opened.
-        TooLargeError: the arrays of a run of an earlier version do not fit into memory.
     """
     found = store.find(job.run_id or identify(job)[1])
     if found is None or options.force:
         return None
     fault = store.fault_of_file(found)
-    if fault is None and found.details is None:
-        try:
-            found = _completed_row(store, found, job, identify(job)[0])
-        except TooLargeError:
-            raise
-        except ValueError as error:
-            fault = str(error)
     if fault is not None:
         return fault
-    if not is_sufficient(found, options):
+    if found.details is None or not is_sufficient(found, options):
         return None
     if job.plan_key is not None and job.plan_key != found.plan_key:
         store.set_plan_key(found, job.plan_key)
@@ -327,49 +319,3 @@ def _stored(job: Job, number: str, trajectory: Trajectory) -> StoredRun:
         plan_key=job.plan_key,
         details=details_of(trajectory, job.scene, job.player is not None),
     )
-
-
-def _completed_row(store: Store, found: StoredRun, job: Job, settings: Settings) -> StoredRun:
-    """Return the row of a run that an earlier version stored, with the columns that it did not write.
-
-    Raises:
-        StoreError: the file cannot be opened.
-        TooLargeError: its arrays would not fit into memory.
-        ValueError: it is damaged, or the run of another job; `str()` names the file and the fault.
-    """
-    file = store.file(found)
-    assert file is not None  # earlier versions stored the arrays of every run
-    try:
-        run = Trajectory.load(file)
-    except TooLargeError as error:
-        raise TooLargeError(f"{error}; delete the file to repeat the run") from None
-    except OSError as error:
-        raise StoreError(f"{file}: {error.strerror or error}; the file must be readable") from None
-    different = _difference(run, job, settings)
-    if different is not None:
-        raise ValueError(f"{file} is not the run of its id: its info.{different} is different")
-    row = replace(_stored(job, found.id, run), path=found.path, created=found.created)
-    return store.complete(row, dict(job.point))
-
-
-def _difference(run: Trajectory, job: Job, settings: Settings) -> str | None:
-    """Return the key in which a stored run differs from that of a job; None if it is the run of the job."""
-    scene, stated = to_document(job.scene), dict(run.info["scene"])
-    for table in ("solver", "play") if job.player is None else ("solver",):  # they do not affect the run
-        scene.pop(table, None)
-        stated.pop(table, None)
-    wanted: dict[str, Any] = {
-        "engine": job.engine,
-        "seed": job.scene.world.seed,
-        "versions": dict(versions(job.engine)),
-    }
-    if run.status != "refused":  # an engine that refuses a scene need not have resolved its settings
-        wanted["settings"] = settings.model_dump(mode="json")
-    if job.player is None:  # otherwise the actions of the game are among them
-        wanted["actions"] = actions_to_json(in_order(job.actions))
-    if scene != stated:
-        return "scene"
-    different = [key for key, value in wanted.items() if run.info.get(key) != value]
-    if len(run.time) and bool(run.info.get("game")) != (job.player is not None):
-        different.append("game")
-    return different[0] if different else None

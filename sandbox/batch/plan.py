@@ -103,13 +103,22 @@ class _Variant:
     where: Values
     """swept and sampled values, and the seed"""
 
-    @cached_property
-    def session(self) -> Recording:
-        """The scene as a session without actions, or the recorded session, with values set.
+    def read(self) -> Recording:
+        """Return the scene as a session without actions, or the recorded session, with values set.
 
         Raises:
             SceneError: it has faults.
         """
+        return self.session
+
+    @property
+    def is_read(self) -> bool:
+        """Whether the scene has been read."""
+        return "session" in vars(self)
+
+    @cached_property
+    def session(self) -> Recording:
+        """The session, which `read` returns."""
         return self.plan.read(self.path, self.where)
 
     @cached_property
@@ -203,7 +212,7 @@ class Plan:
             for point in self._axis_points():
                 variant = self._variant(label, path, self._point(point), 0)
                 yield from self._runs(variant, 1)
-                if "session" in vars(variant):
+                if variant.is_read:
                     self._keep(variant)
 
     def last_of_axes(self) -> Iterator[PlannedRun]:
@@ -350,7 +359,7 @@ class Plan:
             if all(run.plan_key is not None and is_stored(run.plan_key) for run in planned):
                 continue
             try:
-                variant.session  # noqa: B018, reads it, also with an engine that is not known
+                variant.read()  # also with an engine that is not known
                 self.has_player |= self.player is not None and variant.player == self.player
                 for run in planned:
                     visit(run.job())

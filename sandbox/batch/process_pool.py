@@ -21,6 +21,7 @@ from typing import Any, Literal
 
 from sandbox.batch.executors import AnyTask, ExecutorError, JobOutcome, TaskLostError, hang_time, outcomes_of
 from sandbox.batch.job import timeout_reason
+from sandbox.worker_process import exit_text
 
 MAX_STARTS = 3
 """Attempts at starting a worker, if no other one runs"""
@@ -201,8 +202,6 @@ class _Worker:
 
     def cause_of_death(self) -> str:
         """Return how the process has ended; it is killed if it has only closed its pipe."""
-        from sandbox.measure.extremes.worker import exit_text
-
         self.process.join(EXIT_TIME)
         if self.process.exitcode is None:
             self.process.kill()

@@ -98,7 +98,7 @@ class StoredRuns:
     """The runs of a store, for reading; another process may be writing to it.
 
     Args:
-        directory: folder of the store. A store of an earlier version is migrated.
+        directory: folder of the store.
 
     Raises:
         StoreError: the folder has no store, or it cannot be read.
@@ -116,7 +116,7 @@ class StoredRuns:
             (version,) = self._connection.execute("PRAGMA user_version").fetchone()
             if version != VERSION:
                 self._connection.close()
-                Store(self.directory).close()  # migrates it, or says why it cannot be used
+                Store(self.directory).close()  # says why it cannot be used
                 self._connection = self._opened()
             self._connection.text_factory = lambda data: data.decode("utf-8", "replace")
             values = value_columns(self._connection)

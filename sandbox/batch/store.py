@@ -47,7 +47,7 @@ from sandbox.trajectory import Trajectory
 
 DATABASE = "runs.sqlite"
 VERSION = 4
-"""Version of the table. A store of an earlier version is migrated, one of a later version is refused."""
+"""Version of the table. A store of another version is refused."""
 WAIT = 60.0
 """s, for another process to finish its write, which takes milliseconds, because files are written before the lock."""
 NOTICE = 1.0
@@ -60,8 +60,6 @@ MAX_VALUE_COLUMNS = 1_900
 DIGEST_BLOCK = 2**20
 """bytes that are hashed at a time"""
 
-COLUMNS_OF = {1: 17, 2: 18, 3: len(COLUMNS)}
-"""Number of columns of earlier versions, which are the first ones; those of set values follow."""
 INDEX = "CREATE INDEX IF NOT EXISTS runs_by_plan_key ON runs (plan_key)"
 
 
@@ -260,18 +258,6 @@ class Store:
         with self._writing():
             self._execute("UPDATE runs SET plan_key = ? WHERE id = ?", (plan_key, run.id))
 
-    def complete(self, row: StoredRun, values: Mapping[str, Any]) -> StoredRun:
-        """Replace the row of a run, which an earlier version wrote without all columns; its file is kept.
-
-        Raises:
-            StoreError: its file or the database cannot be used.
-        """
-        file = self.file(row)
-        if file is not None:
-            with self._faults():
-                row = replace(row, size=file.stat().st_size, digest=_digest_of(file))
-        return self._insert(row, values, True, None)
-
     def _with_file(self, found: Sequence[StoredRun]) -> StoredRun | None:
         if not found:
             return None
@@ -368,12 +354,15 @@ class Store:
                 f"{self._database}: written by a newer version of sandbox (format {version}; this one "
                 f"reads {VERSION}); update sandbox, or name another folder"
             )
+        if 0 < version < VERSION:
+            raise StoreError(
+                f"{self._database}: written by an earlier version of sandbox (format {version}; this one "
+                f"reads {VERSION}); {_REMOVE}"
+            )
         if version == 0 and self._execute("SELECT count(*) FROM sqlite_master")[0][0]:
             raise StoreError(f"{self._database}: not a database of runs; name another folder")
         if version == 0:
             self._execute(TABLE)
-        if version in COLUMNS_OF:
-            self._migrate(COLUMNS_OF[version])
         columns, others = _layout(self._connection)
         wanted, _ = _layout_of_table()
         if version < 0 or columns[: len(wanted)] != wanted or others or not _are_values(columns[len(wanted) :]):
@@ -386,17 +375,6 @@ class Store:
             self._execute(f"PRAGMA user_version = {VERSION}")
         self._columns = set(value_columns(self._connection))
         self._count = int(self._execute("SELECT count(*) FROM runs")[0][0])
-
-    def _migrate(self, count: int) -> None:
-        """Create the table of this version, with the rows of that of an earlier one, which has so many columns."""
-        others = value_columns(self._connection, count)
-        self._execute("ALTER TABLE runs RENAME TO runs_before")
-        self._execute(TABLE)
-        for column in others:
-            self._execute(f"ALTER TABLE runs ADD COLUMN {quoted_column(column)}")
-        names = ", ".join(map(quoted_column, (*COLUMNS[:count], *others)))
-        self._execute(f"INSERT INTO runs ({names}) SELECT {names} FROM runs_before")
-        self._execute("DROP TABLE runs_before")
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -102,7 +102,7 @@ class StoredRun:
     score: float | None = None
     """score of the game; null if no game was played"""
     scene: str | None = None
-    """the scene as the command named it; null in rows of earlier versions, as in the following columns"""
+    """the scene as the command named it; null, as the following columns, in rows of `Store.add`"""
     set_values: str | None = None
     """JSON object: values that the command set, swept or sampled, by path; each has a column of its own too"""
     first_contact: float | None = None

@@ -87,9 +87,9 @@ class Study:
             check_text(text)
             document = tomllib.loads(text)
         except OSError as error:
-            raise SceneError([Fault(file, None, "", f"cannot be read: {error.strerror or error}")]) from None
+            raise SceneError([Fault.of(file, f"cannot be read: {error.strerror or error}")]) from None
         except ValueError as error:
-            raise SceneError([Fault(file, None, "", f"not a study file: {error}")]) from None
+            raise SceneError([Fault.of(file, f"not a study file: {error}")]) from None
         lines = Lines(text)
         faults = [
             Fault(file, lines.find((key,)), key, f"unknown table; a study file has one, [{HEADING}]")
@@ -150,7 +150,7 @@ class Study:
             try:
                 sampling = Sampling.parse(self.sample)
             except AddressError as error:
-                faults.append(Fault("--sample", None, "", str(error)))
+                faults.append(Fault.of("--sample", str(error)))
         for sweep in self.sweeps:
             try:
                 if not isinstance(sweep, str):
@@ -162,15 +162,15 @@ class Study:
                 else:
                     ranges.append(drawn)
             except AddressError as error:
-                faults.append(Fault("--sweep", None, "", str(error)))
+                faults.append(Fault.of("--sweep", str(error)))
         if self.sample is not None and not ranges and not faults:
             message = "needs a range to draw from: --sweep KEY=LOW:HIGH or KEY=LOW:HIGH:log, without a count"
-            faults.append(Fault("--sample", None, "", message))
+            faults.append(Fault.of("--sample", message))
         if sampling is not None and ranges:
             try:
                 axes.append(sampled_axis(ranges, sampling))
             except AddressError as error:
-                faults.append(Fault("--sample", None, "", str(error)))
+                faults.append(Fault.of("--sample", str(error)))
         return axes, faults
 
 

@@ -272,14 +272,14 @@ def _read(options: _Options, faults: list[Fault]) -> Scene | Recording | None:
         if is_recording(scene_paths([options.scene])[0][1]):
             read = read_session(scene_paths([options.scene])[0][1])
             if options.overrides:
-                raise SceneError([Fault("--set", None, "", "a recording has its scene and settings within it")])
+                raise SceneError([Fault.of("--set", "a recording has its scene and settings within it")])
         else:
             read = load(scene_path(options.scene), options.overrides)
     if options.pixels and options.given_zoom is not None:
-        faults.append(Fault("--pixels", None, "", "is --zoom 1; leave out one of them"))
+        faults.append(Fault.of("--pixels", "is --zoom 1; leave out one of them"))
     if options.out is not None:
         name = shorten(str(options.out), MAX_NAMED)
-        faults += [Fault("--out", None, "", f"{name}: {reason}") for reason in reasons_not_writable(options.out)]
+        faults += [Fault.of("--out", f"{name}: {reason}") for reason in reasons_not_writable(options.out)]
     return read
 
 

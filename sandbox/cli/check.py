@@ -130,7 +130,7 @@ def check_command(
         try:
             engine_named(engine)
         except UnknownEngineError as error:
-            return exit_with_errors([Fault("--engine", None, "", str(error))], as_json)
+            return exit_with_errors([Fault.of("--engine", str(error))], as_json)
     answers, names = _Answers(), expand_folders(scenes)
     for name in names:
         try:
@@ -145,7 +145,7 @@ def check_command(
                 print_faults(error.faults)
         except Exception as error:  # noqa: BLE001, a failure on one scene must not lose the answers for the others
             message = f"check failed with {type(error).__name__}: {error}; please report this scene"
-            fault = Fault(name, None, "", message)
+            fault = Fault.of(name, message)
             answers.add(_faulty(name, [fault]), 1)
             click.echo(str(fault), err=True)
         else:

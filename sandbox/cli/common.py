@@ -68,7 +68,7 @@ def parse_engines(text: str | None, faults: list[Fault]) -> list[str] | None:
 def more_unknown(option: str, count: int) -> list[Fault]:
     """Return a fault with the number of unknown names of an option beyond `MAX_UNKNOWN`; empty if there are none."""
     more = count - MAX_UNKNOWN
-    return [Fault(option, None, "", f"{more:,} more names are unknown")] if more > 0 else []
+    return [Fault.of(option, f"{more:,} more names are unknown")] if more > 0 else []
 
 
 PLOT_SUFFIXES = (".png", ".svg", ".pdf")
@@ -85,7 +85,7 @@ def require_folder(out: Path | None) -> None:
     except OSError as error:  # the name is too long for the file system
         reason = error.strerror or str(error)
     if reason:
-        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reason}")])
+        raise SceneError([Fault.of("--out", f"{shorten(str(out), MAX_NAMED)}: {reason}")])
 
 
 def make_folder(out: Path) -> None:
@@ -100,11 +100,15 @@ def make_folder(out: Path) -> None:
             pass
     except OSError as error:
         reason = error.strerror or error
-        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reason}")]) from None
+        raise SceneError([Fault.of("--out", f"{shorten(str(out), MAX_NAMED)}: {reason}")]) from None
 
 
-def require_plot_file(plot: Path | None) -> None:
-    """Check that the file of `--plot` can be written.
+def require_plot_file(plot: Path | None, option: str = "--plot") -> None:
+    """Check that the file of a plot can be written.
+
+    Args:
+        plot: path of the file.
+        option: option that names it.
 
     Raises:
         SceneError: it cannot, or its suffix is not one of `PLOT_SUFFIXES`.
@@ -116,7 +120,7 @@ def require_plot_file(plot: Path | None) -> None:
         faults.append("the name must end in .png, .svg or .pdf")
     faults += reasons_not_writable(plot)
     if faults:
-        raise SceneError([Fault("--plot", None, "", f"{shorten(str(plot), MAX_NAMED)}: {each}") for each in faults])
+        raise SceneError([Fault.of(option, f"{shorten(str(plot), MAX_NAMED)}: {each}") for each in faults])
 
 
 def reasons_not_writable(path: Path) -> list[str]:
@@ -169,7 +173,7 @@ def scene_paths(names: Sequence[str]) -> list[tuple[str, str]]:
         try:
             found.append((name, str(find(name))))
         except UnknownSceneError as error:
-            faults.append(Fault(name, None, "", str(error)))
+            faults.append(Fault.of(name, str(error)))
     if faults:
         raise SceneError(faults)
     return found
@@ -188,7 +192,7 @@ def scene_path(name: str) -> str:
             remedy = f"`sandbox replay {shorten(name)}` shows it"
             if ending == ".json":
                 remedy += f", `sandbox export {shorten(name)} --to FILE.toml` writes its scene"
-            raise SceneError([Fault(name, None, "", f"is {kind}, not a scene; {remedy}")])
+            raise SceneError([Fault.of(name, f"is {kind}, not a scene; {remedy}")])
     return path
 
 
@@ -206,7 +210,7 @@ def collect_errors(faults: list[Fault], source: str = "", also: tuple[type[Excep
     except SceneError as error:
         faults += error.faults
     except also as error:
-        faults.append(Fault(source, None, "", str(error)))
+        faults.append(Fault.of(source, str(error)))
 
 
 def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:

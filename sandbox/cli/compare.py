@@ -34,8 +34,19 @@ from sandbox.cli.options import (
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
-from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.cli.tables import (
+    add_columns,
+    cell_text,
+    format_optional,
+    heads_of,
+    new_table,
+    print_legend,
+    print_line,
+    print_table,
+)
+from sandbox.measure.columns import Column, shown
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
+from sandbox.measure.compare.columns import COLUMNS, ONE_SIDED
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.compare.result import short_key, value_text
 from sandbox.measure.run.recorder import TooLargeError
@@ -45,15 +56,8 @@ from sandbox.scene.files.overrides import AddressError, combinations
 
 MAX_LISTED = 5
 """Unmatched contacts that are listed for each engine; `--json` has more."""
-ONE_SIDED = {"missed": "truth only", "phantom": "run only"}
-"""Heads of unmatched contacts by their JSON names. `run` has another meaning of missed: tunnelling."""
-
 NO_EFFECT = 1e-6
 """Relative change of the error below which a setting counts as without effect."""
-HEADS = (
-    "max error, m", "rms error, m", "max error, m/s", "diverges, s", "energy", "momentum", "contacts",
-    *ONE_SIDED.values(), "after", "seconds",
-)  # fmt: skip
 LEGEND = (
     "error: the largest, and the root mean square, of all bodies' distances from the truth while that is trusted",
     "diverges: when a distance first exceeds the tolerance; energy, momentum: change without a cause, as a fraction",
@@ -61,23 +65,13 @@ LEGEND = (
     "after: either, once a body has diverged",
 )
 """Short meanings of the columns."""
-COLUMNS = {
+NAMES = {
     "engine": "the physics engine",
     "dt": "time step of a frame, s",
     "status": "ok; diverged: a state is not finite; refused: the engine cannot model the scene; failed: it stopped",
-    "max error, m": "largest distance of any body from the truth, while the truth is trusted, m",
-    "rms error, m": "root mean square of these distances, m",
-    "max error, m/s": "largest difference of any body's velocity from the truth, m/s",
-    "diverges, s": "time at which a distance first exceeds the tolerance, s",
-    "energy": "change of the energy without a cause, as a fraction; + is a gain",
-    "momentum": "change of the momentum without a cause, as a fraction",
-    "contacts": "contacts that the truth has too",
-    "truth only": "contacts of the truth that the run does not have",
-    "run only": "contacts of the run that the truth does not have",
-    "after": "contacts of either after one of their bodies has diverged; these are not matched",
-    "seconds": "computing time of the run, without compilation, s",
 }
-"""Columns of the table and their meaning, for `--verbose`."""
+"""Meanings of the columns that name a row."""
+SECONDS: Column[Row] = Column("seconds", "computing time of the run, without compilation, s", lambda row: row.seconds)
 
 
 def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bool, verbose: bool = False) -> None:
@@ -97,27 +91,23 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
     swept = [key for key in comparison.rows[0].set if key != "solver.dt"]
     add_columns(table, (*map(short_key, swept), "dt"), "right")
     add_columns(table, ["status"])
-    add_columns(table, HEADS, "right")
+    columns = shown((*COLUMNS, SECONDS), comparison.rows)
+    add_columns(table, [column.head for column in columns], "right")
     for row in comparison.rows:
         table.add_row(
             row.engine,
             *(Text(value_text(row.set[key])) for key in swept),
             f"{row.settings['dt']:.4g}",
             Text(row.status, style="green" if row.status == "ok" else "bold red"),
-            format_optional(row.score.max_position),
-            format_optional(row.score.rms_position),
-            format_optional(row.score.max_velocity),
-            _divergence(row),
-            _drift(row.energy_drift),
-            _drift(row.momentum_drift),
-            *(format_optional(row.count(kind), ",") for kind in ("matched", *ONE_SIDED, "after_divergence")),
-            format_optional(row.seconds),
+            *(cell_text(column, row) for column in columns),
         )
     print_line(f"{scene}: {comparison.scene.title}" if comparison.scene.title else scene)
     print_line(comparison.sentence())
     print_table(table)
     if verbose:
-        print_legend(heads_of(table), COLUMNS | {short_key(key): f"value of {key!r}" for key in swept})
+        meanings = {column.head: column.about for column in columns}
+        meanings |= {short_key(key): f"value of {key!r}" for key in swept}
+        print_legend(heads_of(table), NAMES | meanings)
     for line in _lines_below_table(comparison, why, refusals, not verbose):
         click.echo(line)
 
@@ -134,8 +124,7 @@ def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend
         if refusals and row.status == "refused":
             lines.append(str(row.reason))
         for kind, head in ONE_SIDED.items():
-            events = [event for event in row.events or () if event.kind == kind]
-            if events:
+            if events := row.contacts(kind):
                 lines.append(f"{row.name}: {head}: {_named(events)}")
         if why and row.status != "refused":
             lines += _explained(row)
@@ -193,16 +182,6 @@ def _explained(row: Row) -> list[str]:
             named = (f"{knob.label} ({knob.status})" if heading == "failed" else knob.label for knob in knobs)
             lines.append(f"  {heading}: {', '.join(named)}")
     return lines
-
-
-def _divergence(row: Row) -> str:
-    if row.first_divergence is not None:
-        return f"{row.first_divergence:.4g}"
-    return "–" if row.score.max_position is None else "never"
-
-
-def _drift(value: float | None) -> str:
-    return "–" if value is None else f"{value:+.2g}" if value else "0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -321,7 +300,7 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         path, remarks = read.path, read.remarks
         variants = _variants(options.scene, options.overrides, axes)
     if options.tolerance is not None and not math.isfinite(options.tolerance):
-        faults.append(Fault("--tolerance", None, "", f"is {options.tolerance} m; it must be finite"))
+        faults.append(Fault.of("--tolerance", f"is {options.tolerance} m; it must be finite"))
     with collect_errors(faults):
         require_folder(options.out)
     smallest = None
@@ -329,11 +308,11 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         smallest = Path(options.minimise or f"{Path(path or options.scene).stem}.min.toml")
         faults += faults_of(smallest, path, options.force)
         if options.sweeps:
-            faults.append(Fault("--minimise", None, "", "works on a single scene; leave out --sweep"))
+            faults.append(Fault.of("--minimise", "works on a single scene; leave out --sweep"))
     elif options.force:
-        faults.append(Fault("--force", None, "", "works only together with --minimise"))
+        faults.append(Fault.of("--force", "works only together with --minimise"))
     if options.out is not None and any(not key.startswith("solver.") for key, _ in axes):
-        faults.append(Fault("--out", None, "", "draws a single scene; sweep only keys of solver, or leave out --out"))
+        faults.append(Fault.of("--out", "draws a single scene; sweep only keys of solver, or leave out --out"))
     if options.out is not None and not faults:
         with collect_errors(faults):
             make_folder(options.out)

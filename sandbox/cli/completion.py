@@ -181,7 +181,7 @@ def _document(ctx: click.Context) -> dict[str, Any]:
 
 
 def _metrics(_ctx: click.Context, _incomplete: str) -> Iterable[str]:
-    from sandbox.measure.tradeoff.metrics import METRICS
+    from sandbox.measure.compare.metrics import METRICS
 
     return METRICS
 

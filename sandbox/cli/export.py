@@ -146,7 +146,7 @@ def _export_program(name: str, options: Options, faults: list[Fault], as_json: b
             with atomic_write(Path(target)) as temporary:
                 temporary.write_text(text, encoding="utf-8", newline="\n")
         except OSError as error:
-            faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
+            faults.append(Fault.of("--to", f"{target}: {error.strerror or error}"))
             click.echo(str(faults[-1]), err=True)
         else:
             files.append({"path": target, "format": kind[1:], "lines": text.count("\n")})
@@ -204,13 +204,13 @@ def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bo
     files: list[dict[str, Any]] = []
     with collect_errors(faults, folder, (StoreError,)), open_store(folder) as runs:
         if not len(runs):
-            faults.append(Fault(folder, None, "", "contains no run"))
+            faults.append(Fault.of(folder, "contains no run"))
         for target in options.targets if len(runs) else ():
             is_csv = Path(target).suffix.lower() == ".csv"
             try:
                 count = runs.to_csv(target) if is_csv else runs.to_parquet(target)
             except OSError as error:
-                faults.append(Fault("--to", None, "", f"{target}: {error.strerror or error}"))
+                faults.append(Fault.of("--to", f"{target}: {error.strerror or error}"))
             else:
                 files.append({"path": target, "format": Path(target).suffix.lower()[1:], "rows": count})
     faults = [replace(fault, message=fault.message.removeprefix(f"{folder}: ")) for fault in faults]
@@ -236,7 +236,7 @@ def _trajectory(run: str, source: Trajectory | Recording, bars: ProgressBars) ->
     try:
         trajectory = rerun(source, audit=False, on_progress=bars.callback(f"running {run}"))
     except (UnknownEngineError, TooLargeError, UnsuitableSceneError) as error:
-        raise SceneError([Fault(run, None, "", str(error))]) from None
+        raise SceneError([Fault.of(run, str(error))]) from None
     if trajectory.status == "ok" or not len(trajectory.time):
         return 0, trajectory
     click.echo(f"{run}: {trajectory.status}: {trajectory.reason}", err=True)
@@ -273,7 +273,7 @@ def _write_table(run: str, options: Options, trajectory: Trajectory, path: Path)
             return write_states(part, path)
         return write_contacts(part, _fixed_names(run, trajectory), path)
     except OSError as error:
-        raise SceneError([Fault("--to", None, "", f"{path}: {error.strerror or error}")]) from None
+        raise SceneError([Fault.of("--to", f"{path}: {error.strerror or error}")]) from None
 
 
 def _fixed_names(run: str, trajectory: Trajectory) -> tuple[str, ...]:
@@ -331,4 +331,4 @@ def _export_images(options: Options, film: "RecordedRun", path: Path, on_progres
     try:
         return export_images(film, export_options, path, on_progress)
     except PictureError as error:
-        raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None
+        raise SceneError([Fault.of("--to", f"{path}: {error}")]) from None

@@ -79,7 +79,7 @@ def check_options(options: Options) -> None:
         *_program_faults(options),
     ]
     if messages:
-        raise SceneError([Fault(option, None, "", message) for option, message in messages])
+        raise SceneError([Fault.of(option, message) for option, message in messages])
 
 
 def check_times(options: Options, end: float | None) -> None:
@@ -107,7 +107,7 @@ def check_times(options: Options, end: float | None) -> None:
                 ("--to", f"the film would have {frames:,.0f} frames, the limit is {limit:,}: {remedy}{instead}")
             )
     if faults:
-        raise SceneError([Fault(option, None, "", message) for option, message in faults])
+        raise SceneError([Fault.of(option, message) for option, message in faults])
 
 
 def _max_frames(options: Options) -> int | None:

@@ -208,7 +208,7 @@ def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
     chosen = _axes(options.axes, faults)
     names = parse_engines(options.engines, faults)
     if not math.isfinite(options.timeout):
-        faults.append(Fault("--timeout", None, "", f"is {options.timeout} s; it must be finite"))
+        faults.append(Fault.of("--timeout", f"is {options.timeout} s; it must be finite"))
     with collect_errors(faults):
         check_overrides(options.overrides, chosen)
     cases = {axis.case.name for axis in chosen}
@@ -233,7 +233,7 @@ def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
     names = parse_names(text)
     unknown = [name for name in names if name not in AXES]
     axes = ", ".join(AXES)
-    faults += [Fault("--axes", None, "", f"no axis {short_repr(name)}; axes: {axes}") for name in unknown[:MAX_UNKNOWN]]
+    faults += [Fault.of("--axes", f"no axis {short_repr(name)}; axes: {axes}") for name in unknown[:MAX_UNKNOWN]]
     faults += more_unknown("--axes", len(unknown))
     return tuple(AXES[name] for name in names if name in AXES)
 

@@ -31,7 +31,7 @@ from sandbox.games.billiards.headless import MAX_TURNS, FrameRecord, FrameTurn, 
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.registry import RULESETS
-from sandbox.jsonable import to_json
+from sandbox.jsonable import in_json, to_json
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
@@ -128,10 +128,11 @@ class MatchResult:
     """as the user named them"""
     frames: list[MatchFrame] = field(default_factory=list)
     """complete frames"""
-    status: int = 0
+    status: int = field(default=0, metadata=in_json(omit=True))
     """exit status: 1 a frame was abandoned, 2 a session cannot be saved, 130 interrupted"""
 
-    json_members: ClassVar = ("scene", "players", "wins", "unfinished", "frames", "interrupted")
+    json_head: ClassVar = ("scene", "players", "wins", "unfinished")
+    json_properties: ClassVar = ("interrupted",)
 
     @property
     def wins(self) -> Sequence[int]:
@@ -240,7 +241,7 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
     with collect_errors(faults, "--engine", (UnknownEngineError,)):
         engine_named(options.engine)
     if options.time_limit is not None and math.isnan(options.time_limit):
-        faults.append(Fault("--time-limit", None, "", "is not a number; it must be greater than 0"))
+        faults.append(Fault.of("--time-limit", "is not a number; it must be greater than 0"))
     count = 2
     with collect_errors(faults, "--players", (GameError,)):
         count = len(parse_bots(options.players))
@@ -249,9 +250,7 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
         require_folder(options.out)
         scene = load(scene_path(options.scene), options.overrides)
     if scene is not None and scene.surface is None:
-        faults.append(
-            Fault(options.scene, None, "", f"is not a billiard table: it has no [surface]; tables are {TABLES}")
-        )
+        faults.append(Fault.of(options.scene, f"is not a billiard table: it has no [surface]; tables are {TABLES}"))
     elif scene is not None:
         with collect_errors(faults, options.scene, (GameError,)):
             Match.begin(scene, options.game, count, **options.terms)

@@ -99,7 +99,7 @@ def import_command(
     suffix = Path(level).suffix.lower()
     if suffix not in SUFFIXES:
         message = OTHER_FORMATS.get(suffix, "is no level; its name must end in .svg, .tmx or .json")
-        faults.append(Fault(level, None, "", message))
+        faults.append(Fault.of(level, message))
     if suffix == ".json":
         faults += _faults_for_a_shot()
         scale = 1.0
@@ -155,7 +155,7 @@ def _faults_for_a_shot() -> list[Fault]:
     """Return a fault for each option of the command line that does not apply to a shot."""
     source_of = click.get_current_context().get_parameter_source
     given = [name for name in OF_DRAWINGS if source_of(name) is ParameterSource.COMMANDLINE]
-    return [Fault(f"--{name}", None, "", "does not apply to a shot of pooltool; leave it out") for name in given]
+    return [Fault.of(f"--{name}", "does not apply to a shot of pooltool; leave it out") for name in given]
 
 
 def _summary(imported: ImportedLevel) -> str:
@@ -174,7 +174,7 @@ def _gravity(text: str | None, faults: list[Fault]) -> tuple[float, float] | Non
     try:
         x, y = map(float, words)
     except ValueError:
-        faults.append(Fault("--gravity", None, "", f"must be two numbers, such as 0,-9.81; is {short_repr(text)}"))
+        faults.append(Fault.of("--gravity", f"must be two numbers, such as 0,-9.81; is {short_repr(text)}"))
         return None
     return x, y
 
@@ -191,7 +191,7 @@ def _target_faults(level: str, target: str | None, force: bool) -> list[Fault]:
                 reasons = ["is the level itself; choose another name"]
         if not reasons and not force:
             reasons = ["exists already; use --force to replace it"]
-    return [Fault("--to", None, "", f"{name}: {reason}") for reason in reasons]
+    return [Fault.of("--to", f"{name}: {reason}") for reason in reasons]
 
 
 def _write(text: str, path: Path) -> list[Fault]:
@@ -200,5 +200,5 @@ def _write(text: str, path: Path) -> list[Fault]:
         with atomic_write(path) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
-        return [Fault("--to", None, "", f"{shorten(str(path), MAX_NAMED)}: {error.strerror or error}")]
+        return [Fault.of("--to", f"{shorten(str(path), MAX_NAMED)}: {error.strerror or error}")]
     return []

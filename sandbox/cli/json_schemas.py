@@ -6,15 +6,15 @@ from typing import Any
 from sandbox.jsonable import json_schema
 
 DOCUMENTS = {
-    "advise": "sandbox.measure.advice.result:AdviceDocument",
+    "advise": "sandbox.measure.advice.result:Advice",
     "check": "sandbox.cli.check:CheckDocument",
-    "compare": "sandbox.measure.compare.result:ComparisonDocument",
-    "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
+    "compare": "sandbox.measure.compare.result:Comparison",
+    "extremes": "sandbox.measure.extremes.runner:Extremes",
     "match": "sandbox.cli.games:MatchResult",
     "run": "sandbox.cli.run_tables:RunsDocument",
     "runs": "sandbox.cli.runs:StoredRunsDocument",
     "shots": "sandbox.measure.shots.study:ShotStudy",
-    "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
+    "tradeoff": "sandbox.measure.tradeoff.result:Tradeoff",
 }
 """Dataclass of the document of each command, as `module:class`."""
 

@@ -42,7 +42,7 @@ def faults_of(path: Path, scene: str, force: bool) -> list[Fault]:
             reason = "is the scene itself; name another file"
         elif not force:
             reason = "exists already; add --force to replace it, or name another file: --minimise FILE"
-    return [Fault("--minimise", None, "", f"{shorten(str(path), MAX_NAMED)}: {reason}")] if reason else []
+    return [Fault.of("--minimise", f"{shorten(str(path), MAX_NAMED)}: {reason}")] if reason else []
 
 
 def minimised(

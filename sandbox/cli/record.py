@@ -104,12 +104,12 @@ def record_command(
         except KeyboardInterrupt:
             ended, status = "interrupted", 130
         except CaptureError as error:
-            faults = [Fault(game, None, "", f"its space cannot be a scene: {error}")]
+            faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
         except Exception as error:  # noqa: BLE001, of the user's program
             traceback.print_exc()
             ended, status = f"{type(error).__name__}: {error}", 1
     if not captured.spaces and not faults:
-        faults = [Fault(game, None, "", "no pymunk space made a step, so that there is nothing to record")]
+        faults = [Fault.of(game, "no pymunk space made a step, so that there is nothing to record")]
     recording: Recording | None = None
     if not faults:
         try:
@@ -117,9 +117,9 @@ def record_command(
             recording = _checked(captured, as_json or quiet)
             recording.save(path)
         except CaptureError as error:
-            faults = [Fault(game, None, "", f"its space cannot be a scene: {error}")]
+            faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
         except OSError as error:
-            faults = [Fault(str(path), None, "", f"cannot be written: {error.strerror or error}")]
+            faults = [Fault.of(str(path), f"cannot be written: {error.strerror or error}")]
     if recording is None or faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game, ended=ended)))
     check = None if recording.game is None else recording.game.replay
@@ -177,14 +177,14 @@ def _faults(game: str, path: Path, force: bool) -> list[Fault]:
     except OSError as error:  # the name is too long for the file system
         return [Fault(shorten(game, MAX_NAMED), None, "", f"cannot be read: {error.strerror or error}")]
     if not exists:
-        found.append(Fault(game, None, "", "does not exist; name the Python file of the game"))
+        found.append(Fault.of(game, "does not exist; name the Python file of the game"))
     elif Path(game).suffix != ".py" and not (Path(game) / "__main__.py").exists():
-        found.append(Fault(game, None, "", "is no Python program; name a .py file, or a folder with a __main__.py"))
+        found.append(Fault.of(game, "is no Python program; name a .py file, or a folder with a __main__.py"))
     reason = next(iter(reasons_not_writable(path)), "")
     if not reason and path.exists() and not force:
         reason = "exists already; add --force to replace it, or name another file: --to FILE"
     if reason:
-        found.append(Fault("--to", None, "", f"{shorten(str(path), MAX_NAMED)}: {reason}"))
+        found.append(Fault.of("--to", f"{shorten(str(path), MAX_NAMED)}: {reason}"))
     return found
 
 

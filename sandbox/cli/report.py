@@ -148,11 +148,9 @@ def _read_scenes(
             read.append((name, scene))
     for flag, value in (("--effort", options.effort), ("--time-limit", options.time_limit)):
         if value is not None and not math.isfinite(value):
-            faults.append(Fault(flag, None, "", f"is {value:g}; it must be finite"))
+            faults.append(Fault.of(flag, f"is {value:g}; it must be finite"))
     if not read and not faults:
-        faults.append(
-            Fault("SCENES", None, "", "is missing, and there are no shipped benchmark scenes; name some scenes")
-        )
+        faults.append(Fault.of("SCENES", "is missing, and there are no shipped benchmark scenes; name some scenes"))
     return read
 
 
@@ -215,5 +213,5 @@ def _page_path(out: Path) -> Path:
     except OSError as error:
         reasons = [error.strerror or str(error)]
     if reasons:
-        raise SceneError([Fault("--out", None, "", f"{shorten(str(out), MAX_NAMED)}: {reasons[0]}")])
+        raise SceneError([Fault.of("--out", f"{shorten(str(out), MAX_NAMED)}: {reasons[0]}")])
     return out

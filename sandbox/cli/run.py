@@ -215,7 +215,7 @@ def _study(options: _Options, faults: list[Fault]) -> Study | None:
     if not any(map(is_study, options.scenes)):
         return given
     if len(options.scenes) > 1:
-        faults.append(Fault(options.scenes[0], None, "", "give a study file alone: it names its scenes"))
+        faults.append(Fault.of(options.scenes[0], "give a study file alone: it names its scenes"))
         return None
     with collect_errors(faults):
         return Study.read(options.scenes[0]).with_options(given)
@@ -238,12 +238,12 @@ def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
         study.seeds,
     )
     if study.keep == "end" and study.audit:
-        faults.append(Fault("--audit", None, "", "counts contacts, which --keep end leaves out; leave out one of them"))
+        faults.append(Fault.of("--audit", "counts contacts, which --keep end leaves out; leave out one of them"))
     player: PlayerSpec | None = None
     with collect_errors(faults):
         player = None if study.player is None else PlayerSpec.parse(study.player)
     if options.cluster is not None and options.workers is not None:
-        faults.append(Fault("--workers", None, "", "is given with --on too; leave out one of them"))
+        faults.append(Fault.of("--workers", "is given with --on too; leave out one of them"))
     with collect_errors(faults, "--sweep", (AddressError,)):
         keeps_ends = study.keep == "end" and study.time_limit is None and not study.ledger and not study.audit
         return Plan(found, names, study.overrides, axes, study.seeds, player, keeps_ends)
@@ -272,7 +272,7 @@ def _checked_batch(
     with collect_errors(faults), status_line(options.is_silent) as progress:
         plan.check(is_stored, visit, progress)
     if plan.player is not None and not plan.has_player and not faults:
-        faults.append(Fault("--player", None, "", "has no use: none of the scenes has a game with rules"))
+        faults.append(Fault.of("--player", "has no use: none of the scenes has a game with rules"))
     count = len(plan)
     scene = scenes[0] if count == 1 and scenes else None
     if not faults:
@@ -430,7 +430,7 @@ def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
         SceneError: one is a stored run.
     """
     reason = "is a stored run, not a scene; `sandbox export` and `sandbox replay` read it"
-    stored = [Fault(name, None, "", reason) for name, path in paths if path.lower().endswith(".npz")]
+    stored = [Fault.of(name, reason) for name, path in paths if path.lower().endswith(".npz")]
     if stored:
         raise SceneError(stored)
     return paths
@@ -500,7 +500,7 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], count: int, scene
     faults: list[Fault] = []
 
     def fault(option: str, message: str) -> None:
-        faults.append(Fault(option, None, "", message))
+        faults.append(Fault.of(option, message))
 
     if plot is None and bodies:
         fault("--body", "works only together with --plot FILE")

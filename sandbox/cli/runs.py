@@ -145,7 +145,7 @@ def runs_command(**given: Any) -> int:
             if not faults:
                 return _answer(runs, options)
     except QueryError as error:
-        faults.append(Fault("--where" if options.wheres else "--success", None, "", str(error)))
+        faults.append(Fault.of("--where" if options.wheres else "--success", str(error)))
     return exit_with_errors(_shortened(options.folder, faults), options.as_json)
 
 
@@ -154,7 +154,7 @@ def _option_faults(options: _Options) -> list[Fault]:
     faults: list[Fault] = []
 
     def fault(option: str, message: str) -> None:
-        faults.append(Fault(option, None, "", message))
+        faults.append(Fault.of(option, message))
 
     if options.plot is not None and not 1 <= len(options.keys) <= 2:
         fault("--plot", "draws over one or two keys: --by KEY or --by KEY,KEY")
@@ -162,8 +162,7 @@ def _option_faults(options: _Options) -> list[Fault]:
         fault("--to", "names the file of --plot; --csv and --json print tables")
     if options.target is not None and options.plot is not None:
         with collect_errors(faults):
-            require_plot_file(options.target)
-        faults[:] = [Fault(f.file.replace("--plot", "--to"), f.line, f.path, f.message) for f in faults]
+            require_plot_file(options.target, "--to")
     if options.as_csv and options.as_json:
         fault("--csv", "is given with --json too; leave out one of them")
     if options.by is None and options.of is not None:

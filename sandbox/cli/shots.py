@@ -200,7 +200,7 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         request.spread = Spread(options.aim_error, options.speed_error, options.side_error, options.height_error)
     for flag, value in (("--nudge", options.nudge), ("--tolerance", options.tolerance)):
         if math.isnan(value):
-            faults.append(Fault(flag, None, "", "is not a number; it must be positive and finite"))
+            faults.append(Fault.of(flag, "is not a number; it must be positive and finite"))
     with collect_errors(faults), collect_errors(faults, options.scene, (NoSuchShotError,)):
         try:
             request.shot = shot_setup(load(scene_path(options.scene), options.overrides), options.name)
@@ -262,7 +262,7 @@ def _write(found: ShotStudy, document: dict[str, Any], options: _Options) -> int
         write_json(document, options.out / "shots.json")
         plot_shots(found, options.out)
     except OSError as error:
-        return exit_with_errors([Fault("--out", None, "", f"{error.filename}: {error.strerror}")])
+        return exit_with_errors([Fault.of("--out", f"{error.filename}: {error.strerror}")])
     if not options.is_silent:
         click.echo(f"written: {options.out}")
     return 0

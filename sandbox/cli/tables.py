@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from sandbox.formatting import UNKNOWN
+from sandbox.measure.columns import Column, R
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -39,7 +42,17 @@ def heads_of(table: "Table") -> list[str]:
 
 def format_optional(value: float | None, spec: str = ".3g") -> str:
     """Return a number by a format specification; a dash for None, an unknown value."""
-    return "–" if value is None else format(value, spec)
+    return UNKNOWN if value is None else format(value, spec)
+
+
+def cell_text(column: Column[R], row: R) -> str:
+    """Return the value of a row in a column as text."""
+    value = column.value(row)
+    if value is None or isinstance(value, str):
+        return value or UNKNOWN
+    if column.kind == "change":
+        return f"{value:+.2g}" if value else "0"
+    return format(value, {"number": ".3g", "time": ".4g", "count": ","}[column.kind])
 
 
 def new_console() -> "Console":

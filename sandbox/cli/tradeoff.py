@@ -37,10 +37,10 @@ from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
 from sandbox.measure.compare import compare
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
 from sandbox.measure.tradeoff.result import Tradeoff
@@ -113,7 +113,7 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
             click.echo(_long_legend(found))
     splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
     proposed = [each.sentence for each in found.proposals]
-    for line in [*_failures(found), *splits, *found.answers(), *_notes(found), *proposed, *_solver(found)]:
+    for line in [*_failures(found), *splits, *found.sentences, *_notes(found), *proposed, *_solver(found)]:
         click.echo(line)
 
 
@@ -400,7 +400,7 @@ def _check_numbers(options: _Options, faults: list[Fault]) -> None:
         ("--time-limit", options.time_limit),
     ):
         if value is not None and not math.isfinite(value):
-            faults.append(Fault(flag, None, "", f"is {value:g}; it must be positive and finite"))
+            faults.append(Fault.of(flag, f"is {value:g}; it must be positive and finite"))
 
 
 def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None, tuple[str, ...]]:
@@ -412,11 +412,11 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None, tu
         path, read, remarks = read_scene(options.scene, options.overrides)
     if options.write and options.overrides:
         faults.append(
-            Fault("--write", None, "", "cannot be combined with --set, because the file does not contain those changes")
+            Fault.of("--write", "cannot be combined with --set, because the file does not contain those changes")
         )
     elif options.write and is_recording(path):
         remedy = f"write its scene with `sandbox export {shorten(options.scene)} --to FILE.toml` first"
-        faults.append(Fault("--write", None, "", f"cannot write into a recording; {remedy}"))
+        faults.append(Fault.of("--write", f"cannot write into a recording; {remedy}"))
     elif options.write and read is not None:
         with collect_errors(faults):
             write_solver(path, {})  # without changes: raises if the file cannot be written
@@ -476,7 +476,7 @@ def _draw(document: dict[str, object], plot: Path | None, written: list[Path]) -
     try:
         plot_tradeoff(document, plot)
     except OSError as error:
-        raise SceneError([Fault("--plot", None, "", f"{error.filename}: {error.strerror}")]) from None
+        raise SceneError([Fault.of("--plot", f"{error.filename}: {error.strerror}")]) from None
     written.append(plot)
 
 
@@ -498,7 +498,7 @@ def _write_folder(found: Tradeoff, document: dict[str, object], out: Path | None
             raise KeyboardInterrupt
         write_tradeoff(document, out / "report.html", replayed)
     except OSError as error:
-        raise SceneError([Fault("--out", None, "", f"{error.filename}: {error.strerror}")]) from None
+        raise SceneError([Fault.of("--out", f"{error.filename}: {error.strerror}")]) from None
     written.append(out)
 
 

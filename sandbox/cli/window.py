@@ -119,7 +119,7 @@ def run_window(
     record = options.record
     reasons = [] if record is None else reasons_not_writable(record)
     if reasons:
-        return exit_with_errors([Fault("--record", None, "", f"{shorten(str(record), MAX_NAMED)}: {reasons[0]}")])
+        return exit_with_errors([Fault.of("--record", f"{shorten(str(record), MAX_NAMED)}: {reasons[0]}")])
     app_state.paused, app_state.saves_at_end = options.paused, record is not None
     failures: list[OutputError] = []
 
@@ -197,7 +197,7 @@ def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ..
                 )
                 return 1
         elif overrides:
-            raise SceneError([Fault("--set", None, "", "needs a SCENE to change; name one")])
+            raise SceneError([Fault.of("--set", "needs a SCENE to change; name one")])
     if faults:
         return exit_with_errors(faults)
 

@@ -156,7 +156,7 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
         lines = read_limited(Path(path), MAX_SCRIPT_SIZE).decode("utf-8").splitlines()
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
-        raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
+        raise SceneError([Fault.of(str(path), f"cannot be read: {reason}")]) from None
     presses, faults = [], []
     for number, text in _statements(lines):
         try:
@@ -211,7 +211,7 @@ def _limit_faults(faults: list[Fault], file: str) -> list[Fault]:
     more = len(faults) - MAX_FAULTS
     if more <= 0:
         return faults
-    return [*faults[:MAX_FAULTS], Fault(file, None, "", f"{more:,} more faults")]
+    return [*faults[:MAX_FAULTS], Fault.of(file, f"{more:,} more faults")]
 
 
 def _lines(file: str) -> dict[Press, int]:
@@ -251,7 +251,7 @@ class PlayerSpec:
             reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         if reason:
             message = f"cannot be read: {reason}; a player is {', '.join(POLICIES)} or a script file"
-            raise SceneError([Fault(text, None, "", message)])
+            raise SceneError([Fault.of(text, message)])
         return cls(text, read_script(text))
 
     @classmethod
@@ -278,7 +278,7 @@ class PlayerSpec:
             try:
                 return HeadlessGame(rules, POLICIES[self.name](scene), self.name)
             except UnsuitableSceneError as error:
-                raise SceneError([Fault("--player", None, "", str(error))]) from None
+                raise SceneError([Fault.of("--player", str(error))]) from None
         faults = faults_of(self.presses, rules.controls, self.name)
         if faults:
             raise SceneError(faults)

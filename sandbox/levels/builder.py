@@ -69,12 +69,12 @@ class LevelOptions:
         found = []
         for name, value, most in (("scale", self.scale, 1e9), ("tolerance", self.tolerance, 1e9)):
             if not 1e-9 <= value <= most:  # also refuses NaN
-                found.append(Fault(f"--{name}", None, "", f"must be between 1e-9 and {most:g}, is {value:g}"))
+                found.append(Fault.of(f"--{name}", f"must be between 1e-9 and {most:g}, is {value:g}"))
         if self.gravity is not None and not all(abs(each) <= 1e9 for each in self.gravity):
-            found.append(Fault("--gravity", None, "", "must be two numbers between -1e9 and 1e9, m/s²"))
+            found.append(Fault.of("--gravity", "must be two numbers between -1e9 and 1e9, m/s²"))
         if self.origin not in ORIGINS:
             message = f"must be one of {', '.join(ORIGINS)}; is {short_repr(self.origin)}"
-            found.append(Fault("--origin", None, "", message))
+            found.append(Fault.of("--origin", message))
         return found
 
 

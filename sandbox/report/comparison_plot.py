@@ -141,7 +141,7 @@ def draw_error(comparison: Comparison) -> Figure:
     panels = figure.subplots(2, 1, sharex=True)
     found = _errors(comparison)
     for panel, quantity, unit in zip(panels, ("position", "velocity"), ("m", "m/s"), strict=True):
-        curves = {name: (each.time, getattr(each, quantity)) for name, each in found.items()}
+        curves = {name: (each.time, each.by_quantity[quantity].largest) for name, each in found.items()}
         floor = _draw_log(panel, comparison, curves, comparison.tolerance if quantity == "position" else None)
         panel.set_ylabel(f"largest {quantity} error, {unit}\n(0 drawn at {floor:.0e})")
     panels[1].set_xlabel("time, s")

@@ -24,7 +24,7 @@ CHUNK = 1 << 16
 """Rows of a chunk, about 10 MB."""
 NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install -e ".[parquet]"; csv works without it'
 
-Column = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
+ColumnValues = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
 """Values, or for texts the indices into a list of them."""
 
 
@@ -68,7 +68,7 @@ def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Pat
     return _write(CONTACTS, _contacts(trajectory, fixed_names), path)
 
 
-def _states(run: Trajectory) -> Iterator[list[Column]]:
+def _states(run: Trajectory) -> Iterator[list[ColumnValues]]:
     """Yield the columns of `STATES` in chunks of frames and bodies."""
     count, names = len(run.names), [str(name) for name in run.names.tolist()]
     frames = max(1, CHUNK // max(count, 1))
@@ -92,7 +92,7 @@ def _states(run: Trajectory) -> Iterator[list[Column]]:
             ]
 
 
-def _contacts(run: Trajectory, fixed_names: Sequence[str]) -> Iterator[list[Column]]:
+def _contacts(run: Trajectory, fixed_names: Sequence[str]) -> Iterator[list[ColumnValues]]:
     """Yield the columns of `CONTACTS` in chunks."""
     # Static geometry has the numbers −1 − k: its names come last, in reverse order, as negative indices count.
     names = [*(str(name) for name in run.names.tolist()), *reversed(fixed_names)]
@@ -107,7 +107,7 @@ def _contacts(run: Trajectory, fixed_names: Sequence[str]) -> Iterator[list[Colu
         ]
 
 
-def _write(columns: Sequence[str], chunks: Iterator[list[Column]], path: Path) -> int:
+def _write(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path) -> int:
     match path.suffix.lower():
         case ".csv":
             with atomic_write(path) as temporary:
@@ -121,7 +121,7 @@ def _write(columns: Sequence[str], chunks: Iterator[list[Column]], path: Path) -
             raise ValueError(f"a table ends in .csv or .parquet, not {suffix!r}")
 
 
-def _write_csv(columns: Sequence[str], chunks: Iterator[list[Column]], path: Path) -> int:
+def _write_csv(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path) -> int:
     rows = 0
     with path.open("x", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
@@ -133,7 +133,7 @@ def _write_csv(columns: Sequence[str], chunks: Iterator[list[Column]], path: Pat
     return rows
 
 
-def _listed(column: Column) -> list[Any]:
+def _listed(column: ColumnValues) -> list[Any]:
     if isinstance(column, tuple):
         numbers, names = column
         return [names[number] for number in numbers.tolist()]
@@ -142,7 +142,7 @@ def _listed(column: Column) -> list[Any]:
     return list(column.tolist())
 
 
-def _write_parquet(columns: Sequence[str], chunks: Iterator[list[Column]], path: Path) -> int:
+def _write_parquet(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path) -> int:
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -150,7 +150,7 @@ def _write_parquet(columns: Sequence[str], chunks: Iterator[list[Column]], path:
     kinds = {"body": words, "a": words, "b": words, "present": pa.bool_()}
     schema = pa.schema([(column, kinds.get(column, pa.float64())) for column in columns])
 
-    def array(column: Column) -> Any:
+    def array(column: ColumnValues) -> Any:
         if isinstance(column, tuple):
             numbers, names = column
             used, codes = np.unique(numbers, return_inverse=True)

@@ -31,6 +31,11 @@ class Fault:
     message: str
     """description of the error and of the valid values"""
 
+    @classmethod
+    def of(cls, source: str, message: str) -> Self:
+        """Return the fault of a whole file, or of an option of the command line such as `--dt`."""
+        return cls(source, None, "", message)
+
     def __str__(self) -> str:
         file, path = shorten(self.file, MAX_NAMED), shorten(self.path, MAX_NAMED)
         position = file if self.line is None else f"{file}:{self.line}"

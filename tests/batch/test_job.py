@@ -1,8 +1,6 @@
 """Jobs: runs that are computed or loaded from a store, and their rows."""
 
 import json
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -10,17 +8,13 @@ from typing import Any, NoReturn
 import numpy as np
 import pytest
 
-from sandbox import run_file
 from sandbox.action import Force, Remove, Spawn
 from sandbox.batch import store as store_module
 from sandbox.batch.job import Job, RunOptions
 from sandbox.batch.store import Store, StoreError
-from sandbox.batch.stored_run import COLUMNS
 from sandbox.jsonable import to_json
-from sandbox.resource_limits import TooLargeError
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
-from sandbox.trajectory import Trajectory
 from tests.batch.fetching import run_or_fetch
 from tests.batch.test_store import files
 
@@ -105,47 +99,22 @@ def test_damaged_run_is_repeated_and_replaced(tmp_path: Path) -> None:
     assert files(tmp_path) == {"runs.sqlite", first.path.name}
 
 
-OTHERS = [
-    ("scene", replace(JOB, scene=SCENE.model_copy(update={"title": "Three"}))),
-    ("seed", replace(JOB, scene=SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"seed": 4})}))),
-    ("engine", replace(JOB, engine="reference")),
-    ("settings", replace(JOB, scene=SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)}))),
-    ("actions", replace(JOB, actions=(Remove(time=0.05, body="a"),))),
-]
-
-
-def written_by_an_earlier_version(folder: Path) -> None:
-    """Remove the columns that format 2 of a store did not have."""
-    with closing(sqlite3.connect(folder / "runs.sqlite", isolation_level=None)) as database:
-        added = ", ".join(f"{column} = NULL" for column in COLUMNS[18:])
-        database.execute(f"UPDATE runs SET {added}")
-
-
-@pytest.mark.parametrize(("key", "other", "is_old"), [(*other, True) for other in OTHERS] + [(*OTHERS[0], False)])
-def test_run_stored_under_a_wrong_id_is_repeated(key: str, other: Job, is_old: bool, tmp_path: Path) -> None:
+def test_file_of_another_run_is_repeated(tmp_path: Path) -> None:
+    other = replace(JOB, scene=SCENE.model_copy(update={"title": "Three"}))
     with Store(tmp_path) as store:
         path, theirs = run_or_fetch(JOB, store).path, run_or_fetch(other, store).path
         path.write_bytes(theirs.read_bytes())
-        if is_old:
-            written_by_an_earlier_version(tmp_path)
-        again = run_or_fetch(JOB, store)
-        if is_old:
-            assert f"is not the run of its id: its info.{'scene' if key == 'seed' else key} is" in again.damaged
-        else:
-            assert again.damaged.startswith(f"{path} is not a stored run: ")
+        assert run_or_fetch(JOB, store).damaged.startswith(f"{path} is not a stored run: ")
         assert run_or_fetch(JOB, store).repeated
         assert run_or_fetch(other, store).repeated
 
 
-def test_row_of_an_earlier_version_is_completed_from_its_file(tmp_path: Path) -> None:
+def test_run_added_without_details_is_repeated(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         first = run_or_fetch(JOB, store)
-        written_by_an_earlier_version(tmp_path)
-        again = run_or_fetch(JOB, store)
-        assert again.repeated
-        assert again.stored == first.stored
-        assert store.find(first.id) == first.stored
-        assert again.row() == replace(first.row(), repeated=True)
+        store.add_run(first.trajectory, first.id, replace_run=True)
+        assert not run_or_fetch(JOB, store).repeated
+        assert run_or_fetch(JOB, store).repeated
 
 
 @pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), OSError(5, "Input/output error")])
@@ -159,21 +128,6 @@ def test_stored_run_that_cannot_be_opened_raises_store_error(error, tmp_path, mo
             patched.setattr(store_module, "_digest_of", fail)
             with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
                 run_or_fetch(JOB, store)
-        written_by_an_earlier_version(tmp_path)
-        monkeypatch.setattr(Trajectory, "load", fail)
-        with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
-            run_or_fetch(JOB, store)
-
-
-def test_stored_run_that_does_not_fit_into_memory_is_not_replaced(tmp_path, monkeypatch):
-    with Store(tmp_path) as store:
-        path = run_or_fetch(JOB, store).path
-        before = path.read_bytes()
-        written_by_an_earlier_version(tmp_path)
-        monkeypatch.setattr(run_file, "free_memory", lambda: 1000)
-        with pytest.raises(TooLargeError, match="delete the file to repeat the run"):
-            run_or_fetch(JOB, store)
-        assert path.read_bytes() == before
 
 
 def test_summary_keeps_the_row_and_the_arrays_are_made_where_they_are_wanted(tmp_path: Path) -> None:

@@ -8,14 +8,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from sandbox.batch import store as module
-from sandbox.batch.store import DATABASE, Store, StoreError
-from sandbox.batch.stored_run import COLUMNS, TABLE
+from sandbox.batch.store import DATABASE, VERSION, Store, StoreError
+from sandbox.batch.stored_run import TABLE
 from sandbox.signals import defer_interrupt
 from tests.batch.test_store import ID, OTHER, files, sample_run
 from tests.environment import with_root_on_path
@@ -117,7 +116,6 @@ LAYOUTS = {
     "a column of a value with a type": ['ALTER TABLE runs ADD COLUMN "solver.dt" REAL'],
     "a view in place of the table": ["ALTER TABLE runs RENAME TO others", "CREATE VIEW runs AS SELECT * FROM others"],
     "a trigger": ["CREATE TRIGGER t AFTER INSERT ON runs BEGIN DELETE FROM runs; END"],
-    "an earlier version than its table": ["PRAGMA user_version = 1"],
     "no version": ["PRAGMA user_version = 0"],
 }
 
@@ -131,51 +129,13 @@ def test_database_with_a_different_layout_is_rejected_and_unchanged(filled: Path
     assert (filled / DATABASE).read_bytes() == before
 
 
-FORMER_TABLE = TABLE.partition("    scene TEXT,")[0].replace("path TEXT,", "path TEXT NOT NULL,").rstrip().rstrip(",")
-"""The table of format 2; format 1 had no scores."""
-
-
-@pytest.mark.parametrize(("version", "dropped"), [(2, []), (1, ["ALTER TABLE runs DROP COLUMN score"])])
-def test_store_of_an_earlier_version_is_migrated(filled: Path, version: int, dropped: list[str]) -> None:
-    columns = ", ".join(COLUMNS[:18])
-    change(
-        filled,
-        "DROP INDEX runs_by_plan_key",
-        "ALTER TABLE runs RENAME TO newer",
-        FORMER_TABLE + ")",
-        f"INSERT INTO runs ({columns}) SELECT {columns} FROM newer",
-        "DROP TABLE newer",
-        *dropped,
-        f"PRAGMA user_version = {version}",
-    )
-    with Store(filled) as store:
-        found = store.find(ID)
-        assert (found.steps, found.scene, found.digest, found.details) == (10, None, None, None)
-        store.add_run(sample_run(), OTHER)
-    with Store(filled) as store:
-        assert len(store.rows()) == 2
-
-
-def test_set_values_of_format_3_are_migrated(filled: Path) -> None:
-    table = TABLE.replace("contacts INTEGER,", "contacts INTEGER NOT NULL,", 1)
-    columns = ", ".join(COLUMNS)
-    change(
-        filled,
-        "DROP INDEX runs_by_plan_key",
-        "ALTER TABLE runs RENAME TO newer",
-        table,
-        'ALTER TABLE runs ADD COLUMN "ball.""8 ball"".mass"',
-        f'INSERT INTO runs ({columns}, "ball.""8 ball"".mass") SELECT {columns}, 0.25 FROM newer',
-        "DROP TABLE newer",
-        "PRAGMA user_version = 3",
-    )
-    with Store(filled) as store:
-        found = store.find(ID)
-        assert found is not None
-        store.add(replace(found, id=OTHER, contacts=None))
-    with closing(sqlite3.connect(filled / DATABASE)) as database:
-        rows = database.execute('SELECT contacts IS NULL, "ball.""8 ball"".mass" FROM runs ORDER BY rowid').fetchall()
-    assert rows == [(0, 0.25), (1, None)]
+@pytest.mark.parametrize("version", [1, VERSION - 1])
+def test_store_of_an_earlier_version_is_refused_and_unchanged(filled: Path, version: int) -> None:
+    change(filled, f"PRAGMA user_version = {version}")
+    before = (filled / DATABASE).read_bytes()
+    with pytest.raises(StoreError, match=rf"earlier version of sandbox \(format {version};"):
+        Store(filled)
+    assert (filled / DATABASE).read_bytes() == before
 
 
 def test_any_damage_of_the_database_raises_store_error(filled: Path) -> None:

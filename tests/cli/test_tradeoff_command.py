@@ -57,7 +57,7 @@ def test_table_has_the_pareto_front_and_the_recommended_settings(tmp_path, capfd
 
 def test_setting_that_may_tunnel_is_not_recommended_and_said_so(tmp_path, capfd):
     scene = write_scene(tmp_path, BULLET)
-    chosen = "--engine pymunk --effort 0.2 --repeats 1 --metric missed_contacts --budget 100"
+    chosen = "--engine pymunk --effort 0.2 --repeats 5 --metric missed_contacts --budget 100"  # the least of 5: noise
     out = output_of(capfd, "tradeoff", scene, *chosen.split())
     (answer,) = [line for line in out if line.startswith("cheapest setting with missed_contacts")]
     assert re.search(r"ms per frame of the budget of 100 ms$", answer)

@@ -107,7 +107,7 @@ def test_recommended_setting_meets_the_tolerance_when_run_again(text: str) -> No
     own = advice.recommended.asked
     truth = truth_of(scene, own, 1e-4)
     run = sandbox.run(scene, "pymunk", **own.model_dump())
-    found = errors(run, truth.trajectory, ~scene.bodies.fixed).until(truth.trusted_until).max_position
+    found = errors(run, truth.trajectory, ~scene.bodies.fixed).largest("position", truth.trusted_until)
     assert found == pytest.approx(advice.recommended.error, abs=1e-4)
     assert found is not None and found <= advice.tolerance
 

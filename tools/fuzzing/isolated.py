@@ -16,7 +16,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import traceback
@@ -24,6 +23,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
+
+from sandbox.worker_process import MEBIBYTE, ProcessEndedError, WorkerProcess, limit_memory, private_stdout
 
 try:
     import resource
@@ -112,12 +113,10 @@ class Outcome:
 
 def serve(limits: Limits) -> None:
     """Run the cases on standard input, one JSON line each; answer each with a JSON line."""
-    replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # keeps the prints of a case apart from the answers
+    replies = private_stdout()
     faulthandler.enable()
     if resource is not None:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_AS, (limits.memory, limits.memory))
+        limit_memory(limits.memory // MEBIBYTE)
         faulthandler.register(signal.SIGXCPU, chain=True)  # writes the stack; the default action then ends the process
     unraisable: list[BaseException] = []
     sys.unraisablehook = lambda hooked: unraisable.append(hooked.exc_value or AssertionError(str(hooked.err_msg)))
@@ -133,7 +132,6 @@ def serve(limits: Limits) -> None:
         outcome = _outcome(function, case["argument"], unraisable)
         outcome["cpu"] = time.process_time() - start_time
         replies.write(json.dumps(outcome) + "\n")
-        replies.flush()
 
 
 _stage_limit: float | None = None
@@ -194,8 +192,7 @@ class Worker:
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-        self._process: subprocess.Popen[str] | None = None
-        self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115, closed in stop
+        self._process: WorkerProcess | None = None
 
     def run(self, case: Case) -> Outcome:
         """Run one case; a hang or a lack of memory is confirmed in a fresh worker."""
@@ -210,7 +207,6 @@ class Worker:
     def stop(self) -> None:
         """Kill the process."""
         self._end()
-        self._stderr.close()
 
     def interrupt(self) -> None:
         """Kill the process from another thread; its current case fails."""
@@ -220,59 +216,32 @@ class Worker:
 
     def _attempt(self, case: Case) -> Outcome:
         process = self._process or self._begin()
-        assert process.stdin is not None
-        assert process.stdout is not None
-        timed_out = threading.Event()
-
-        def abort_late() -> None:
-            timed_out.set()
-            process.send_signal(signal.SIGABRT)  # faulthandler writes the stack
-
-        timer = threading.Timer(self._limits.wall, abort_late)
-        timer.start()
         try:
-            process.stdin.write(json.dumps({"function": case.function, "argument": case.argument}) + "\n")
-            process.stdin.flush()
-            line = process.stdout.readline()
-        except OSError:
-            line = ""
-        finally:
-            timer.cancel()
-        if line:
-            return Outcome(**json.loads(line))
-        return self._post_mortem(timed_out.is_set())
+            process.send({"function": case.function, "argument": case.argument})
+            return Outcome(**process.receive(self._limits.wall))
+        except TimeoutError:
+            process.send_signal(signal.SIGABRT)  # faulthandler writes the stack
+            return self._post_mortem(process, timed_out=True)
+        except ProcessEndedError:
+            return self._post_mortem(process, timed_out=False)
 
-    def _begin(self) -> subprocess.Popen[str]:
-        self._stderr.seek(0)
-        self._stderr.truncate()
+    def _begin(self) -> WorkerProcess:
         code = (
             "from tools.fuzzing.isolated import Limits, serve; "
             f"serve(Limits({self._limits.cpu!r}, {self._limits.memory!r}))"
         )
         path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
-        self._process = subprocess.Popen(
-            [sys.executable, "-W", "error", "-c", code],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._stderr,
-            text=True,
-            encoding="utf-8",
-            env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
-            start_new_session=True,  # only the parent handles Ctrl-C
-        )
+        self._process = WorkerProcess([sys.executable, "-W", "error", "-c", code], {"PYTHONPATH": path})
         return self._process
 
-    def _post_mortem(self, timed_out: bool) -> Outcome:
+    def _post_mortem(self, process: WorkerProcess, timed_out: bool) -> Outcome:
         """Return the outcome of a process that died."""
-        process = self._process
-        assert process is not None
         try:
-            status = process.wait(10)
+            status = process.exit_code(10.0)
         except subprocess.TimeoutExpired:
             status = 0
+        text = process.error_output()
         self._end()
-        self._stderr.seek(0)
-        text = self._stderr.read()
         found = re.search(r'File "([^"]*/sandbox/(?!.*site-packages)[^"]*)", line (\d+) in (\S+)', text)
         location = f"{_short(found[1])}:{found[2]} in {found[3]}" if found else ""
         if timed_out or (hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU):
@@ -284,14 +253,7 @@ class Worker:
     def _end(self) -> None:
         process, self._process = self._process, None
         if process is not None:
-            process.kill()
-            process.wait()
-            for stream in (process.stdin, process.stdout):
-                if stream is not None:
-                    try:
-                        stream.close()
-                    except BrokenPipeError:  # the worker died with an unread request
-                        continue
+            process.end()
 
 
 def run_cases(cases: Iterable[Case], limits: Limits, workers: int = 2) -> Iterator[tuple[Case, Outcome]]:

@@ -18,11 +18,11 @@ from sandbox.measure.advice.result import (
 )
 from sandbox.measure.advice.scoring import AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )

@@ -1,13 +1,13 @@
 """Results of the advice for a game as frozen values and as a JSON document."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
-from sandbox.measure.tradeoff.metrics import WorstError
+from sandbox.measure.compare.metrics import WorstError
 from sandbox.scene.description.world import Settings
 
 FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]
@@ -181,6 +181,8 @@ class Advice:
     versions: Mapping[str, str]
     """versions of Python and of the packages used"""
 
+    json_properties: ClassVar = ("title", ("fits_budget", "recommended_fits_budget"))
+
     def __repr__(self) -> str:
         """Return the scene, the engine and the recommended setting."""
         if self.recommended is None:
@@ -203,6 +205,16 @@ class Advice:
         """Whether there is a truth that is trusted to the end of the scene."""
         return self.trusted_until is not None and self.trusted_until >= self.duration
 
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene
+
+    @property
+    def recommended_fits_budget(self) -> bool | None:
+        """Whether a frame of the recommended setting takes at most the budget."""
+        return None if self.recommended is None else self.fits_budget(self.recommended)
+
     def fits_budget(self, setting: MeasuredSetting) -> bool | None:
         """Return whether a frame of a setting takes at most the budget; None without a budget or a timing."""
         if self.budget is None or setting.frame_ms is None:
@@ -219,64 +231,5 @@ class Advice:
         Args:
             scene: name of the scene in the document, such as its path; default: its title.
         """
-        shared = {name: getattr(self, name) for name in AdviceDocument.__dataclass_fields__ if name not in COMPUTED}
-        found: dict[str, Any] = to_json(
-            AdviceDocument(
-                **shared | {"scene": self.scene if scene is None else scene},
-                title=self.scene,
-                fits_budget=None if self.recommended is None else self.fits_budget(self.recommended),
-            )
-        )
-        return found
-
-
-COMPUTED = ("title", "fits_budget")
-"""Fields of the document that are not fields of the advice."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class AdviceDocument:
-    """JSON document of an advice; the fields are those of `Advice`."""
-
-    scene: str
-    title: str
-    engine: str
-    fps: float
-    zoom: float
-    metric: str
-    metric_about: str
-    metric_reason: str | None
-    unit: str
-    tolerance: float
-    tolerance_px: float | None
-    budget: float | None
-    invariant: str | None
-    invariant_tolerance: float | None
-    truth: str | None
-    truth_about: str | None
-    trusted_until: float | None
-    duration: float
-    left_at: Mapping[str, float]
-    risks: Sequence[Risk]
-    notes: Sequence[str]
-    present: MeasuredSetting
-    is_in_loop: bool
-    recommended: MeasuredSetting | None
-    fits_budget: bool | None
-    fallback: MeasuredSetting | None
-    fallback_kind: FallbackKind | None
-    remaining_risks: Sequence[Risk]
-    knob_start: KnobStart | None
-    knob_setting: MeasuredSetting | None
-    knobs: Sequence[Knob]
-    others: Sequence[OtherEngine]
-    code: GameCode | None
-    recorded_actions: int
-    replays: Sequence[ReplayedActions]
-    tried: int
-    tried_here: int
-    untried: int
-    out_of_time: bool
-    interrupted: bool
-    machine: Mapping[str, Any]
-    versions: Mapping[str, str]
+        found: dict[str, Any] = to_json(self)
+        return found if scene is None else {**found, "scene": scene}

@@ -6,9 +6,9 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext, Metric
 from sandbox.measure.metrics.trajectory_error import default_tolerance
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
-from sandbox.measure.tradeoff.objective import DEFAULT_TOLERANCES, choose_metric
+from sandbox.measure.tradeoff.objective import choose_metric, default_metric_tolerance
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
@@ -109,7 +109,7 @@ def find_score(request: AdviceRequest) -> AdviceScore:
 
 def _limit(metric: Metric, request: AdviceRequest) -> float:
     """Return the tolerance of a metric: that of positions for a length, otherwise the default."""
-    return request.length if metric.unit == "m" else DEFAULT_TOLERANCES[metric.unit]
+    return default_metric_tolerance(metric, request.length)
 
 
 def _context(scene: Scene, truth: Truth | str, zoom: float) -> EvaluationContext:

@@ -21,6 +21,7 @@ from sandbox.measure.advice.forecast import forecast, game_notes
 from sandbox.measure.advice.replays import replay_actions
 from sandbox.measure.advice.result import Advice, FallbackKind
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.sessions import recorded_scene
@@ -33,7 +34,6 @@ from sandbox.measure.tradeoff.configuration import (
     evaluate,
     refused_evaluation,
 )
-from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.objective import Objective
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,

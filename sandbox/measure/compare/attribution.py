@@ -8,12 +8,10 @@ from typing import Any, get_args
 
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import in_json
-from sandbox.measure.metrics.trajectory_error import errors
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SettingsError
-from sandbox.trajectory import Trajectory
 
 MAX_EXPLAINED_RATIO = 0.9
 """A change that leaves more than this fraction of the error does not explain it."""
@@ -65,22 +63,20 @@ class SettingEffect:
 
 
 def one_at_a_time(
-    scene: Scene, engine: str, settings: Settings, truth: Trajectory, until: float, before: float
+    context: EvaluationContext, engine: str, settings: Settings, before: float
 ) -> tuple[SettingEffect, ...]:
     """Rerun an engine with one setting changed at a time; if none of the changes suffices, also with two changed.
 
     Args:
-        scene: the scene.
+        context: scene and truth of the run.
         engine: name of the engine.
         settings: settings of the run; choices left to the engine are None.
-        truth: run that errors are measured against.
-        until: end of the frames that count, s.
         before: largest position error of the unchanged run, m.
 
     Raises:
         TooLargeError: the frames of a run would not fit into memory.
     """
-    rerun = _Rerun(scene, engine, settings, ENGINES[engine].resolve(scene, settings), truth, until, before)
+    rerun = _Rerun(context, engine, settings, ENGINES[engine].resolve(context.scene, settings), before)
     single = [rerun.effect(*change) for change in setting_changes(rerun.resolved)]
     if min((each._ratio for each in single), default=math.inf) <= SUFFICIENT_RATIO:
         return tuple(single)
@@ -92,12 +88,10 @@ def one_at_a_time(
 class _Rerun:
     """The run to be explained."""
 
-    scene: Scene
+    context: EvaluationContext
     engine: str
     settings: Settings
     resolved: Settings
-    truth: Trajectory
-    until: float
     before: float
 
     def effect(self, setting: str, value: Any, changes: dict[str, Any]) -> SettingEffect:
@@ -110,15 +104,15 @@ class _Rerun:
             settings = self.settings.replace(**changes)
         except SettingsError as error:
             return replace(unknown, reason=error.faults[0].message)
-        missing = ENGINES[self.engine].missing(self.scene, settings)
+        missing = ENGINES[self.engine].missing(self.context.scene, settings)
         if missing:
             return replace(unknown, reason="; ".join(missing))
         try:
-            run, _ = bounded_run(self.scene, self.engine, settings, RERUN_LIMIT, audit=False)
+            run, _ = bounded_run(self.context.scene, self.engine, settings, RERUN_LIMIT, audit=False)
         except RunTimeoutError as error:
             return replace(unknown, status="stopped", reason=str(error))
         unknown = replace(unknown, status=run.status, reason=run.reason)
-        after = errors(run, self.truth, ~self.scene.bodies.fixed).until(self.until).max_position
+        after = METRICS["max_position"].measure(run, self.context)
         if after is None or not math.isfinite(after):
             return unknown
         return replace(unknown, max_position_error=after, ratio=after / self.before)

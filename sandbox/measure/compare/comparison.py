@@ -12,9 +12,11 @@ from sandbox.engines.registry import ENGINES, USUAL, able, engine_named
 from sandbox.measure.compare.attribution import one_at_a_time, verdict
 from sandbox.measure.compare.contact_matching import match_contacts
 from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.compare.result import (
     Comparison,
     Row,
+    Score,
     Sweep,
     Variant,
     physics_of,
@@ -24,7 +26,7 @@ from sandbox.measure.compare.result import (
     variants_of,
 )
 from sandbox.measure.metrics.invariants import energy_drift, momentum_drift
-from sandbox.measure.metrics.trajectory_error import default_tolerance, errors
+from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.runner import run
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
@@ -264,23 +266,28 @@ def score_run(
         tolerance: position error beyond which the run has diverged, m.
     """
     row = Row(engine=engine, status=run.status, reason=run.reason, settings=run.info["settings"])
+    if truth is not None:
+        row = replace(row, truth=truth.kind, trusted_until=truth.trusted_until)
     if run.status == "refused":
         return row
-    row = replace(row, seconds=float(run.info["seconds"]), momentum_drift=momentum_drift(run, scene))
-    if truth is None:
-        energy = energy_drift(run, scene, None, False)
-        return replace(row, energy_drift=energy.fraction, energy_against=energy.against)
-    until, last = truth.trusted_until, float(run.time[-1])
-    position_errors = errors(run, truth.trajectory, ~scene.bodies.fixed)
-    first = position_errors.first_above(tolerance, until)
-    if first is None and run.status == "diverged" and last <= until:
-        first = last
-    energy = energy_drift(run, scene, truth.trajectory, until == scene.world.duration)
-    return replace(
+    path = None if truth is None else truth.trajectory
+    energy = energy_drift(run, scene, path, row.trusted_until == scene.world.duration)
+    row = replace(
         row,
-        score=position_errors.until(until),
+        seconds=float(run.info["seconds"]),
+        momentum_drift=momentum_drift(run, scene),
         energy_drift=energy.fraction,
         energy_against=energy.against,
+    )
+    if truth is None:
+        return row
+    context, until, last = EvaluationContext(scene, truth), truth.trusted_until, float(run.time[-1])
+    first = context.errors(run).first_above(tolerance, until)
+    if first is None and run.status == "diverged" and last <= until:
+        first = last
+    return replace(
+        row,
+        score=Score.of(run, context),
         first_divergence=first,
         events=match_contacts(run, truth.trajectory, scene, settings.dt, tolerance, min(until, last)),
     )
@@ -294,5 +301,5 @@ def _has_error(row: Row, tolerance: float) -> bool:
 def _with_attribution(scene: Scene, row: Row, settings: Settings, truth: Truth) -> Row:
     before = row.score.max_position
     assert before is not None
-    effects = one_at_a_time(scene, row.engine, settings, truth.trajectory, truth.trusted_until, before)
+    effects = one_at_a_time(EvaluationContext(scene, truth), row.engine, settings, before)
     return replace(row, why=effects, verdict=verdict(row.engine, effects, before))

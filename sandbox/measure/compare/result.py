@@ -1,17 +1,17 @@
-"""Results of a comparison as frozen values and as a JSON document, and the variants of a sweep."""
+"""Results of a comparison, whose fields are those of its JSON document, and the variants of a sweep."""
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, get_args
+from dataclasses import dataclass, field, fields
+from typing import Any, ClassVar, Self, get_args
 
 from sandbox.echo import short_repr
 from sandbox.html_repr import HtmlRepr
-from sandbox.jsonable import to_json
+from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.attribution import SettingEffect
 from sandbox.measure.compare.contact_matching import ContactMatch, MatchKind
 from sandbox.measure.compare.ground_truth import Truth
-from sandbox.measure.metrics.trajectory_error import Score
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
@@ -90,6 +90,27 @@ MAX_EVENTS = 100
 
 
 @dataclass(frozen=True)
+class Score:
+    """Errors over all moving bodies and all frames up to `trusted_until`, named as in `METRICS`; None if unknown."""
+
+    max_position: float | None = field(default=None, metadata=in_json(key="max_position_error"))
+    """m, largest position error"""
+    rms_position: float | None = field(default=None, metadata=in_json(key="rms_position_error"))
+    """m, root mean square over frames and bodies"""
+    max_velocity: float | None = field(default=None, metadata=in_json(key="max_velocity_error"))
+    """m/s, largest velocity error"""
+    rms_velocity: float | None = field(default=None, metadata=in_json(key="rms_velocity_error"))
+    """m/s, root mean square over frames and bodies"""
+    max_angle: float | None = field(default=None, metadata=in_json(key="max_angle_error"))
+    """rad, largest error of an angle; whole turns count"""
+
+    @classmethod
+    def of(cls, run: Trajectory, context: EvaluationContext) -> Self:
+        """Measure a run."""
+        return cls(**{each.name: METRICS[each.name].measure(run, context) for each in fields(cls)})
+
+
+@dataclass(frozen=True)
 class Row:
     """Score of one engine. Unknown values are None."""
 
@@ -101,7 +122,13 @@ class Row:
     """reason for a status other than `ok`"""
     settings: Mapping[str, Any]
     """settings as the engine resolved them"""
-    score: Score = field(default_factory=Score)
+    set: Mapping[str, Any] = field(default_factory=dict)
+    """swept keys and their values; empty without a sweep"""
+    truth: str | None = None
+    """kind of the truth that the row is scored against"""
+    trusted_until: float | None = None
+    """s, time up to which that truth is trusted"""
+    score: Score = field(default_factory=Score, metadata=in_json(inline=True))
     """errors up to `trusted_until`"""
     energy_drift: float | None = None
     """energy change as a fraction of the largest kinetic energy; see `metrics.invariants.energy_drift`"""
@@ -111,7 +138,7 @@ class Row:
     """unexplained momentum change as a fraction of the largest Σ|m v|; see `metrics.invariants.momentum_drift`"""
     first_divergence: float | None = None
     """s, time of the first frame whose position error exceeds the tolerance; None if there is none"""
-    events: tuple[ContactMatch, ...] | None = None
+    events: tuple[ContactMatch, ...] | None = field(default=None, metadata=in_json(omit=True))
     """contacts of the run matched with those of the truth, up to `trusted_until`"""
     seconds: float | None = None
     """s, computing time of the steps"""
@@ -119,8 +146,17 @@ class Row:
     """effect of other settings on the error"""
     verdict: str | None = None
     """conclusion from `why`, as one sentence"""
-    set: Mapping[str, Any] = field(default_factory=dict)
-    """swept keys and their values; empty without a sweep"""
+
+    json_properties: ClassVar = (
+        "matched_contacts",
+        "missed_contacts",
+        "phantom_contacts",
+        "contacts_after_divergence",
+        "max_contact_delay",
+        ("events", "listed_events"),
+        ("missed", "listed_missed"),
+        ("phantom", "listed_phantom"),
+    )
 
     @property
     def name(self) -> str:
@@ -130,119 +166,93 @@ class Row:
     def __repr__(self) -> str:
         """Return engine and status, the largest error and the number of contacts of each kind."""
         error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
-        counts = ", ".join(f"{kind} {sum(e.kind == kind for e in self.events or ())}" for kind in get_args(MatchKind))
+        counts = ", ".join(f"{kind} {len(self.contacts(kind))}" for kind in get_args(MatchKind))
         return f"<Row {self.name}: {self.status}, max error {error}, contacts: {counts}>"
 
+    def contacts(self, kind: str) -> list[ContactMatch]:
+        """Return the contacts of a kind: `matched`, `missed`, `phantom` or `after_divergence`."""
+        return [event for event in self.events or () if event.kind == kind]
+
     def count(self, kind: str) -> int | None:
-        """Return the number of contacts of a kind; None if there is no truth.
+        """Return the number of contacts of a kind; None if there is no truth."""
+        return None if self.events is None else len(self.contacts(kind))
 
-        Args:
-            kind: `matched`, `missed`, `phantom` or `after_divergence`.
-        """
-        return None if self.events is None else sum(event.kind == kind for event in self.events)
+    @property
+    def matched_contacts(self) -> int | None:
+        """Number of contacts that the truth has too."""
+        return self.count("matched")
 
-    def document(self, truth: Truth | None) -> "RowDocument":
-        """Return the row as it appears in the JSON document.
+    @property
+    def missed_contacts(self) -> int | None:
+        """Number of contacts of the truth alone."""
+        return self.count("missed")
 
-        Args:
-            truth: truth that the row is scored against.
-        """
-        events = self.events or ()
-        by_kind = {kind: [event for event in events if event.kind == kind] for kind in get_args(MatchKind)}
-        delays = [abs(event.delta_time) for event in by_kind["matched"] if event.delta_time is not None]
-        document = RowDocument(
-            engine=self.engine,
-            status=self.status,
-            reason=self.reason,
-            settings=self.settings,
-            set=self.set,
-            max_position_error=self.score.max_position,
-            rms_position_error=self.score.rms_position,
-            max_velocity_error=self.score.max_velocity,
-            rms_velocity_error=self.score.rms_velocity,
-            energy_drift=self.energy_drift,
-            momentum_drift=self.momentum_drift,
-            first_divergence=self.first_divergence,
-            matched_contacts=self.count("matched"),
-            missed_contacts=self.count("missed"),
-            phantom_contacts=self.count("phantom"),
-            contacts_after_divergence=self.count("after_divergence"),
-            max_contact_delay=max(delays, default=None),
-            trusted_until=None if truth is None else truth.trusted_until,
-            seconds=self.seconds,
-            energy_against=self.energy_against,
-            events=events[:MAX_EVENTS],
-            missed=by_kind["missed"][:MAX_EVENTS],
-            phantom=by_kind["phantom"][:MAX_EVENTS],
-            why=self.why,
-            verdict=self.verdict,
-        )
-        if not self.set:
-            return document
-        return SweptRowDocument(**vars(document), truth=None if truth is None else truth.kind)
+    @property
+    def phantom_contacts(self) -> int | None:
+        """Number of contacts of the run alone."""
+        return self.count("phantom")
 
+    @property
+    def contacts_after_divergence(self) -> int | None:
+        """Number of contacts of either alone, after one of their bodies had diverged."""
+        return self.count("after_divergence")
 
-@dataclass(frozen=True)
-class RowDocument:
-    """JSON document of a row; the fields are those of `Row` and `Score`."""
+    @property
+    def max_contact_delay(self) -> float | None:
+        """Largest time difference of matched contacts, s."""
+        delays = [abs(each.delta_time) for each in self.contacts("matched") if each.delta_time is not None]
+        return max(delays, default=None)
 
-    engine: str
-    status: str
-    reason: str | None
-    settings: Mapping[str, Any]
-    set: Mapping[str, Any]
-    max_position_error: float | None
-    rms_position_error: float | None
-    max_velocity_error: float | None
-    rms_velocity_error: float | None
-    energy_drift: float | None
-    momentum_drift: float | None
-    first_divergence: float | None
-    matched_contacts: int | None
-    missed_contacts: int | None
-    phantom_contacts: int | None
-    contacts_after_divergence: int | None
-    max_contact_delay: float | None
-    trusted_until: float | None
-    seconds: float | None
-    energy_against: str | None
-    events: Sequence[ContactMatch]
-    missed: Sequence[ContactMatch]
-    phantom: Sequence[ContactMatch]
-    why: Sequence[SettingEffect]
-    verdict: str | None
+    @property
+    def listed_events(self) -> Sequence[ContactMatch]:
+        """Contacts that a document lists: the first `MAX_EVENTS`."""
+        return (self.events or ())[:MAX_EVENTS]
 
+    @property
+    def listed_missed(self) -> Sequence[ContactMatch]:
+        """Contacts of the truth alone that a document lists."""
+        return self.contacts("missed")[:MAX_EVENTS]
 
-@dataclass(frozen=True)
-class SweptRowDocument(RowDocument):
-    """JSON document of a row of a sweep, with the kind of its own truth."""
-
-    truth: str | None
+    @property
+    def listed_phantom(self) -> Sequence[ContactMatch]:
+        """Contacts of the run alone that a document lists."""
+        return self.contacts("phantom")[:MAX_EVENTS]
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison(HtmlRepr):
     """Scores of one scene on several engines, or with several values of a setting."""
 
-    scene: Scene
+    scene: Scene = field(metadata=in_json(omit=True))
     """the scene; in a sweep, with its first value"""
-    best: Truth | None
+    best: Truth | None = field(metadata=in_json(omit=True))
     """truth of `scene`; None if there is none: no engine can run the scene, or two methods disagree"""
     tolerance: float
     """m, position error beyond which a run has diverged"""
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...] = field(metadata=in_json(key="engines"))
     """score of each engine and combination of values"""
-    trajectories: Mapping[str, Trajectory]
+    trajectories: Mapping[str, Trajectory] = field(metadata=in_json(omit=True))
     """run of each row that has one, by the row's `name`"""
-    doubt: str | None = None
+    doubt: str | None = field(default=None, metadata=in_json(omit=True))
     """reason why there is no truth"""
     interrupted: bool = False
     """whether Ctrl-C was pressed before every engine had run"""
-    truths: Mapping[str, Truth | None] = field(default_factory=dict)
+    truths: Mapping[str, Truth | None] = field(default_factory=dict, metadata=in_json(omit=True))
     """truth of each row by its `name`, if a sweep changes the scene or the times of its frames; the other rows have
     `best`"""
-    same_scene: bool = True
+    same_scene: bool = field(default=True, metadata=in_json(omit=True))
     """whether all rows have the same scene: a sweep changes only its `[solver]`"""
+
+    json_head: ClassVar = (
+        ("scene", "title"),
+        "title",
+        "truth",
+        "truth_about",
+        "truth_confirmed_by",
+        "trusted_until",
+        "truth_difference",
+        "duration",
+    )
 
     def truth_of(self, name: str) -> Truth | None:
         """Return the truth that a row is scored against.
@@ -271,6 +281,31 @@ class Comparison(HtmlRepr):
         return None if self.best is None else self.best.kind
 
     @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene.title
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scene, s."""
+        return self.scene.world.duration
+
+    @property
+    def truth_about(self) -> str | None:
+        """Source of the truth, or the reason why there is none."""
+        return self.doubt if self.best is None else self.best.about
+
+    @property
+    def truth_confirmed_by(self) -> str | None:
+        """Method that confirms the truth."""
+        return None if self.best is None else self.best.witness
+
+    @property
+    def truth_difference(self) -> float:
+        """Distance of a refined truth from the previous halving of dt, m; 0 of the others."""
+        return 0.0 if self.best is None else self.best.difference
+
+    @property
     def trusted_until(self) -> float | None:
         """Time up to which errors are measured, s; None if there is no truth."""
         return None if self.best is None else self.best.trusted_until
@@ -295,36 +330,5 @@ class Comparison(HtmlRepr):
         Args:
             scene: name of the scene in the document, such as its path; default: its title.
         """
-        found: dict[str, Any] = to_json(
-            ComparisonDocument(
-                scene=self.scene.title if scene is None else scene,
-                title=self.scene.title,
-                truth=self.truth,
-                truth_about=self.doubt if self.best is None else self.best.about,
-                truth_confirmed_by=None if self.best is None else self.best.witness,
-                trusted_until=self.trusted_until,
-                truth_difference=0.0 if self.best is None else self.best.difference,
-                duration=self.scene.world.duration,
-                tolerance=self.tolerance,
-                engines=[row.document(self.truth_of(row.name)) for row in self.rows],
-                interrupted=self.interrupted,
-            )
-        )
-        return found
-
-
-@dataclass(frozen=True)
-class ComparisonDocument:
-    """JSON document of a comparison."""
-
-    scene: str
-    title: str
-    truth: str | None
-    truth_about: str | None
-    truth_confirmed_by: str | None
-    trusted_until: float | None
-    truth_difference: float
-    duration: float
-    tolerance: float
-    engines: Sequence[RowDocument | SweptRowDocument]
-    interrupted: bool
+        found: dict[str, Any] = to_json(self)
+        return found if scene is None else {**found, "scene": scene}

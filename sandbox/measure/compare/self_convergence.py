@@ -164,7 +164,7 @@ def _refine_settings(scene: Scene, engine: str, settings: Settings, tolerance: f
             horizon, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
     except RunTimeoutError:
         horizon = min(required, agrees)
-    difference = 0.0 if last is None else last.until(min(agrees, horizon)).max_position or 0.0
+    difference = 0.0 if last is None else last.largest("position", min(agrees, horizon)) or 0.0
     return RefinedRun(engine, settings, halvings, coarse, agrees, about, difference, horizon, work)
 
 

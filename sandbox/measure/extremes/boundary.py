@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale, Scenario
-from sandbox.measure.extremes.outcome import Outcome, Sample, Task
+from sandbox.measure.extremes.outcome import Outcome, PairSample, Sample, Task
 
 TOLERANCE = 0.01
 """Relative width to which a boundary is found; whole numbers are found exactly."""
@@ -123,7 +123,8 @@ def run_pair(
     for both in pair.levels:
         parameters = {pair.first.parameter: both[0], pair.second.parameter: both[1]}
         outcome = submit(_task(pair.case, parameters, setup, overrides))
-        on_sample(Sample(pair.name, both, setup.engine, dict(setup.changes), setup.name, outcome))
+        names = pair.first.parameter, pair.second.parameter
+        on_sample(PairSample(pair.name, both, setup.engine, dict(setup.changes), setup.name, outcome, axes=names))
 
 
 def _task(scenario: Scenario, parameters: dict[str, float], setup: EngineSetup, overrides: tuple[str, ...]) -> Task:

@@ -97,3 +97,11 @@ class Sample:
     def passed(self) -> bool:
         """Whether the run broke no rule."""
         return self.verdict in PASSED
+
+
+@dataclass(frozen=True, kw_only=True)
+class PairSample(Sample):
+    """Pair of levels on one engine configuration."""
+
+    axes: tuple[str, str]
+    """names of the two parameters"""

@@ -12,10 +12,11 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.extremes.boundary import TOLERANCE, Boundary, OnSample, Submit, run_axis, run_pair
 from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, setups_of_engines
 from sandbox.measure.extremes.isolation import IsolatedWorker
-from sandbox.measure.extremes.outcome import Sample
+from sandbox.measure.extremes.outcome import PairSample, Sample
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
-from sandbox.provenance import machine, versions
+from sandbox.provenance import machine as this_machine
+from sandbox.provenance import versions as package_versions
 
 
 @dataclass(frozen=True)
@@ -80,15 +81,15 @@ SAMPLE_SECONDS, WORKER_MEMORY = 30.0, 2048
 class ExtremesPlan:
     """Axes, pairs and engines to run, and the limits."""
 
-    axes: tuple[Axis, ...] = tuple(AXES.values())
-    pairs: tuple[AxisPair, ...] = PAIRS
-    engines: tuple[str, ...] | None = None
+    axes: tuple[Axis, ...] = field(default=tuple(AXES.values()), metadata=in_json(omit=True))
+    pairs: tuple[AxisPair, ...] = field(default=PAIRS, metadata=in_json(omit=True))
+    engines: tuple[str, ...] | None = field(default=None, metadata=in_json(omit=True))
     """names of the engines; None for all"""
-    overrides: tuple[str, ...] = ()
+    overrides: tuple[str, ...] = field(default=(), metadata=in_json(key="set"))
     """`KEY=VALUE`, changes to every scene"""
     quick: bool = False
     """few levels, and no bisection between them"""
-    seconds: float = SAMPLE_SECONDS
+    seconds: float = field(default=SAMPLE_SECONDS, metadata=in_json(key="timeout"))
     """s, time limit of a sample"""
     memory: int = WORKER_MEMORY
     """MiB, memory limit of a worker"""
@@ -111,21 +112,38 @@ class ExtremesPlan:
 
 @dataclass(frozen=True)
 class Extremes:
-    """Results of a plan."""
+    """Results of a plan, whose fields are those of its JSON document."""
 
-    plan: ExtremesPlan
+    plan: ExtremesPlan = field(metadata=in_json(inline=True))
     cells: tuple[Sample, ...]
     """samples at the levels of the axes"""
     probes: tuple[Sample, ...]
     """samples between the levels, from the bisection"""
     limits: tuple[Boundary, ...]
     """boundary of each axis on each engine configuration"""
-    pairs: tuple[Sample, ...]
+    pairs: tuple[PairSample, ...]
     """samples of the pairs of axes"""
     seconds: float
     """s, time of the whole plan"""
     interrupted: bool = False
     """whether Ctrl-C ended the plan; the finished samples are kept"""
+
+    json_properties: ClassVar = ("predictions", "tolerance", "versions", "machine")
+
+    @property
+    def tolerance(self) -> float | None:
+        """Relative accuracy of the boundaries; None if they were not bisected."""
+        return None if self.plan.quick else TOLERANCE
+
+    @property
+    def versions(self) -> Mapping[str, str]:
+        """Versions of Python and of the packages used."""
+        return package_versions()
+
+    @property
+    def machine(self) -> Mapping[str, Any]:
+        """Description of the machine."""
+        return this_machine()
 
     @property
     def predictions(self) -> tuple[PredictionScore, ...]:
@@ -134,55 +152,8 @@ class Extremes:
 
     def document(self) -> dict[str, Any]:
         """Return the results as one JSON document."""
-        found: dict[str, Any] = to_json(
-            ExtremesDocument(
-                cells=self.cells,
-                limits=self.limits,
-                predictions=self.predictions,
-                pairs=[PairSample(each.axis.split(": ")[1].split(" × "), each) for each in self.pairs],
-                probes=self.probes,
-                tolerance=None if self.plan.quick else TOLERANCE,
-                quick=self.plan.quick,
-                set=self.plan.overrides,
-                interrupted=self.interrupted,
-                timeout=self.plan.seconds,
-                memory=self.plan.memory,
-                workers=self.plan.workers,
-                seconds=self.seconds,
-                versions=versions(),
-                machine=machine(),
-            )
-        )
+        found: dict[str, Any] = to_json(self)
         return found
-
-
-@dataclass(frozen=True)
-class PairSample:
-    """Sample of a pair, with the names of its two parameters."""
-
-    axes: Sequence[str]
-    sample: Sample = field(metadata=in_json(inline=True))
-
-
-@dataclass(frozen=True)
-class ExtremesDocument:
-    """JSON document of the results of a plan; the fields are those of `Extremes` and `ExtremesPlan`."""
-
-    cells: Sequence[Sample]
-    limits: Sequence[Boundary]
-    predictions: Sequence[PredictionScore]
-    pairs: Sequence[PairSample]
-    probes: Sequence[Sample]
-    tolerance: float | None
-    quick: bool
-    set: Sequence[str]
-    interrupted: bool
-    timeout: float
-    memory: int
-    workers: int
-    seconds: float
-    versions: Mapping[str, str]
-    machine: Mapping[str, Any]
 
 
 SampleJob = Callable[[Submit, OnSample], Boundary | None]
@@ -203,7 +174,7 @@ def extremes(plan: ExtremesPlan, on_progress: ProgressCallback | None = None) ->
     began = perf_counter()
     jobs = list(_jobs(plan))
     results = _run_jobs(jobs, plan, on_progress or ignore_progress)
-    cells = [each for each in results.samples if each.axis in AXES]
+    cells = [each for each in results.samples if not isinstance(each, PairSample)]
     order = _order(plan)
     on_levels = {axis.name: set(plan.levels(axis)) for axis in plan.axes}
     return Extremes(
@@ -211,7 +182,7 @@ def extremes(plan: ExtremesPlan, on_progress: ProgressCallback | None = None) ->
         cells=tuple(sorted((c for c in cells if c.level in on_levels[c.axis]), key=order)),
         probes=tuple(sorted((c for c in cells if c.level not in on_levels[c.axis]), key=order)),
         limits=tuple(sorted(results.boundaries, key=order)),
-        pairs=tuple(sorted((c for c in results.samples if c.axis not in AXES), key=order)),
+        pairs=tuple(sorted((c for c in results.samples if isinstance(c, PairSample)), key=order)),
         seconds=perf_counter() - began,
         interrupted=results.interrupted,
     )

@@ -7,8 +7,6 @@ longer, and one outcome for each task. It ends at the end of its standard input.
 """
 
 import json
-import os
-import signal
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -27,8 +25,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
-
-MEBIBYTE = 2**20
+from sandbox.worker_process import limit_cpu_time, limit_memory, private_stdout
 
 MAX_FRAMES = 2_000
 """Recorded frames of a run; of a longer run only every n-th frame is recorded."""
@@ -55,7 +52,7 @@ def serve(answer: Answer, memory: int) -> None:
         memory: memory limit of the process, MiB.
     """
     limit_memory(memory)
-    output = _private_stdout()
+    output = private_stdout()
     output.write('{"ready": true}\n')
     _report_compiling(output)
     for line in sys.stdin:
@@ -114,58 +111,6 @@ def _settings(scene: Scene, task: Task) -> Settings:
     settings = scene.solver.replace(**task.changes)
     frames = scene.world.duration / settings.dt
     return settings.replace(record_every=max(1, int(frames // MAX_FRAMES)))
-
-
-def limit_memory(mebibytes: int) -> None:
-    """Limit the address space of this process, and disable core files; does nothing on Windows.
-
-    Args:
-        mebibytes: the limit, MiB.
-    """
-    if sys.platform == "win32":
-        return
-    import resource
-
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    wanted = mebibytes * MEBIBYTE
-    resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def limit_cpu_time(seconds: float) -> None:
-    """Limit the processor time of this process from now on; the operating system ends the process beyond it.
-
-    The parent process limits the wall-clock time. This limit ends a process whose parent no longer exists.
-
-    Args:
-        seconds: the limit, s.
-    """
-    if sys.platform == "win32":
-        return
-    import resource
-
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    wanted = int(used.ru_utime + used.ru_stime + seconds) + 1
-    resource.setrlimit(resource.RLIMIT_CPU, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
-
-
-def exit_text(status: int) -> str:
-    """Return how a process ended, from its return code: the name of a signal, or the exit status."""
-    if status >= 0:
-        return f"the process ended with status {status}"
-    try:
-        name = signal.Signals(-status).name
-    except ValueError:
-        name = f"signal {-status}"
-    return f"the process was killed by {name}"
-
-
-def _private_stdout() -> TextIO:
-    """Return a stream for the answers; all other output, also of C libraries, goes to standard error."""
-    output = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
-    os.dup2(2, 1)
-    return output
 
 
 def _report_compiling(output: TextIO) -> None:

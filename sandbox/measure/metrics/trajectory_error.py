@@ -1,5 +1,7 @@
 """Error of a run against another one, in the frames that both have."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -30,46 +32,47 @@ CHUNK = 2_000_000
 """Frames × bodies processed at once."""
 TOLERANCE = 0.01
 """Default tolerance as a fraction of the smallest radius, or half width, of the moving bodies."""
+QUANTITIES = "position", "velocity", "angle"
+"""Arrays of a run that are compared. Angles count whole turns: a wheel that has turned once more is off by 2π."""
 
 
-class Score(NamedTuple):
-    """Errors over all moving bodies and all frames up to a time; None if there are no such frames or bodies."""
+class Deviation(NamedTuple):
+    """Deviations of one quantity of the bodies from the truth, in K frames."""
 
-    max_position: float | None = None
-    """m, largest position error"""
-    rms_position: float | None = None
-    """m, root mean square over frames and bodies"""
-    max_velocity: float | None = None
-    """m/s, largest velocity error"""
-    rms_velocity: float | None = None
-    """m/s, root mean square over frames and bodies"""
+    largest: FloatArray
+    """(K,) largest over the bodies; inf if the run is no longer finite"""
+    squares: FloatArray
+    """(K,) sum of the squares over the bodies"""
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Distances between a run and the truth in their K common frames, over the bodies that are present in both."""
+    """Deviations of a run from the truth in their K common frames, over the bodies that are present in both."""
 
     time: FloatArray
     """(K,) s"""
-    position: FloatArray
-    """(K,) m, largest distance; inf if the run is no longer finite"""
-    velocity: FloatArray
-    """(K,) m/s, largest velocity difference"""
-    squares: FloatArray
-    """(2, K) sums of the squares of both over the bodies"""
+    by_quantity: Mapping[str, Deviation]
+    """deviations by the name of an array of `Trajectory`, those of `QUANTITIES`"""
     count: FloatArray
     """(K,) number of compared bodies"""
     body: IntArray
     """(K,) index of the body with the largest distance"""
 
-    def until(self, end: float) -> Score:
-        """Return the score of the frames up to a time, s, inclusive."""
+    @property
+    def position(self) -> FloatArray:
+        """(K,) m, largest distance; inf if the run is no longer finite."""
+        return self.by_quantity["position"].largest
+
+    def largest(self, quantity: str, end: float) -> float | None:
+        """Return the largest deviation in the frames up to a time, s, inclusive; None without a frame or body."""
+        kept = self.time <= end
+        return float(self.by_quantity[quantity].largest[kept].max()) if self.count[kept].any() else None
+
+    def root_mean_square(self, quantity: str, end: float) -> float | None:
+        """Return the root mean square over frames and bodies, likewise."""
         kept = self.time <= end
         count = float(self.count[kept].sum())
-        if count == 0.0:
-            return Score()
-        position, velocity = np.sqrt(self.squares[:, kept].sum(axis=1) / count).tolist()
-        return Score(float(self.position[kept].max()), position, float(self.velocity[kept].max()), velocity)
+        return math.sqrt(float(self.by_quantity[quantity].squares[kept].sum()) / count) if count else None
 
     def first_above(self, tolerance: float, end: float) -> float | None:
         """Return the time of the first frame up to `end`, s, whose position error exceeds a tolerance, m; or None."""
@@ -106,8 +109,8 @@ def errors(run: Trajectory, truth: Trajectory, moving: BoolArray, until: FloatAr
     """
     frames, truth_frames = common_frames(run, truth)
     size = len(frames)
-    largest, squares, count = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
-    numbers, body = np.flatnonzero(moving), np.zeros(size, np.int64)
+    found = {name: Deviation(np.zeros(size), np.zeros(size)) for name in QUANTITIES}
+    numbers, body, count = np.flatnonzero(moving), np.zeros(size, np.int64), np.zeros(size)
     step = max(1, CHUNK // max(1, len(numbers)))
     for begin in range(0, size if len(numbers) else 0, step):
         rows = slice(begin, begin + step)
@@ -115,16 +118,17 @@ def errors(run: Trajectory, truth: Trajectory, moving: BoolArray, until: FloatAr
         if until is not None:
             both &= run.time[frames[rows], None] <= until[numbers]
         count[rows] = both.sum(axis=1)
-        for k, name in enumerate(("position", "velocity")):
+        for name, deviation in found.items():
             actual, expected = getattr(run, name)[frames[rows]], getattr(truth, name)[truth_frames[rows]]
             # The distances of a diverged state are infinite.
             with np.errstate(over="ignore", invalid="ignore"):
-                away = np.hypot(*np.moveaxis(actual[:, numbers] - expected[:, numbers], 2, 0))
+                away = np.abs(actual[:, numbers] - expected[:, numbers])
+                away = np.hypot(away[..., 0], away[..., 1]) if away.ndim == 3 else away
                 away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
-                largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
+                deviation.largest[rows], deviation.squares[rows] = away.max(axis=1), np.square(away).sum(axis=1)
             if name == "position":
                 body[rows] = numbers[away.argmax(axis=1)]
-    return Errors(run.time[frames], largest[0], largest[1], squares, count, body)
+    return Errors(run.time[frames], found, count, body)
 
 
 def default_tolerance(scene: Scene) -> float:

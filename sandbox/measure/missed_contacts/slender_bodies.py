@@ -6,7 +6,6 @@ piece, has passed through the body, whatever contacts the engine found in the me
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 
@@ -15,6 +14,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.measure.metrics.clearance import offset_from_segment
 from sandbox.measure.missed_contacts.swept_geometry import CLEAR, cross, dot
+from sandbox.measure.missed_contacts.verlet_list import CanCollide
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.geometry.shapes import Piece, geometry_of
 from sandbox.trajectory import Trajectory
@@ -26,8 +26,6 @@ ARC = 0.1
 radius."""
 MAX_TURN = math.pi
 """rad: frames between which a body turns farther do not say where its ends were."""
-
-CanCollide = Callable[[IntArray, IntArray], BoolArray]
 
 
 def is_slender(bodies: Bodies) -> BoolArray:

@@ -71,7 +71,7 @@ class Windows:
     found: tuple[Window, ...] = field(metadata=in_json(key="windows"))
     """windows in ascending order"""
 
-    json_members: ClassVar = ("ball", "pocket", "aim", "within", "reach", "spacing", "found")
+    json_head: ClassVar = ("ball", "pocket", "aim", "within")
     json_name: ClassVar = "WindowsDocument"
 
     @property

@@ -1,7 +1,7 @@
 """Success odds and final positions of a shot under execution noise, by Monte Carlo."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from sandbox.echo import short_repr
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.shots import ShotBatch
 from sandbox.html_repr import HtmlRepr
+from sandbox.jsonable import in_json
 from sandbox.measure.proportion import Proportion
 from sandbox.measure.shots.shot import (
     ShotSetup,
@@ -61,34 +62,25 @@ class Odds(HtmlRepr):
     A miscue is not played; it counts as a stroke that pots nothing.
     """
 
-    shot: ShotSetup
+    shot: ShotSetup = field(metadata=in_json(omit=True))
     """the shot"""
     spread: Spread
     """standard deviations of the errors"""
     seed: int
     """seed of the random errors"""
-    nominal: ShotResult
+    nominal: ShotResult = field(metadata=in_json(omit=True))
     """result of the intended stroke"""
-    errors: FloatArray
+    errors: FloatArray = field(metadata=in_json(omit=True))
     """(M, 4) errors of the strokes: aim in rad, speed as a fraction, side and height as fractions of the radius"""
-    batch: ShotBatch
+    batch: ShotBatch = field(metadata=in_json(omit=True))
     """results of the M − `miscues` played shots"""
     miscues: int
     """number of miscues"""
     interrupted: bool = False
     """whether Ctrl-C was pressed before all shots were played"""
 
-    json_members: ClassVar = (
-        "count",
-        "seed",
-        "spread",
-        "interrupted",
-        "miscues",
-        "unfinished",
-        "scratch",
-        "any_pot",
-        "balls",
-    )
+    json_head: ClassVar = ("count", "seed", "spread", "interrupted", "miscues")
+    json_properties: ClassVar = ("unfinished", "scratch", "any_pot", "balls")
     json_name: ClassVar = "OddsDocument"
 
     def __repr__(self) -> str:

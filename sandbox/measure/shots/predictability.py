@@ -149,7 +149,7 @@ class Horizon:
     """perturbed quantity: `aim`, or `place` for the position of the struck ball"""
     tolerance: float
     """m, tolerance of the final positions"""
-    radius: float
+    radius: float = field(metadata=in_json(omit=True))
     """m, radius of the struck ball, which is the second tolerance"""
     duration: float
     """s, duration of the intended shot"""
@@ -163,16 +163,7 @@ class Horizon:
     ladder: tuple[Separation, ...]
     """separation beyond the tolerance, from larger perturbations of the aim to smaller ones"""
 
-    json_members: ClassVar = (
-        "by",
-        "tolerance",
-        "duration",
-        "separation",
-        "by_a_radius",
-        "player",
-        "digits_per_second",
-        "ladder",
-    )
+    json_head: ClassVar = ("by", "tolerance", "duration", "separation", "by_a_radius", "player", "digits_per_second")
     json_name: ClassVar = "HorizonDocument"
 
     @property

@@ -74,7 +74,7 @@ class Slope:
     reason: str | None
     """reason why there is no value"""
 
-    json_members: ClassVar = ("ball", "variable", "unit", "value", "error", "fitted", "holds", "reason")
+    json_head: ClassVar = ("ball", "variable", "unit")
     json_name: ClassVar = "SlopeDocument"
 
     @property

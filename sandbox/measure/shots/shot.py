@@ -91,7 +91,7 @@ class NoSuchShotError(ValueError):
 class ShotSetup:
     """Intended stroke at a ball of a table."""
 
-    table: Table
+    table: Table = field(metadata=in_json(omit=True))
     """the table before the stroke"""
     ball: str
     """name of the struck ball"""
@@ -100,7 +100,7 @@ class ShotSetup:
     name: str
     """name of the shot"""
 
-    json_members: ClassVar = ("name", "ball", "stroke")
+    json_head: ClassVar = ("name", "ball")
     json_name: ClassVar = "ShotDocument"
 
     def __repr__(self) -> str:

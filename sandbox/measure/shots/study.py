@@ -54,10 +54,10 @@ class ShotStudy:
     """aim windows of each ball and pocket"""
     horizon: Horizon | None
     """predictability horizon"""
-    interrupted: bool = False
+    interrupted: bool = field(default=False, metadata=in_json(omit=True))
     """whether Ctrl-C was pressed before the study was complete"""
 
-    json_members: ClassVar = ("title", "shot", "nominal", "odds", "slopes", "windows", "horizon")
+    json_head: ClassVar = ("title", "shot", "nominal")
 
     @property
     def answered(self) -> bool:

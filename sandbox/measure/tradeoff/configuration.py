@@ -13,10 +13,10 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import finite, in_json
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext, WorstError, measure_all, worst_error
 from sandbox.measure.compare.self_convergence import preferred_settings
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, WorstError, measure_all, worst_error
 from sandbox.measure.tradeoff.objections import ErrorLimits, find_objections
 from sandbox.measure.tradeoff.timing import Timing
 from sandbox.scene.compile.contacts import contact_matrix

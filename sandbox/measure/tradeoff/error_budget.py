@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import in_json
+from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
-from sandbox.measure.tradeoff.metrics import EvaluationContext
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SettingsError
 from sandbox.trajectory import Trajectory
@@ -131,5 +131,5 @@ class _LimitedRuns:
 
     def distance(self, a: Trajectory, b: Trajectory) -> float:
         """Return the largest distance of any body between two runs, m, up to the time to which the truth is trusted."""
-        found = errors(a, b, self.context.moving).until(self.context.until).max_position
+        found = errors(a, b, self.context.moving).largest("position", self.context.until)
         return 0.0 if found is None else found

@@ -15,10 +15,10 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.formatting import format_fraction, format_percent, format_plural, format_quantity
+from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
-from sandbox.measure.tradeoff.metrics import Metric
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 

@@ -5,15 +5,17 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 from sandbox.echo import short_repr
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext, Metric
 from sandbox.measure.metrics.invariants import conserves_energy, has_constraints
 from sandbox.measure.metrics.trajectory_error import default_tolerance
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
 from sandbox.scene.compile.contacts import contact_matrix
 
 T = TypeVar("T")
 
-DEFAULT_TOLERANCES = {"px": 1.0, "s": 0.05, "": 0.01}
-"""Default tolerances by unit; for lengths it is that of `compare`: 1 % of the smallest radius."""
+DEFAULT_TOLERANCES = {"px": 1.0, "s": 0.05, "rad": 0.01, "": 0.01}
+"""Default tolerances by unit; those of lengths and speeds depend on the scene."""
+FRAMES_PER_SECOND = 60.0
+"""1/s; the default tolerance of a speed is that of a length in such a frame."""
 COUNT_METRICS = frozenset({"missed_contacts"})
 """Metrics that are counts: their default tolerance is 0."""
 AUDIT_METRICS = frozenset({"missed_contacts", "passes"})
@@ -67,9 +69,26 @@ def complete_objective(
     """Return an objective that passed `check_objective`, with defaults for the values not given."""
     chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), "it was requested")
     if tolerance is None:
-        fallback = default_tolerance(context.scene)
-        tolerance = 0.0 if chosen.name in COUNT_METRICS else DEFAULT_TOLERANCES.get(chosen.unit, fallback)
+        tolerance = default_metric_tolerance(chosen, default_tolerance(context.scene))
     return Objective(chosen, tolerance, budget, fps, reason=reason)
+
+
+def default_metric_tolerance(metric: Metric, length: float) -> float:
+    """Return the default tolerance of a metric, in its unit; 0 for a count.
+
+    Args:
+        metric: the metric.
+        length: tolerance of a position, m.
+
+    Raises:
+        ValueError: no tolerance is known for the unit of the metric.
+    """
+    if metric.name in COUNT_METRICS:
+        return 0.0
+    known = DEFAULT_TOLERANCES | {"m": length, "m/s": length * FRAMES_PER_SECOND}
+    if metric.unit not in known:
+        raise ValueError(f"{metric.name}: no default tolerance is known in {metric.unit}; units: {', '.join(known)}")
+    return known[metric.unit]
 
 
 def metric_named(name: str) -> Metric:

@@ -1,20 +1,20 @@
-"""Results of a trade-off as frozen values and as a JSON document."""
+"""Results of a trade-off, whose fields are those of its JSON document."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
 from sandbox.html_repr import HtmlRepr
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.metrics import Metric
 from sandbox.measure.tradeoff.objective import pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
@@ -48,17 +48,25 @@ class Recommendation:
     show them: a body can tunnel at a slightly different speed"""
 
 
+class Conclusion(NamedTuple):
+    """Answer of a trade-off to a question, as a sentence."""
+
+    text: str
+    key: str | None = None
+    """key in the document of the recommendation that it describes, such as `cheapest_by_engine.pymunk`"""
+
+
 @dataclass(frozen=True, eq=False)
 class Tradeoff(HtmlRepr):
     """Error and cost of engines and settings for one scene."""
 
-    scene: Scene
+    scene: Scene = field(metadata=in_json(omit=True))
     """the scene"""
-    best: Truth | None
+    best: Truth | None = field(metadata=in_json(omit=True))
     """truth that errors are measured against; None if there is none"""
-    doubt: str | None
+    doubt: str | None = field(metadata=in_json(omit=True))
     """reason why there is no truth"""
-    metric: Metric
+    metric: Metric = field(metadata=in_json(omit=True))
     """metric of the error: name, unit and description"""
     metric_reason: str
     """reason for the choice of the metric, as a clause"""
@@ -68,7 +76,7 @@ class Tradeoff(HtmlRepr):
     """all settings that were tried"""
     pareto: tuple[Evaluation, ...]
     """points of the Pareto front, cheapest first: no other point is both cheaper and more accurate"""
-    splits: tuple[ErrorBudget, ...]
+    splits: tuple[ErrorBudget, ...] = field(metadata=in_json(key="split"))
     """position error of each engine: the parts of solver iterations and time step, and the remaining error"""
     proposals: tuple[Simplification, ...]
     """cheaper models of the scene whose error is within the tolerance"""
@@ -111,17 +119,65 @@ class Tradeoff(HtmlRepr):
     interrupted: bool = False
     """whether Ctrl-C ended the search; the points are those tried before, with the times of their recorded runs"""
 
+    json_head: ClassVar = (
+        ("scene", "title"),
+        "title",
+        "truth",
+        "truth_about",
+        "trusted_until",
+        "duration",
+        ("metric", "metric_name"),
+        "metric_about",
+        "unit",
+    )
+    json_properties: ClassVar = (("answers", "sentences"), ("answered_by", "answer_keys"))
+
     def __repr__(self) -> str:
         """Return the number of points, and the settings within the tolerance and the budget."""
         engines = ", ".join(dict.fromkeys(point.engine for point in self.points))
         head = f"<Tradeoff {short_repr(self.scene.title)}: {len(self.points):,} settings of {engines or 'no engine'}"
         lines = [f"{head}, {len(self.pareto):,} on the Pareto front; error: {self.metric.name}"]
-        return "\n  ".join([*lines, *self.answers()[:MAX_SHOWN]]) + ">"
+        return "\n  ".join([*lines, *self.sentences[:MAX_SHOWN]]) + ">"
 
     @property
     def truth(self) -> str | None:
         """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
         return None if self.best is None else self.best.kind
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene.title
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scene, s."""
+        return self.scene.world.duration
+
+    @property
+    def truth_about(self) -> str | None:
+        """Source of the truth, or the reason why there is none."""
+        return self.doubt if self.best is None else self.best.about
+
+    @property
+    def trusted_until(self) -> float | None:
+        """Time up to which errors are measured, s; None without a truth."""
+        return None if self.best is None else self.best.trusted_until
+
+    @property
+    def metric_name(self) -> str:
+        """Name of the metric."""
+        return self.metric.name
+
+    @property
+    def metric_about(self) -> str:
+        """Description of the metric."""
+        return self.metric.about
+
+    @property
+    def unit(self) -> str:
+        """Unit of the errors; empty for counts and fractions."""
+        return self.metric.unit
 
     @property
     def error_about(self) -> str:
@@ -133,28 +189,44 @@ class Tradeoff(HtmlRepr):
         names = dict.fromkeys(point.engine for point in self.points)
         return {name: front_of([p for p in self.points if p.engine == name]) for name in names}
 
-    def answers(self) -> list[str]:
-        """Return the recommended settings as sentences."""
+    def answers(self) -> list[Conclusion]:
+        """Return the answers, each with the key of the recommendation in the document that it describes."""
         successful = [point for point in self.points if point.status == "ok"]
         if successful and all(point.error is None for point in successful):
-            return [f"{self.metric.name} cannot be measured in this scene; choose another --metric"]
+            return [Conclusion(f"{self.metric.name} cannot be measured in this scene; choose another --metric")]
         tolerance = format_quantity(self.tolerance, self.metric.unit)
         question = f"cheapest setting with {self.metric.name} within {tolerance}"
-        lines = [f"{question}: {self._answer(self.within_tolerance, self.nearest_to_tolerance)}"]
+        found = [self._answer(question, "within_tolerance", "nearest_to_tolerance")]
         if self.budget is not None:
             question = f"most accurate setting within {self.budget:g} ms per frame at {self.fps:g} fps"
-            lines.append(f"{question}: {self._answer(self.within_budget, self.nearest_to_budget)}")
+            found.append(self._answer(question, "within_budget", "nearest_to_budget"))
         overall = None if self.within_tolerance is None else self.within_tolerance.point
-        others = {name: each for name, each in self.cheapest_by_engine.items() if each and each.point is not overall}
-        lines += [f"cheapest setting of {name} within the tolerance: {each.sentence}" for name, each in others.items()]
+        for name, each in self.cheapest_by_engine.items():
+            if each and each.point is not overall:
+                text = f"cheapest setting of {name} within the tolerance: {each.sentence}"
+                found.append(Conclusion(text, f"cheapest_by_engine.{name}"))
         if self.rejected is not None:
             reasons = "; ".join(self.rejected.point.objections)
-            lines.append(f"within the tolerance, but not recommended: {self.rejected.sentence}. Because: {reasons}")
-        return lines
+            text = f"within the tolerance, but not recommended: {self.rejected.sentence}. Because: {reasons}"
+            found.append(Conclusion(text, "rejected"))
+        return found
 
-    def _answer(self, found: Recommendation | None, nearest: Recommendation | None) -> str:
+    @property
+    def sentences(self) -> list[str]:
+        """The answers as sentences."""
+        return [each.text for each in self.answers()]
+
+    @property
+    def answer_keys(self) -> list[str | None]:
+        """The key in the document of the recommendation that each answer describes."""
+        return [each.key for each in self.answers()]
+
+    def _answer(self, question: str, found_key: str, nearest_key: str) -> Conclusion:
+        """Return the answer to a question: the recommendation with one key, or without it the nearest setting."""
+        found: Recommendation | None = getattr(self, found_key)
+        nearest: Recommendation | None = getattr(self, nearest_key)
         if found is not None:
-            return found.sentence
+            return Conclusion(f"{question}: {found.sentence}", found_key)
         sentences = [f"none of the {len(self.points)} settings tried"]
         if nearest is not None:
             sentences[0] += f"; the nearest is {nearest.sentence}"
@@ -164,7 +236,8 @@ class Tradeoff(HtmlRepr):
             sentences.append(
                 f"{LIMITS[self.limit]} ended the search, after {self.spent:.2g} of an effort of {self.effort:g}"
             )
-        return ". ".join([*sentences, *self._unsteady(nearest)])
+        text = ". ".join([*sentences, *self._unsteady(nearest)])
+        return Conclusion(f"{question}: {text}", None if nearest is None else nearest_key)
 
     def _unsteady(self, nearest: Recommendation | None) -> Iterator[str]:
         """Yield a sentence if the errors of a method do not fall steadily with the step."""
@@ -191,87 +264,8 @@ class Tradeoff(HtmlRepr):
         Args:
             scene: name of the scene in the document, such as its path; default: its title.
         """
-        found: dict[str, Any] = to_json(
-            TradeoffDocument(
-                scene=self.scene.title if scene is None else scene,
-                title=self.scene.title,
-                truth=self.truth,
-                truth_about=self.doubt if self.best is None else self.best.about,
-                trusted_until=None if self.best is None else self.best.trusted_until,
-                duration=self.scene.world.duration,
-                metric=self.metric.name,
-                metric_reason=self.metric_reason,
-                metric_about=self.metric.about,
-                unit=self.metric.unit,
-                zoom=self.zoom,
-                seeds=self.seeds,
-                points=self.points,
-                pareto=self.pareto,
-                split=self.splits,
-                proposals=self.proposals,
-                tolerance=self.tolerance,
-                budget=self.budget,
-                fps=self.fps,
-                max_dt=self.max_dt,
-                within_tolerance=self.within_tolerance,
-                within_budget=self.within_budget,
-                nearest_to_tolerance=self.nearest_to_tolerance,
-                nearest_to_budget=self.nearest_to_budget,
-                cheapest_by_engine=self.cheapest_by_engine,
-                rejected=self.rejected,
-                answers=self.answers(),
-                untried=self.untried,
-                effort=self.effort,
-                spent=self.spent,
-                limit=self.limit,
-                out_of_time=self.out_of_time,
-                interrupted=self.interrupted,
-                machine=self.machine,
-                versions=self.versions,
-            )
-        )
-        return found
-
-
-@dataclass(frozen=True)
-class TradeoffDocument:
-    """JSON document of a trade-off; the fields are those of `Tradeoff`."""
-
-    scene: str
-    title: str
-    truth: str | None
-    truth_about: str | None
-    trusted_until: float | None
-    duration: float
-    metric: str
-    metric_reason: str
-    metric_about: str
-    unit: str
-    zoom: float
-    seeds: Sequence[int]
-    points: Sequence[Evaluation]
-    pareto: Sequence[Evaluation]
-    split: Sequence[ErrorBudget]
-    proposals: Sequence[Simplification]
-    tolerance: float
-    budget: float | None
-    fps: float
-    max_dt: float
-    within_tolerance: Recommendation | None
-    within_budget: Recommendation | None
-    nearest_to_tolerance: Recommendation | None
-    nearest_to_budget: Recommendation | None
-    cheapest_by_engine: Mapping[str, Recommendation | None]
-    rejected: Recommendation | None
-    answers: Sequence[str]
-    untried: int
-    effort: float
-    spent: float
-    limit: Limit | None
-    out_of_time: bool
-    interrupted: bool
-    machine: Mapping[str, Any]
-    versions: Mapping[str, str]
+        found: dict[str, Any] = to_json(self)
+        return found if scene is None else {**found, "scene": scene}
 
 
 def _has_method(point: Evaluation, other: Configuration) -> bool:

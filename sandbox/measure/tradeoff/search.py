@@ -19,9 +19,9 @@ from dataclasses import dataclass, field, replace
 from itertools import cycle
 from typing import Literal
 
+from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
-from sandbox.measure.tradeoff.metrics import EvaluationContext
 from sandbox.measure.tradeoff.objective import is_dominated
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.trajectory import Trajectory

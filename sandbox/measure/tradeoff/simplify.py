@@ -16,8 +16,8 @@ from sandbox.engines.registry import ENGINES
 from sandbox.formatting import format_quantity
 from sandbox.jsonable import in_json
 from sandbox.measure.analytic.trajectory import solved_run
+from sandbox.measure.compare.metrics import EvaluationContext, Metric
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation
-from sandbox.measure.tradeoff.metrics import EvaluationContext, Metric
 from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene

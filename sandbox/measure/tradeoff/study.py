@@ -14,6 +14,7 @@ from typing import Any
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
@@ -29,7 +30,6 @@ from sandbox.measure.tradeoff.configuration import (
     refused_evaluation,
 )
 from sandbox.measure.tradeoff.error_budget import ErrorBudget, error_budget
-from sandbox.measure.tradeoff.metrics import EvaluationContext, default_zoom
 from sandbox.measure.tradeoff.objective import (
     AUDIT_METRICS,
     Objective,

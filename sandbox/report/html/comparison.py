@@ -8,8 +8,10 @@ from typing import Any
 
 from markupsafe import Markup
 
-from sandbox.formatting import UNKNOWN, format_change, format_count, format_number
+from sandbox.formatting import UNKNOWN, format_number
+from sandbox.measure.columns import shown
 from sandbox.measure.compare import Comparison, Row
+from sandbox.measure.compare.columns import COLUMNS
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.provenance import machine, versions
@@ -26,9 +28,11 @@ from sandbox.report.html.page import (
     concatenated,
     engine_name,
     fragment,
+    html_columns,
     isolated,
     remark_paragraphs,
     table,
+    value_cells,
     write_page,
 )
 from sandbox.report.html.replay import TRUTH, Track, replay
@@ -102,20 +106,17 @@ VERDICTS: tuple[tuple[str, Shade, str], ...] = (
 """Meanings of the verdicts."""
 MAX_EVENTS = 50
 """Missed and phantom contacts that are listed for each engine."""
-ENGINES = (
-    HtmlColumn("engine"),
-    HtmlColumn("verdict"),
-    HtmlColumn("max error, m", True, "largest position error of any body while the truth is trusted"),
-    HtmlColumn("rms error, m", True, "root mean square of the position error, over bodies and frames"),
-    HtmlColumn("max error, m/s", True, "largest velocity error of any body"),
-    HtmlColumn("energy", True, "energy error at the end, relative to the largest kinetic energy of the run"),
-    HtmlColumn("momentum", True, "unexplained momentum at the end, relative to the largest sum of |m v|"),
-    HtmlColumn("contacts", True, "contacts that the truth has too"),
-    HtmlColumn("missed", True, "contacts of the truth that the engine does not have"),
-    HtmlColumn("phantom", True, "contacts of the engine that the truth does not have"),
-    HtmlColumn("after", True, "unmatched contacts after a body diverged, which are not judged"),
-    HtmlColumn("ms per s", True, "computing time in milliseconds per simulated second"),
-)
+NAMES = HtmlColumn("engine"), HtmlColumn("verdict")
+COST = HtmlColumn("ms per s", True, "computing time in milliseconds per simulated second")
+
+
+ENGINE_COLUMNS = (*NAMES, *html_columns(COLUMNS), COST)
+"""All columns that the table of the engines may have."""
+
+
+def columns_of(rows: Sequence[Row]) -> list[HtmlColumn]:
+    """Return the columns of the table of all engines."""
+    return [*NAMES, *html_columns(shown(COLUMNS, rows)), COST]
 
 
 def write_comparison(comparison: Comparison, path: str | Path, on_recording: Sequence[str] = ()) -> Path:
@@ -136,7 +137,7 @@ def comparison_page(comparison: Comparison, replayed: bool = True, on_recording:
         on_recording: remarks on the recording whose scene is compared.
     """
     scene = comparison.scene
-    meanings = meanings_of(ENGINES)
+    meanings = meanings_of(columns_of(comparison.rows))
     sections = [Section("Engines", concatenated(engines_table(comparison), remarks(comparison), meanings))]
     if replayed and comparison.trajectories and comparison.same_scene:
         sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW_TO_REPLAY))
@@ -192,22 +193,17 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
 
 def engines_table(comparison: Comparison) -> Markup:
     """Return the table of all engines."""
-    classes = css_classes(comparison)
+    classes, columns = css_classes(comparison), shown(COLUMNS, comparison.rows)
     rows = [
         [
             engine_name(row.name, classes[row.name]),
             badge_of(row, comparison.tolerance),
-            format_number(row.score.max_position),
-            format_number(row.score.rms_position),
-            format_number(row.score.max_velocity),
-            format_change(row.energy_drift),
-            format_change(row.momentum_drift),
-            *(format_count(row.count(kind)) for kind in ("matched", "missed", "phantom", "after_divergence")),
+            *value_cells(columns, row),
             format_number(cost_of(comparison, row)),
         ]
         for row in comparison.rows
     ]
-    return table(ENGINES, rows, "Engines against the truth", wide=True)
+    return table(columns_of(comparison.rows), rows, "Engines against the truth", wide=True)
 
 
 def cost_of(comparison: Comparison, row: Row) -> float | None:

@@ -12,7 +12,7 @@ from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.provenance import machine, versions
 from sandbox.report.comparison_plot import FLOOR
 from sandbox.report.html.comparison import (
-    ENGINES,
+    ENGINE_COLUMNS,
     badge_of,
     cost_of,
     engines_table,
@@ -102,7 +102,7 @@ class Overview:
         done = len(self.sections)
         about = "each run on every engine that supports it and compared with the best known truth"
         summary = concatenated(
-            table(COLUMNS, self.rows, "Every scene and engine", wide=True), meanings_of(COLUMNS, ENGINES)
+            table(COLUMNS, self.rows, "Every scene and engine", wide=True), meanings_of(COLUMNS, ENGINE_COLUMNS)
         )
         lead = fragment(TEMPLATE, "lead", f"{format_plural(done, 'scene')}, {about}.", done, self.asked)
         sections = [Section("All scenes", summary, "all"), *self.sections]

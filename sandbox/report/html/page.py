@@ -7,7 +7,7 @@ content security policy names them by their hashes: no other script runs, no oth
 import base64
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
@@ -20,6 +20,7 @@ from markupsafe import Markup
 
 from sandbox.atomic_write import atomic_write
 from sandbox.formatting import format_change, format_count, format_number, format_plural
+from sandbox.measure.columns import Column, Kind, R
 from sandbox.report.style import css_class_of
 
 SCRIPTS = ("charts.js", "renderer.js", "replay.js")
@@ -77,6 +78,26 @@ def table(columns: Sequence[HtmlColumn], rows: Sequence[Sequence[Content]], capt
     """
     cells = [list(zip(columns, row, strict=True)) for row in rows]
     return fragment("parts.html.j2", "table", columns, cells, caption, wide)
+
+
+def html_columns(columns: Iterable[Column[R]]) -> list[HtmlColumn]:
+    """Return the heads of columns of values."""
+    return [HtmlColumn(column.head, True, column.about) for column in columns]
+
+
+def value_cells(columns: Iterable[Column[R]], row: R) -> list[Content]:
+    """Return the values of a row in some columns."""
+    return [_value_cell(column.value(row), column.kind) for column in columns]
+
+
+def _value_cell(value: float | str | None, kind: Kind) -> str:
+    if isinstance(value, str):
+        return value
+    if kind == "change":
+        return format_change(value)
+    if kind == "count":
+        return format_count(None if value is None else int(value))
+    return format_number(value, 4 if kind == "time" else 3)
 
 
 def column_key(*tables: Sequence[HtmlColumn]) -> Markup:

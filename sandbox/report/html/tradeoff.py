@@ -1,6 +1,7 @@
 """HTML page of a trade-off: recommendations, diagram, error budget and all settings."""
 
 from collections.abc import Collection, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -93,13 +94,20 @@ def answers(document: TradeoffMapping) -> Markup | None:
     sentences = document.get("answers") or []
     if not sentences:
         return None
-    picks, shown = _recommended(document), set[tuple[str, str]]()
-    items = []
-    for text in sentences:
-        pick = next((each for each in picks if text.endswith(each["sentence"])), None)
+    shown, items = set[tuple[str, str]](), []
+    for text, key in zip_longest(sentences, document.get("answered_by") or []):  # documents of earlier versions lack it
+        pick = None if key is None else _value_at(document, key)
         notes = [] if pick is None else _new_warnings(pick, shown)
         items.append((f"{text[:1].upper()}{text[1:]}", notes))
     return fragment(TEMPLATE, "answers", items, metric_sentence(document))
+
+
+def _value_at(document: TradeoffMapping, key: str) -> Any:
+    """Return the value at a key with dots, such as `cheapest_by_engine.pymunk`; None if there is none."""
+    found: Any = document
+    for name in key.split("."):
+        found = (found or {}).get(name)
+    return found
 
 
 def _recommended(document: TradeoffMapping) -> list[TradeoffMapping]:

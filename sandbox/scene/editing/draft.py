@@ -99,12 +99,12 @@ class SceneDraft:
         try:
             raw = path.read_bytes()
             if (refusal := too_large(len(raw))) is not None:
-                raise SceneError([Fault(str(path), None, "", refusal)])
+                raise SceneError([Fault.of(str(path), refusal)])
             text = raw.decode("utf-8")
         except OSError as error:
-            raise SceneError([Fault(str(path), None, "", f"cannot be read: {error.strerror or error}")]) from None
+            raise SceneError([Fault.of(str(path), f"cannot be read: {error.strerror or error}")]) from None
         except UnicodeDecodeError:
-            raise SceneError([Fault(str(path), None, "", "is not UTF-8 text; a scene is a TOML file")]) from None
+            raise SceneError([Fault.of(str(path), "is not UTF-8 text; a scene is a TOML file")]) from None
         draft = cls(text.removeprefix(BYTE_ORDER_MARK), path, text)
         if text.startswith(BYTE_ORDER_MARK):
             draft._has_mark = True
@@ -243,7 +243,7 @@ class SceneDraft:
         """
         target = path or self.path
         if target is None:
-            raise SceneError([Fault("<scene>", None, "", "has no file yet; give it a name")])
+            raise SceneError([Fault.of("<scene>", "has no file yet; give it a name")])
         fault = _reason_not_writable(target)
         if fault is None:
             try:
@@ -255,7 +255,7 @@ class SceneDraft:
             except OSError as error:
                 fault = f"cannot be written: {error.strerror or error}"
         if fault is not None:
-            raise SceneError([Fault(str(target), None, "", fault)])
+            raise SceneError([Fault.of(str(target), fault)])
         self.path, self._saved = target, self._file_text
         return target
 

@@ -47,7 +47,7 @@ def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
     try:
         file = find(str(path))
     except UnknownSceneError as error:
-        raise SceneError([Fault(str(path), None, "", str(error))]) from None
+        raise SceneError([Fault.of(str(path), str(error))]) from None
     return loads(_read(file), str(file), overrides)
 
 
@@ -116,7 +116,7 @@ class SceneText:
         except NestingError as error:
             raise SceneError([Fault(file, error.line, "", str(error))]) from None
         except ValueError as error:  # an integer of thousands of digits
-            raise SceneError([Fault(file, None, "", f"cannot be read: {error}")]) from None
+            raise SceneError([Fault.of(file, f"cannot be read: {error}")]) from None
         if not document:
             message = "the file is empty; a scene needs at least one body, such as a [[ball]] with position and radius"
             raise SceneError([Fault(file, 1, "", message)])
@@ -148,7 +148,7 @@ def from_document(
     try:
         check_value(document)
     except NestingError as error:
-        raise SceneError([Fault(file, None, "", str(error))]) from None
+        raise SceneError([Fault.of(file, str(error))]) from None
     assignments, faults = _parse_overrides(overrides, file)
     stated, whole, changed = document, True, set[Location]()
     if has_preset(document, (path for path, _ in assignments)):
@@ -271,16 +271,16 @@ def _read(path: str | Path) -> str:
     file = str(path)
     try:
         if (message := too_large(Path(path).stat().st_size)) is not None:
-            raise SceneError([Fault(file, None, "", message)])
+            raise SceneError([Fault.of(file, message)])
         return read_limited(Path(path), FILE_SIZE.value).decode("utf-8-sig").replace("\r\n", "\n")
     except OSError as error:
-        raise SceneError([Fault(file, None, "", f"cannot be read: {error.strerror or error}")]) from None
+        raise SceneError([Fault.of(file, f"cannot be read: {error.strerror or error}")]) from None
     except ValueError as error:
         if isinstance(error, UnicodeDecodeError):
             reason = "is not UTF-8 text; a scene is a TOML file"
         else:
             reason = f"{error}; generators such as [[grid]] need less text"
-        raise SceneError([Fault(file, None, "", reason)]) from None
+        raise SceneError([Fault.of(file, reason)]) from None
 
 
 def _is_long_enough(details: Any) -> bool:

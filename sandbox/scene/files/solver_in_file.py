@@ -67,11 +67,11 @@ def write_solver(path: str | Path, settings: Mapping[str, Any]) -> bool:
             temporary.write_bytes(result.encode("utf-8"))
             shutil.copymode(target, temporary)
     except UnicodeDecodeError:
-        raise SceneError([Fault(file, None, "", "is not UTF-8 text; a scene is a TOML file")]) from None
+        raise SceneError([Fault.of(file, "is not UTF-8 text; a scene is a TOML file")]) from None
     except ValueError as error:
-        raise SceneError([Fault(file, None, "", str(error).removeprefix(f"{file}: "))]) from None
+        raise SceneError([Fault.of(file, str(error).removeprefix(f"{file}: "))]) from None
     except OSError as error:
-        raise SceneError([Fault(file, None, "", f"cannot be written: {error.strerror or error}")]) from None
+        raise SceneError([Fault.of(file, f"cannot be written: {error.strerror or error}")]) from None
     return True
 
 
@@ -99,7 +99,7 @@ def _writable(path: Path, file: str) -> Path:
     except (OSError, RuntimeError) as error:  # a loop of links, or a folder without permission
         reason = f"cannot be read: {getattr(error, 'strerror', None) or error}"
     if reason:
-        raise SceneError([Fault(file, None, "", reason)])
+        raise SceneError([Fault.of(file, reason)])
     return target
 
 

@@ -11,6 +11,7 @@ from sandbox.measure.compare import compare
 from sandbox.measure.compare import ground_truth as truth_module
 from sandbox.measure.compare.attribution import NOT_CHANGED, SettingEffect, setting_changes, verdict
 from sandbox.measure.compare.ground_truth import truth_of
+from sandbox.measure.compare.result import Score
 from sandbox.progress import Progress
 from sandbox.scene.description.world import DetectionName, IntegratorName, Settings
 from sandbox.scene.files.load import load, loads
@@ -42,7 +43,7 @@ def test_engine_that_refuses_is_a_row_with_its_reason() -> None:
     assert row.status == "refused"
     assert row.reason is not None
     assert "integrator 'rk4'" in row.reason
-    assert row.score == (None, None, None, None)
+    assert row.score == Score()
     assert row.events is row.seconds is row.energy_drift is None
     assert comparison.truth == "closed_form"  # belongs to the scene, not to the compared engine
     assert comparison.trajectories == {}

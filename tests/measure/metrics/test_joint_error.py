@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.metrics.invariants import joint_error, joint_errors, joint_scales
 from sandbox.measure.run.runner import run
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.scene.files.load import from_document, loads
 from tests.measure.metrics.test_energy import resting_run
 

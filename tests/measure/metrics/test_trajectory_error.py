@@ -16,11 +16,12 @@ def test_known_offset_is_the_error() -> None:
     position[:, 0] += (3.0, 4.0)  # 5 m away; the other ball has no error
     velocity[:, 1, 0] += 2.0
     found = errors(run_of(SCENE, position, velocity=velocity), truth, MOVING)
-    score = found.until(2.0)
-    assert score.max_position == pytest.approx(5.0, rel=1e-15)  # one rounding of hypot
-    assert score.rms_position == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-14)  # a sum of 21 equal squares
-    assert score.max_velocity == 2.0
-    assert score.rms_velocity == pytest.approx(np.sqrt(2.0), rel=1e-14)  # likewise
+    assert found.largest("position", 2.0) == pytest.approx(5.0, rel=1e-15)  # one rounding of hypot
+    # a sum of 21 equal squares
+    assert found.root_mean_square("position", 2.0) == pytest.approx(5.0 / np.sqrt(2.0), rel=1e-14)
+    assert found.largest("velocity", 2.0) == 2.0
+    assert found.root_mean_square("velocity", 2.0) == pytest.approx(np.sqrt(2.0), rel=1e-14)  # likewise
+    assert found.largest("angle", 2.0) == 0.0
     assert found.position.tolist() == [5.0] * 21
 
 
@@ -29,8 +30,8 @@ def test_only_frames_up_to_the_given_time_count() -> None:
     position = truth.position.copy()
     position[:, 0, 1] += np.arange(21) * 0.25
     found = errors(run_of(SCENE, position), truth, MOVING)
-    assert found.until(1.0).max_position == 2.5
-    assert found.until(2.0).max_position == 5.0
+    assert found.largest("position", 1.0) == 2.5
+    assert found.largest("position", 2.0) == 5.0
     assert found.first_above(0.6, 2.0) == truth.time[3]
     assert found.first_above(0.75, 2.0) == truth.time[4]  # exactly the tolerance is not above it
     assert found.first_above(0.6, 0.2) is None
@@ -40,7 +41,7 @@ def test_fixed_bodies_do_not_count() -> None:
     truth = run_of(SCENE)
     position = truth.position.copy()
     position[:, 2] += 100.0
-    assert errors(run_of(SCENE, position), truth, MOVING).until(2.0).max_position == 0.0
+    assert errors(run_of(SCENE, position), truth, MOVING).largest("position", 2.0) == 0.0
 
 
 def test_retired_bodies_count_only_while_present_in_both_runs() -> None:
@@ -58,7 +59,7 @@ def test_nan_position_has_infinite_error() -> None:
     position = truth.position.copy()
     position[5:, 0] = np.nan
     found = errors(run_of(SCENE, position), truth, MOVING)
-    assert found.until(2.0).max_position == np.inf
+    assert found.largest("position", 2.0) == np.inf
     assert found.first_above(1.0, 2.0) == truth.time[5]
 
 
@@ -76,8 +77,10 @@ def test_common_frames_of_different_steps_are_those_of_equal_time() -> None:
 
 def test_run_without_frames_has_no_score() -> None:
     empty = run_of(SCENE, position=np.empty((0, 3, 2)), time=np.empty(0))
-    assert errors(empty, run_of(SCENE), MOVING).until(2.0) == (None, None, None, None)
+    found = errors(empty, run_of(SCENE), MOVING)
+    assert (found.largest("position", 2.0), found.root_mean_square("position", 2.0)) == (None, None)
 
 
 def test_scene_without_moving_bodies_has_no_score() -> None:
-    assert errors(run_of(SCENE), run_of(SCENE), np.zeros(3, dtype=bool)).until(2.0) == (None, None, None, None)
+    found = errors(run_of(SCENE), run_of(SCENE), np.zeros(3, dtype=bool))
+    assert (found.largest("angle", 2.0), found.root_mean_square("angle", 2.0)) == (None, None)

@@ -5,8 +5,8 @@ from typing import Any
 
 from sandbox.arrays import FloatArray
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory

@@ -3,11 +3,11 @@
 import pytest
 
 from sandbox.measure.compare.ground_truth import Truth, truth_of
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.compare.self_convergence import refine
 from sandbox.measure.tradeoff import simplify as module
 from sandbox.measure.tradeoff import timing
 from sandbox.measure.tradeoff.error_budget import error_budget
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
 from sandbox.scene.compile.demands import Demand, demands
 from sandbox.scene.compile.scene import Scene

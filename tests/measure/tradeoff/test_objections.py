@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.measure.compare.metrics import METRICS, times_of_leaving, worst_error
 from sandbox.measure.preflight import warnings
 from sandbox.measure.run.runner import run
-from sandbox.measure.tradeoff.metrics import METRICS, times_of_leaving, worst_error
 from sandbox.measure.tradeoff.objections import MAX_ODDS, SPEED_MARGIN, ErrorLimits, find_objections
 from sandbox.measure.tradeoff.study import tradeoff
 from sandbox.scene.compile.scene import Scene
@@ -88,7 +88,7 @@ def test_no_recommended_setting_has_an_objection(scene: Scene, metric: str, tole
             assert chosen.point.metrics["joint_distance"] <= tolerance
     assert any(point.objections for point in found.points)
     if found.rejected is not None:  # where it is the cheapest, which its time decides
-        assert found.rejected.point.objections[0] in found.answers()[-1]
+        assert found.rejected.point.objections[0] in found.sentences[-1]
 
 
 @given(st.floats(0.1, 100.0))

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from sandbox.engines.pymunk_adapter.colliders import new_space
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.tradeoff.configuration import Evaluation
-from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.objective import Objective, is_dominated, pareto
 from sandbox.measure.tradeoff.recommendation import (
     label,

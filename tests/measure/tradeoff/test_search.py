@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff import search as module
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.search import SettingsSearch
 from sandbox.scene.compile.scene import Scene
 from tests.measure.tradeoff.evaluations_by_hand import context_of, point_of

@@ -12,13 +12,13 @@ import pytest
 import sandbox
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.measure.compare.ground_truth import truth_of
+from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.preflight import warnings
 from sandbox.measure.seeds import with_seed
 from sandbox.measure.tradeoff import Tradeoff, tradeoff
 from sandbox.measure.tradeoff import study as module
 from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
-from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
 from sandbox.measure.tradeoff.objective import UnknownMetricError
 from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, NOISE_FACTOR
 from sandbox.measure.tradeoff.study import setting_warnings
@@ -125,7 +125,7 @@ def test_refused_engine_is_a_point_with_its_reason() -> None:
     assert (refused.status, refused.error, refused.cost) == ("refused", None, None)
     assert "rod" in (refused.reason or "")
     assert (found.pareto, found.within_tolerance) == ((), None)
-    assert "none of the 1" in found.answers()[0]
+    assert "none of the 1" in found.sentences[0]
 
 
 def test_settings_that_diverge_are_points_with_a_reason() -> None:
@@ -190,7 +190,7 @@ def test_nearest_is_given_if_nothing_meets_the_tolerance_or_budget() -> None:
     assert (found.within_tolerance, found.within_budget) == (None, None)
     assert found.nearest_to_budget is not None
     assert found.nearest_to_tolerance.point.error == min(p.error for p in found.points if p.is_usable)
-    assert all("the nearest is pymunk" in line for line in found.answers())
+    assert all("the nearest is pymunk" in line for line in found.sentences)
     document = found.document()
     assert document["nearest_to_tolerance"]["sentence"] in document["answers"][0]
 
@@ -238,7 +238,7 @@ def test_scene_without_moving_bodies_can_be_studied() -> None:
 def test_undefined_metric_is_reported() -> None:
     found = study(scene_of(DROP), metric="joint_error", most=3)
     assert found.within_tolerance is None
-    assert found.answers() == ["joint_error cannot be measured in this scene; choose another --metric"]
+    assert found.sentences == ["joint_error cannot be measured in this scene; choose another --metric"]
 
 
 def test_progress_names_each_stage_of_a_study() -> None:
@@ -299,7 +299,7 @@ ball = [{ position = [0.13, 2.0], radius = 0.1, restitution = 0.9 }]
 
 def test_answer_says_that_errors_do_not_fall_steadily_and_what_ended_the_search() -> None:
     found = tradeoff(scene_of(POSTS), ("pymunk",), tolerance=1e-9, most=12, repeats=1)
-    (answer, *_) = found.answers()
+    (answer, *_) = found.sentences
     assert re.match(
         "cheapest setting with max_position within 1 nm: none of the [0-9]+ settings tried; the near", answer
     )

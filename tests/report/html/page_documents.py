@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.extremes import Extremes, ExtremesPlan
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.outcome import Outcome, Sample
@@ -12,7 +13,6 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.metrics import METRICS
 from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings

@@ -1,4 +1,7 @@
-"""Error metrics of a trade-off, and the context in which they are evaluated."""
+"""Metrics of the error of a run, and the context in which they are evaluated.
+
+A new metric is a function and a row of `METRICS`; with a `head` it is also a column of comparisons.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -21,6 +24,8 @@ SCREEN_SIZE = 1280.0, 720.0
 """px, window in which a scene is assumed to be drawn."""
 SCREEN_FILL = 0.9
 """Fraction of the window that the motion fills."""
+DEFAULT_ZOOM = 100.0
+"""px/m, where the extent of the motion gives none."""
 REST_FRACTION = 0.01
 """Fraction of its half width by which a body may move in the second half of a run and still count as at rest."""
 
@@ -33,7 +38,7 @@ class EvaluationContext:
     """the scene, with the seed of this context"""
     truth: Truth | None
     """truth of the scene; None if there is none"""
-    zoom: float
+    zoom: float = DEFAULT_ZOOM
     """px/m, scale of errors in pixels"""
     doubt: str | None = None
     """reason why there is no truth, if known"""
@@ -157,7 +162,7 @@ def default_zoom(scene: Scene, truth: Truth | None) -> float:
         high = np.nanmax(positions + reach, axis=(0, 1), initial=-np.inf)
     size = high - low
     if not (np.isfinite(size).all() and (size > 0.0).all()):
-        return 100.0
+        return DEFAULT_ZOOM
     return float(min(SCREEN_FILL * SCREEN_SIZE[0] / size[0], SCREEN_FILL * SCREEN_SIZE[1] / size[1]))
 
 
@@ -200,20 +205,26 @@ class Metric(NamedTuple):
     about: str
     """description"""
     measure: Measure
+    head: str | None = None
+    """head of its column in a comparison; None if it has none"""
 
 
-def max_position(run: Trajectory, context: EvaluationContext) -> float | None:
-    """Return the largest distance of any body from the truth, m, up to the time to which the truth is trusted."""
-    if context.truth is None:
-        return None
-    return context.errors(run).until(context.until).max_position
+def largest(quantity: str) -> Measure:
+    """Return the metric of the largest deviation of any body from the truth, while the truth is trusted."""
+
+    def measure(run: Trajectory, context: EvaluationContext) -> float | None:
+        return None if context.truth is None else context.errors(run).largest(quantity, context.until)
+
+    return measure
 
 
-def rms_position(run: Trajectory, context: EvaluationContext) -> float | None:
-    """Return the root mean square distance from the truth, m."""
-    if context.truth is None:
-        return None
-    return context.errors(run).until(context.until).rms_position
+def root_mean_square(quantity: str) -> Measure:
+    """Return the metric of the root mean square deviation from the truth, over bodies and frames, likewise."""
+
+    def measure(run: Trajectory, context: EvaluationContext) -> float | None:
+        return None if context.truth is None else context.errors(run).root_mean_square(quantity, context.until)
+
+    return measure
 
 
 def final_position(run: Trajectory, context: EvaluationContext) -> float | None:
@@ -338,16 +349,25 @@ def _settled(run: Trajectory, context: EvaluationContext) -> float:
 
 def pixels(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the largest distance from the truth on the screen, px."""
-    distance = max_position(run, context)
+    distance = largest("position")(run, context)
     return None if distance is None else distance * context.zoom
 
 
 METRICS: Mapping[str, Metric] = {
     metric.name: metric
     for metric in (
-        Metric("max_position", "m", "largest distance from the truth", max_position),
+        Metric("max_position", "m", "largest distance from the truth", largest("position"), "max error"),
         Metric("final_position", "m", "distance from the truth at the end", final_position),
-        Metric("rms_position", "m", "root of the mean square distance from the truth", rms_position),
+        Metric(
+            "rms_position",
+            "m",
+            "root of the mean square distance from the truth",
+            root_mean_square("position"),
+            "rms error",
+        ),
+        Metric("max_velocity", "m/s", "largest error of a velocity", largest("velocity"), "max error"),
+        Metric("rms_velocity", "m/s", "root of the mean square error of velocities", root_mean_square("velocity")),
+        Metric("max_angle", "rad", "largest error of an angle", largest("angle"), "max error"),
         Metric("pixels", "px", "largest distance from the truth on the screen", pixels),
         Metric("bounce_height", "m", "error of the bounce height", bounce_height),
         Metric("energy", "", "drift of the energy as a fraction of the kinetic energy", energy),

@@ -1,20 +1,32 @@
 """Metrics on synthetic runs with known values."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from sandbox.jsonable import to_json
+from sandbox.measure.compare import compare
+from sandbox.measure.compare.metrics import METRICS, default_zoom, displacement, measure_all
 from sandbox.measure.run.runner import run as run_scene
-from sandbox.measure.tradeoff.metrics import default_zoom, displacement, measure_all
-from sandbox.measure.tradeoff.objective import choose_metric
+from sandbox.measure.tradeoff.objective import choose_metric, default_metric_tolerance
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 from tests.measure.tradeoff.evaluations_by_hand import context_of, shifted
 from tests.runs_by_hand import BALLS, run_of, scene_of
 
-NEEDS_TRUTH = ("max_position", "final_position", "rms_position", "pixels", "bounce_height", "settle_time", "drift")
+NEEDS_TRUTH = (
+    "max_position",
+    "final_position",
+    "rms_position",
+    "pixels",
+    "bounce_height",
+    "settle_time",
+    "drift",
+    "max_angle",
+)
 
 
 @pytest.fixture
@@ -31,6 +43,37 @@ def test_max_position_is_of_the_worst_body_and_frame(scene: Scene) -> None:
     assert found["final_position"] == 0.0
     # One of 21 frames × 2 bodies that move.
     assert found["rms_position"] == pytest.approx(0.05 / math.sqrt(42.0), rel=1e-12)
+
+
+def test_max_angle_counts_whole_turns(scene: Scene) -> None:
+    resting = run_of(scene)
+    angle = resting.angle.copy()
+    angle[7:, 1] += 2.0 * math.pi
+    angle[3, 0] = -0.25
+    found = measure_all(replace(resting, angle=angle), context_of(scene))
+    assert found["max_angle"] == pytest.approx(2.0 * math.pi, rel=1e-15)
+    assert found["max_position"] == 0.0
+
+
+def test_angle_and_position_of_a_compound_pendulum_are_off_by_one_arc() -> None:
+    """About a fixed pivot at the distance L, a difference of angles Δ moves the centre by the chord 2 L sin(Δ/2)."""
+    scene = loads(
+        "[world]\nduration = 1.0\ngravity = [0, -9.81]\n[[box]]\nname = 'bar'\nposition = [0.5, 0]\nsize = [1.0, 0.1]\n"
+        "[[joint]]\nkind = 'pivot'\nbetween = ['bar']\nat = [0, 0]\n"
+    )
+    (row,) = compare(scene, ["reference"], dt=0.01, joints="rattle").rows
+    assert row.score.max_angle is not None and row.score.max_angle > 1e-5
+    chord = 2.0 * 0.5 * math.sin(row.score.max_angle / 2.0)
+    assert row.score.max_position == pytest.approx(chord, rel=1e-3)  # the joint itself is off by less
+    document = to_json(row)
+    assert document["max_angle_error"] == row.score.max_angle
+
+
+def test_every_metric_has_a_default_tolerance_and_an_unknown_unit_none() -> None:
+    for metric in METRICS.values():
+        assert default_metric_tolerance(metric, 0.01) >= 0.0
+    with pytest.raises(ValueError, match="furlong"):
+        default_metric_tolerance(METRICS["max_angle"]._replace(unit="furlong"), 0.01)
 
 
 def test_fixed_bodies_do_not_count(scene: Scene) -> None:

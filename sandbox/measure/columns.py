@@ -1,0 +1,28 @@
+"""Columns of the tables of a study: the terminal, its legend and the HTML page are views of one list."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Generic, Literal, NamedTuple, TypeVar
+
+R = TypeVar("R")
+
+Kind = Literal["number", "time", "change", "count"]
+"""Format of the values: a number; a time, s; a signed fraction; a count"""
+
+
+class Column(NamedTuple, Generic[R]):
+    """Column of a table with a row for each R."""
+
+    head: str
+    """head, with the unit"""
+    about: str
+    """meaning"""
+    value: Callable[[R], float | str | None]
+    """value of a row; None if it is unknown, a text in the place of a number"""
+    kind: Kind = "number"
+    is_optional: bool = False
+    """left out of a table whose rows all have 0 or no value"""
+
+
+def shown(columns: Iterable[Column[R]], rows: Sequence[R]) -> list[Column[R]]:
+    """Return the columns that a table of some rows has."""
+    return [column for column in columns if not column.is_optional or any(map(column.value, rows))]
