@@ -2,7 +2,26 @@
 
 Runs are looked up in the store first, then grouped into tasks of at least `TASK_TIME`, submitted as slots become free,
 and stored as their outcomes arrive. Runs of one family (`PlannedRun.family`) are members of one task, which many
-engines compute in one call; the members that are not computed so are queued again as ordinary runs.
+engines compute in one call.
+
+A run is in one state at a time:
+
+    planned    in the queue, or not taken from the plan yet
+      → done       it is stored
+      → waiting    an equal run is ready or submitted
+      → collected  it has a family
+      → ready      otherwise
+    waiting    behind the equal run
+      → planned    that is done
+    collected  among the members of its family
+      → submitted  they are enough for a task
+    ready      in the queue, with its job
+      → submitted  it is its turn
+    submitted  in a pending task
+      → done       its outcome has arrived
+      → ready      the task was lost, and it has been tried less than `ATTEMPTS` times
+      → planned    without its family: it is a member that was not computed
+    done       reported, and stored if there is a store
 
 A worker that dies or hangs costs its own run only: the run is tried again up to `ATTEMPTS` times and then recorded as
 failed, with the reason; the next command tries it again.
@@ -11,9 +30,9 @@ failed, with the reason; the next command tries it again.
 import math
 import statistics
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from sandbox.batch.executors import (
@@ -89,12 +108,18 @@ class Result:
 
 
 @dataclass
-class _Attempt:
-    """A job to be run, and what has happened to it."""
+class _Run:
+    """A planned run, and what has happened to it."""
 
     index: int
-    job: Job
-    options: RunOptions
+    """in the order of the plan, from 0"""
+    planned: PlannedRun
+    family: str | None = None
+    """family of the planned run, unless it is an ordinary run"""
+    job: Job | None = None
+    """what is to be run, once it is ready"""
+    options: RunOptions | None = None
+    """how it is run, once it is ready"""
     damaged: str | None = None
     """fault of the stored run that it replaces"""
     deaths: int = 0
@@ -102,12 +127,17 @@ class _Attempt:
     is_suspect: bool = False
     """it was in a task that was lost, so it is run alone"""
 
+    @property
+    def label(self) -> str:
+        """The scene as the user named it."""
+        return self.planned.label
+
 
 @dataclass
-class _MemberGroup:
-    """Runs of one family that become members of one task, with their indices in the plan."""
+class _Members:
+    """Runs of one family that are the members of one task."""
 
-    runs: list[tuple[int, PlannedRun]] = field(default_factory=list)
+    runs: list[_Run]
 
 
 class Driver:
@@ -143,21 +173,17 @@ class Driver:
         self._done, self._started, self._faulty, self._computed = done, started, faulty, computed
         self._unseen = count
         """runs of the plan that were not looked up yet"""
-        self._again: deque[_Attempt] = deque()
-        self._pending: dict[Future[tuple[JobOutcome, ...]], list[_Attempt] | _MemberGroup] = {}
-        self._families: dict[str, _MemberGroup] = {}
-        """members that wait for their task, by family"""
+        self._queue: deque[_Run | _Members] = deque()
+        """planned and ready runs, and members whose task is submitted next, before those of the plan"""
+        self._pending: dict[Future[tuple[JobOutcome, ...]], list[_Run] | _Members] = {}
+        """submitted runs by their task"""
+        self._waiting: dict[str, list[_Run]] = {}
+        """runs that wait, by the id of the equal run that is ready or submitted"""
+        self._families: dict[str, _Members] = {}
+        """collected runs"""
         self._ordinary_families: set[str] = set()
         """families whose runs are ordinary ones, because their members were not computed in one call"""
         self._times: deque[float] = deque(maxlen=MAX_TIMED)
-        self._running: set[str] = set()
-        """ids of the runs that were begun and are not stored yet"""
-        self._equal: dict[str, list[tuple[int, PlannedRun]]] = {}
-        """further planned runs with these ids, which are looked up again once the run is stored"""
-        self._due: deque[tuple[int, PlannedRun]] = deque()
-        """planned runs whose equal run has been stored, and members that become ordinary runs"""
-        self._full_groups: deque[_MemberGroup] = deque()
-        """members whose task is submitted next"""
 
     def run(self) -> None:
         """Run all jobs.
@@ -189,38 +215,38 @@ class Driver:
         slots, before = self._executor.slots, len(self._pending)
         while len(self._pending) < (2 * slots if self._executor.is_remote else 1):
             group = self._next_group()
-            if not group:
+            if group is None:
                 break
-            task: AnyTask
-            if isinstance(group, _MemberGroup):
-                self._started(group.runs[0][1].label)
-                task = self._plan.member_task([planned for _, planned in group.runs], self._options)
-            else:
-                for each in group:
-                    self._started(each.job.label)
-                task = RunTask(tuple(each.job for each in group), group[0].options, dict(versions()))
-            self._pending[self._executor.submit(task)] = group
+            self._pending[self._executor.submit(self._task(group))] = group
         return len(self._pending) > before
 
-    def _next_group(self) -> list[_Attempt] | _MemberGroup | None:
-        """Return the runs of the next task; None if there are none left.
+    def _task(self, group: list[_Run] | _Members) -> AnyTask:
+        """Return the task of some runs, and announce them."""
+        if isinstance(group, _Members):
+            self._started(group.runs[0].label)
+            return self._plan.member_task([each.planned for each in group.runs], self._options)
+        for each in group:
+            self._started(each.label)
+        jobs = tuple(each.job for each in group if each.job is not None)
+        return RunTask(jobs, group[0].options or self._options, dict(versions()))
 
-        Those of a list are run with the same options.
-        """
-        group: list[_Attempt] = []
-        for attempt in self._next_attempts():
-            if isinstance(attempt, _MemberGroup):
-                if group:
-                    self._full_groups.append(attempt)
-                    break
-                return attempt
-            if group and (attempt.is_suspect or attempt.options != group[0].options):
-                self._again.appendleft(attempt)
+    def _next_group(self) -> list[_Run] | _Members | None:
+        """Return the runs of the next task; None if there are none left. Those of a list have the same options."""
+        group: list[_Run] = []
+        bodies = 0
+        while (ready := self._next_ready()) is not None:
+            if isinstance(ready, _Members):
+                if not group:
+                    return ready
+                self._queue.appendleft(ready)
                 break
-            group.append(attempt)
-            bodies = sum(len(each.job.scene.bodies) for each in group)
-            is_full = len(group) >= self._group_size() or bodies > MAX_GROUP_BODIES
-            if attempt.is_suspect or is_full:
+            if group and (ready.is_suspect or ready.options != group[0].options):
+                self._queue.appendleft(ready)
+                break
+            assert ready.job is not None
+            group.append(ready)
+            bodies += len(ready.job.scene.bodies)
+            if ready.is_suspect or len(group) >= self._group_size() or bodies > MAX_GROUP_BODIES:
                 break
         return group or None
 
@@ -232,68 +258,69 @@ class Driver:
         size = math.ceil(TASK_TIME / max(statistics.median(self._times), 1e-6))
         return max(min(size, MAX_GROUP, math.ceil(self._unseen / (2 * slots))), 1)
 
-    def _next_attempts(self) -> Iterator[_Attempt | _MemberGroup]:
-        """Yield runs that must be made, members in full groups; runs that are stored are reported."""
-        while self._full_groups:
-            yield self._full_groups.popleft()
-        while self._again:
-            yield self._again.popleft()
-        while (item := self._next_planned()) is not None:
-            index, planned = item
+    def _next_ready(self) -> _Run | _Members | None:
+        """Return the next run that is ready, or the members of a task; None if there are none left for now.
+
+        Runs on the way to it are looked up: those that are stored are reported, others wait or are collected.
+        """
+        while (each := self._next_queued()) is not None:
+            if isinstance(each, _Members) or each.job is not None:
+                return each
             try:
-                attempt = self._looked_up(index, planned)
+                ready = self._looked_up(each)
             except SceneError as error:
                 if self._faulty is None:
-                    raise JobError(planned.label, error) from error
+                    raise JobError(each.label, error) from error
                 self._faulty(error)
                 continue
             except (StoreError, TooLargeError) as error:
-                raise JobError(planned.label, error) from error
-            if attempt is not None:
-                yield attempt
-        while self._families:  # the plan has ended
-            yield self._families.pop(next(iter(self._families)))
+                raise JobError(each.label, error) from error
+            if ready is not None:
+                return ready
+        return None
 
-    def _next_planned(self) -> tuple[int, PlannedRun] | None:
-        """Return the next planned run and its index; None if there are none left for now."""
-        if self._due:
-            return self._due.popleft()
+    def _next_queued(self) -> _Run | _Members | None:
+        """Return the next of the queue, else of the plan, else members that were too few for a task before."""
+        if self._queue:
+            return self._queue.popleft()
         self._unseen = max(self._unseen - 1, 0)
-        return next(self._runs, None)
+        if (item := next(self._runs, None)) is not None:
+            return _Run(*item, family=item[1].family)
+        return self._families.pop(next(iter(self._families))) if self._families else None
 
-    def _looked_up(self, index: int, planned: PlannedRun) -> _Attempt | _MemberGroup | None:
-        """Return a planned run that must be made, as a job or in a full group of members.
+    def _looked_up(self, run: _Run) -> _Run | _Members | None:
+        """Look a planned run up; return it if it is ready, or a full group of members.
 
-        None if it is stored, which is reported, if an equal run is running, or if its group is not full yet.
+        None if it is stored, which is reported, if it waits for an equal run, or if it is collected.
         """
-        store = self._store
+        store, planned = self._store, run.planned
         if store is not None and planned.plan_key is not None:
             found = store.find_planned(planned.plan_key)
             if found is not None and is_sufficient(found, self._options) and store.fault_of_file(found) is None:
                 file = store.file(found)
-                self._report_stored(index, RunRecord(planned.label, planned.values, found, file, repeated=True))
+                self._report(run, RunRecord(planned.label, planned.values, found, file, repeated=True))
                 return None
-        if planned.family is not None and planned.family not in self._ordinary_families:
-            return self._collected(index, planned, planned.family)
-        if store is None:
-            return _Attempt(index, planned.job(), self._options)
+        if run.family is not None and run.family not in self._ordinary_families:
+            return self._collected(run, run.family)
         job = planned.job()
+        if store is None:
+            return replace(run, job=job, options=self._options)
         run_id = identify(job)[1]
-        if run_id in self._running:
-            self._equal.setdefault(run_id, []).append((index, planned))
+        if run_id in self._waiting:
+            self._waiting[run_id].append(run)
             return None
         job = replace(job, run_id=run_id)
         record = fetch(job, store, self._options)
         if isinstance(record, RunRecord):
-            self._report_stored(index, record)
+            self._report(run, record)
             return None
-        self._running.add(run_id)
-        return _Attempt(index, job, with_earlier_audit(job, store, self._options), record)
+        self._waiting[run_id] = []
+        return replace(run, job=job, options=with_earlier_audit(job, store, self._options), damaged=record)
 
-    def _collected(self, index: int, planned: PlannedRun, family: str) -> _MemberGroup | None:
+    def _collected(self, run: _Run, family: str) -> _Members | None:
         """Add a run to the members of its family, and return a group that is full or has waited for long."""
-        group = self._families.setdefault(family, _MemberGroup())
-        group.runs.append((index, planned))
+        group = self._families.setdefault(family, _Members([]))
+        group.runs.append(run)
         left = (self._unseen + len(group.runs)) / (2 * self._executor.slots)
         if len(group.runs) >= max(min(math.ceil(left), MAX_MEMBERS), MIN_MEMBERS):
             return self._families.pop(family)
@@ -301,8 +328,9 @@ class Driver:
             return self._families.pop(next(iter(self._families)))
         return None
 
-    def _report_stored(self, index: int, record: RunRecord) -> None:
-        self._done(Result(index, record, self._options))
+    def _report(self, run: _Run, record: RunRecord) -> None:
+        """Report a run that is done."""
+        self._done(Result(run.index, record, self._options))
 
     def _handle(self, future: "Future[tuple[JobOutcome, ...]]") -> None:
         """Store the outcomes of a task, and queue what was lost again."""
@@ -321,80 +349,81 @@ class Driver:
             raise ExecutorError("the tasks were cancelled") from None
         except Exception as error:
             raise ExecutorError(f"a worker cannot run tasks: {type(error).__name__}: {str(error)[:300]}") from error
-        if isinstance(group, _MemberGroup):
+        if isinstance(group, _Members):
             self._complete_members(group, outcomes, is_lost=lost is not None)
             return
-        for attempt, outcome in zip(group, outcomes, strict=False):
+        for run, outcome in zip(group, outcomes, strict=False):
             assert outcome is not None
-            self._complete(attempt, outcome)
+            self._complete(run, outcome)
         if lost is not None:
             self._requeue(group[len(outcomes) :], lost)
 
-    def _complete_members(self, group: _MemberGroup, outcomes: tuple[JobOutcome, ...], is_lost: bool) -> None:
+    def _complete_members(self, group: _Members, outcomes: tuple[JobOutcome, ...], is_lost: bool) -> None:
         """Store the members of a task that were computed, and queue the others as ordinary runs."""
-        family, first = group.runs[0][1].family, group.runs[0][1]
+        family, first = group.runs[0].family, group.runs[0].planned
         assert family is not None
-        completed = [
-            (index, planned, outcome)
-            for (index, planned), outcome in zip(group.runs, outcomes, strict=False)
-            if isinstance(outcome, CompletedRun)
-        ]
+        pairs = zip(group.runs, outcomes, strict=False)
+        completed = [(run, outcome.stored) for run, outcome in pairs if isinstance(outcome, CompletedRun)]
         with defer_interrupt():
             if self._store is not None:
                 try:
-                    self._store.add_rows([(run.stored, dict(planned.values)) for _, planned, run in completed])
+                    self._store.add_rows([(stored, dict(run.planned.values)) for run, stored in completed])
                 except StoreError as error:
                     raise JobError(first.label, error) from error
-            for index, planned, run in completed:
-                record = RunRecord(planned.label, planned.values, run.stored, None, repeated=False)
-                self._done(Result(index, record, self._options))
+            for run, stored in completed:
+                self._report(run, RunRecord(run.label, run.planned.values, stored, None, repeated=False))
         if len(completed) > 1:
             self._computed(first.label, first.engine)
         elif not is_lost and len(group.runs) > 1:
             self._ordinary_families.add(family)
-        done = {index for index, _, _ in completed}
-        self._due.extend((index, replace(planned, family=None)) for index, planned in group.runs if index not in done)
+        done = {run.index for run, _ in completed}
+        self._queue.extend(replace(run, family=None) for run in group.runs if run.index not in done)
 
-    def _requeue(self, rest: list[_Attempt], lost: TaskLostError) -> None:
-        """Queue the jobs of a lost task again, each in a task of its own if any of them may be the cause."""
+    def _requeue(self, rest: list[_Run], lost: TaskLostError) -> None:
+        """Queue the runs of a lost task again, each in a task of its own if any of them may be the cause."""
         guilty = rest[0] if rest and (lost.knows_job or len(rest) == 1) else None
-        for attempt in reversed(rest if guilty is None else rest[1:]):
-            attempt.is_suspect |= guilty is None
-            self._again.appendleft(attempt)
+        for run in reversed(rest if guilty is None else rest[1:]):
+            run.is_suspect |= guilty is None
+            self._queue.appendleft(run)
         if guilty is None:
             return
         guilty.deaths += 1
         guilty.is_suspect = True
         if lost.is_timeout or lost.is_final:
-            self._store_run(guilty, failed_run(guilty.job, lost.reason))
+            self._store_failure(guilty, lost.reason)
         elif guilty.deaths < ATTEMPTS:
-            self._again.appendleft(guilty)
+            self._queue.appendleft(guilty)
         else:
-            remedy = "; if memory is the cause, use fewer workers" if "SIGKILL" in lost.reason else ""
-            reason = f"{lost.reason}, in the last of {ATTEMPTS} attempts{remedy}"
-            self._store_run(guilty, failed_run(guilty.job, reason))
+            remedy = "; if memory is the cause, use fewer workers" if lost.was_killed else ""
+            self._store_failure(guilty, f"{lost.reason}, in the last of {ATTEMPTS} attempts{remedy}")
 
-    def _complete(self, attempt: _Attempt, outcome: CompletedRun | JobFailure) -> None:
+    def _complete(self, run: _Run, outcome: CompletedRun | JobFailure) -> None:
+        """Store the outcome of a run."""
         if isinstance(outcome, CompletedRun):
             self._times.append(outcome.elapsed)
-            self._store_run(attempt, outcome)
+            self._store_run(run, outcome)
         elif outcome.error is not None:
-            raise JobError(attempt.job.label, outcome.error)
+            raise JobError(run.label, outcome.error)
         else:
-            self._store_run(attempt, failed_run(attempt.job, outcome.reason))
+            self._store_failure(run, outcome.reason)
 
-    def _store_run(self, attempt: _Attempt, completed: CompletedRun) -> None:
+    def _store_failure(self, run: _Run, reason: str) -> None:
+        """Store a run that failed, with the reason."""
+        assert run.job is not None
+        self._store_run(run, failed_run(run.job, reason))
+
+    def _store_run(self, run: _Run, completed: CompletedRun) -> None:
         """Store a run and report it; no interrupt comes between the two."""
+        assert run.job is not None
         with defer_interrupt():
             if self._store is None:
-                stored, run = completed.stored, completed.trajectory
-                record = RunRecord.of(attempt.job, stored, None, repeated=False, computed=run)
+                stored, trajectory = completed.stored, completed.trajectory
+                record = RunRecord.of(run.job, stored, None, repeated=False, computed=trajectory)
             else:
                 try:
-                    record = store_run(self._store, attempt.job, completed, attempt.damaged)
+                    record = store_run(self._store, run.job, completed, run.damaged)
                 except StoreError as error:
-                    raise JobError(attempt.job.label, error) from error
-            if attempt.job.run_id is not None:
-                self._running.discard(attempt.job.run_id)
-                self._due.extend(self._equal.pop(attempt.job.run_id, ()))
-            self._done(Result(attempt.index, record, self._options))
+                    raise JobError(run.label, error) from error
+            if run.job.run_id is not None:
+                self._queue.extend(self._waiting.pop(run.job.run_id, ()))
+            self._report(run, record)

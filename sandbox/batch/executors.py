@@ -33,6 +33,7 @@ class TaskLostError(Exception):
         is_timeout: bool = False,
         knows_job: bool = False,
         is_final: bool = False,
+        was_killed: bool = False,
     ) -> None:
         """Describe the loss.
 
@@ -42,10 +43,11 @@ class TaskLostError(Exception):
             is_timeout: the time limit was exceeded.
             knows_job: the job after the outcomes was running; otherwise any of the others was.
             is_final: the executor has tried the task several times.
+            was_killed: SIGKILL ended the process, as it does where memory is short.
         """
         super().__init__(reason)
         self.reason, self.outcomes, self.knows_job = reason, outcomes, knows_job
-        self.is_timeout, self.is_final = is_timeout, is_final
+        self.is_timeout, self.is_final, self.was_killed = is_timeout, is_final, was_killed
 
 
 class VersionMismatchError(Exception):

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from sandbox.arrays import FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.batch.job import CompletedRun, Job, RunOptions, Values, identify, run_job
 from sandbox.batch.run_row import state_documents
 from sandbox.batch.start_states import StartStates
@@ -26,6 +26,7 @@ from sandbox.measure.run.ensemble import run_members
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import Override, SceneText
 from sandbox.trajectory import Contacts, Frame, Trajectory
@@ -101,45 +102,56 @@ def _member_rows(
     if _state_hash(frame, ends, 0) != pilot.state_hash:
         return None
     seconds = (perf_counter() - began) / len(task.members)
-    return _rows(task, states, job, pilot, (starts, ends), frame, is_done.tolist(), seconds)
+    return _ComputedMembers(task, states, pilot, starts, ends, frame, is_done, seconds).rows(identify(job)[0])
 
 
-def _rows(
-    task: MemberTask,
-    states: StartStates,
-    job: Job,
-    pilot: StoredRun,
-    state: tuple[Members, Members],
-    frame: Frame,
-    is_done: list[bool],
-    seconds: float,
-) -> Iterator[CompletedRun | None]:
-    """Yield the runs of a task after the first one; None for one that was not computed."""
-    _, ends = state
-    setup, settings = Setup.of(states.scene), identify(job)[0]
-    energy_start, energy_end = (_energies(setup, each).tolist() for each in state)
-    details = json.loads(pilot.details or "{}")
-    for m, member in enumerate(task.members[1:], 1):
-        if not is_done[m]:
-            yield None
-            continue
-        document = states.scene_document(member.where)
-        seed = int(document.get("world", {}).get("seed", 0))
-        columns = {name: getattr(ends, name)[m] for name in Members._fields}
-        row = replace(
-            pilot,
-            id=id_of_document(document, task.engine, settings, seed, versions(task.engine)),
-            scene_hash=hash_of(document),
-            seed=seed,
-            seconds=seconds,
-            energy_start=energy_start[m],
-            energy_end=energy_end[m],
-            set_values=dump_json(dict(member.values)),
-            state_hash=_state_hash(frame, ends, m),
-            plan_key=member.plan_key,
-            details=dump_json({**details, "final": state_documents(setup.bodies.names, columns)}),
-        )
-        yield CompletedRun(row, None, seconds)
+@dataclass(frozen=True, eq=False)
+class _ComputedMembers:
+    """The runs of a task, computed in one call."""
+
+    task: MemberTask
+    states: StartStates
+    pilot: StoredRun
+    """row of the first run, the model for the others"""
+    starts: Members
+    ends: Members
+    frame: Frame
+    """end of a run: its time, and what is the same for all"""
+    is_done: BoolArray
+    """(M,) whether each run was computed"""
+    seconds: float
+    """s, computing time of a run"""
+
+    def rows(self, settings: Settings) -> Iterator[CompletedRun | None]:
+        """Yield the runs after the first one; None for one that was not computed.
+
+        Args:
+            settings: settings as the engine resolves them.
+        """
+        setup, engine = Setup.of(self.states.scene), self.task.engine
+        energy_start, energy_end = (_energies(setup, each).tolist() for each in (self.starts, self.ends))
+        details = json.loads(self.pilot.details or "{}")
+        for m, member in enumerate(self.task.members[1:], 1):
+            if not self.is_done[m]:
+                yield None
+                continue
+            document = self.states.scene_document(member.where)
+            seed = int(document.get("world", {}).get("seed", 0))
+            columns = {name: getattr(self.ends, name)[m] for name in Members._fields}
+            row = replace(
+                self.pilot,
+                id=id_of_document(document, engine, settings, seed, versions(engine)),
+                scene_hash=hash_of(document),
+                seed=seed,
+                seconds=self.seconds,
+                energy_start=energy_start[m],
+                energy_end=energy_end[m],
+                set_values=dump_json(dict(member.values)),
+                state_hash=_state_hash(self.frame, self.ends, m),
+                plan_key=member.plan_key,
+                details=dump_json({**details, "final": state_documents(setup.bodies.names, columns)}),
+            )
+            yield CompletedRun(row, None, self.seconds)
 
 
 def _state_hash(frame: Frame, ends: Members, m: int) -> str:

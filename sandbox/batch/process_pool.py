@@ -124,7 +124,7 @@ class ProcessExecutor:
                 if worker.wait_until_ready():
                     self._failed_starts = 0
                     return worker
-                cause = worker.cause_of_death()
+                cause = exit_text(worker.exit_code())
                 self._forget(worker)
             with self._lock:
                 self._failed_starts += 1
@@ -198,16 +198,18 @@ class _Worker:
                     raise content
                 outcomes.append(content)
         except (EOFError, OSError):  # an end in the middle of a message is an OSError
-            raise TaskLostError(self.cause_of_death(), tuple(outcomes), knows_job=True) from None
+            code = self.exit_code()
+            was_killed = hasattr(signal, "SIGKILL") and code == -signal.SIGKILL
+            raise TaskLostError(exit_text(code), tuple(outcomes), knows_job=True, was_killed=was_killed) from None
 
-    def cause_of_death(self) -> str:
-        """Return how the process has ended; it is killed if it has only closed its pipe."""
+    def exit_code(self) -> int:
+        """Return the exit code of the process, which has ended; it is killed if it has only closed its pipe."""
         self.process.join(EXIT_TIME)
         if self.process.exitcode is None:
             self.process.kill()
             self.process.join()
         assert self.process.exitcode is not None
-        return exit_text(self.process.exitcode)
+        return self.process.exitcode
 
     def close(self) -> None:
         """End the process."""

@@ -20,10 +20,12 @@ from sandbox.cli.common import (
     suggest_names,
 )
 from sandbox.cli.options import (
+    POSITIVE,
     OutputOptions,
     json_option,
     quiet_option,
     set_option,
+    takes,
     time_limit_option,
 )
 from sandbox.cli.progress import status_line
@@ -115,9 +117,6 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]  # generic in newer v
         return number, unit
 
 
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Options(OutputOptions):
     """The command line as typed; None for an option that was left out."""
@@ -198,7 +197,8 @@ class _Options(OutputOptions):
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILE", help="write the advice as an HTML page")
 @json_option
 @quiet_option()
-def advise_command(**given: Any) -> int:
+@takes(_Options)
+def advise_command(options: _Options) -> int:
     """Answer which dt, how many iterations and which engine a game needs.
 
     Prints the forecast and the measured error of the present setting, the cheapest setting within the tolerance, the
@@ -206,7 +206,6 @@ def advise_command(**given: Any) -> int:
     are considered step once a frame, dt = 1/fps, with substeps. SCENE|RECORDING is a scene file, the name of a shipped
     scene, or a recorded session (.json). Exit status 1: no setting is within the tolerance and the budget.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     if options.engine is not None:
         with collect_errors(faults, "--engine", (UnknownEngineError,)):

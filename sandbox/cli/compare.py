@@ -1,6 +1,5 @@
 """Command `compare` and its table."""
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from sandbox.cli.common import (
 )
 from sandbox.cli.minimise import faults_of, minimised
 from sandbox.cli.options import (
+    POSITIVE,
     OutputOptions,
     engines_option,
     json_option,
@@ -29,6 +29,7 @@ from sandbox.cli.options import (
     quiet_option,
     set_option,
     sweep_option,
+    takes,
     verbose_option,
 )
 from sandbox.cli.progress import status_line
@@ -220,7 +221,7 @@ class _Request(NamedTuple):
 @sweep_option
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=POSITIVE,
     metavar="M",
     help="position error at which a run counts as diverged, m; default: 1 % of the smallest ball's radius",
 )
@@ -242,7 +243,8 @@ class _Request(NamedTuple):
 @json_option
 @verbose_option
 @quiet_option()
-def compare_command(**given: Any) -> int:
+@takes(_Options)
+def compare_command(options: _Options) -> int:
     """Run a scene on several engines, or with several values, and measure each error against the best known truth.
 
     SCENE is a file, the name of a shipped scene, or a recorded session (.json), whose scene is compared without its
@@ -250,7 +252,6 @@ def compare_command(**given: Any) -> int:
     the event-driven engine, or a run with ever smaller steps. Exit status 1: an engine failed, diverged, or refused the
     scene although it was named.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     request = _checked(options, faults)
     comparison: Comparison | None = None
@@ -299,8 +300,6 @@ def _checked(options: _Options, faults: list[Fault]) -> _Request:
         read = read_scene(options.scene)
         path, remarks = read.path, read.remarks
         variants = _variants(options.scene, options.overrides, axes)
-    if options.tolerance is not None and not math.isfinite(options.tolerance):
-        faults.append(Fault.of("--tolerance", f"is {options.tolerance} m; it must be finite"))
     with collect_errors(faults):
         require_folder(options.out)
     smallest = None

@@ -1,11 +1,9 @@
 """Command `extremes` and its tables."""
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -22,12 +20,14 @@ from sandbox.cli.common import (
     write_json,
 )
 from sandbox.cli.options import (
+    Finite,
     OutputOptions,
     engines_option,
     json_option,
     out_option,
     quiet_option,
     set_option,
+    takes,
     workers_option,
 )
 from sandbox.cli.progress import ProgressBar, progress_bars
@@ -153,7 +153,7 @@ MIN_MEMORY = 1024
 @click.option("--pairs/--no-pairs", default=True, help="also vary two axes at once")
 @click.option(
     "--timeout",
-    type=click.FloatRange(0.1, 86_400.0),
+    type=Finite(0.1, 86_400.0),
     default=SAMPLE_SECONDS,
     metavar="S",
     help="time limit of each cell, s",
@@ -175,12 +175,12 @@ MIN_MEMORY = 1024
 )
 @json_option
 @quiet_option("print no tables and no progress")
-def extremes_command(**given: Any) -> int:
+@takes(_Options)
+def extremes_command(options: _Options) -> int:
     """Increase one parameter at a time, and pairs of them, until each engine fails, and report the boundaries.
 
     Each cell runs in a worker process with a time and a memory limit, so a crash does not stop the command.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     plan = _plan(options, faults)
     stored = None
@@ -207,8 +207,6 @@ def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
     """Return the plan of the command line; add its errors to the faults."""
     chosen = _axes(options.axes, faults)
     names = parse_engines(options.engines, faults)
-    if not math.isfinite(options.timeout):
-        faults.append(Fault.of("--timeout", f"is {options.timeout} s; it must be finite"))
     with collect_errors(faults):
         check_overrides(options.overrides, chosen)
     cases = {axis.case.name for axis in chosen}

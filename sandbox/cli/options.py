@@ -1,7 +1,9 @@
 """Options shared by several commands, each with one spelling and one help text."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -19,6 +21,37 @@ class OutputOptions:
     def is_silent(self) -> bool:
         """Whether neither progress nor results as text are printed."""
         return self.quiet or self.as_json
+
+
+Options = TypeVar("Options")
+
+
+def takes(options: type[Options]) -> Callable[[Callable[[Options], int]], Callable[..., int]]:
+    """Return a decorator of a command: it gets its parameters as one value of a dataclass with a field for each."""
+
+    def decorate(command: Callable[[Options], int]) -> Callable[..., int]:
+        @wraps(command)
+        def call(**given: Any) -> int:
+            return command(options(**given))
+
+        return call
+
+    return decorate
+
+
+class Finite(click.FloatRange):
+    """Range of numbers that contains neither nan nor infinity."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number; fail unless it is finite and within the range."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not finite; the range is {self._describe_range()}.", param, ctx)
+        return number
+
+
+POSITIVE = Finite(min=0.0, min_open=True)
+NOT_NEGATIVE = Finite(min=0.0)
 
 
 CommandFunction = TypeVar("CommandFunction", bound=Callable[..., Any])
@@ -77,5 +110,4 @@ def workers_option(default: int | None, text: str) -> Decorator:
 
 def time_limit_option(text: str) -> Decorator:
     """Return `--time-limit S`, also spelled `--patience`."""
-    seconds = click.FloatRange(min=0.0, min_open=True)
-    return click.option("--time-limit", "--patience", "time_limit", type=seconds, metavar="S", help=text)
+    return click.option("--time-limit", "--patience", "time_limit", type=POSITIVE, metavar="S", help=text)

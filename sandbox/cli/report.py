@@ -1,9 +1,8 @@
 """Command `report`: one page on many scenes, each compared on every engine."""
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -14,7 +13,16 @@ from sandbox.cli.common import (
     parse_engines,
     reasons_not_writable,
 )
-from sandbox.cli.options import OutputOptions, engines_option, json_option, quiet_option, set_option, time_limit_option
+from sandbox.cli.options import (
+    NOT_NEGATIVE,
+    OutputOptions,
+    engines_option,
+    json_option,
+    quiet_option,
+    set_option,
+    takes,
+    time_limit_option,
+)
 from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
@@ -75,7 +83,7 @@ class _Report:
 @set_option("set a value of every scene")
 @click.option(
     "--effort",
-    type=click.FloatRange(min=0.0),
+    type=NOT_NEGATIVE,
     default=EFFORT,
     metavar="N",
     help=f"effort of the trade-off search in each scene, about 1 per second of computing; default: {EFFORT:g};"
@@ -88,14 +96,14 @@ class _Report:
 )
 @json_option
 @quiet_option("print no progress and no summary")
-def report_command(**given: Any) -> int:
+@takes(_Options)
+def report_command(options: _Options) -> int:
     """Compare many scenes and write one self-contained HTML page.
 
     SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json), whose scenes are compared
     without their actions; default: all benchmark scenes. A scene takes about 10 s of processor time (11 benchmarks took
     107 s), a quarter of it with --effort 0.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     engines = parse_engines(options.engines, faults)
     remarks: dict[str, tuple[str, ...]] = {}
@@ -146,9 +154,6 @@ def _read_scenes(
             _, scene, remarks[name] = read_scene(name, options.overrides)
             report_remarks(name, remarks[name])
             read.append((name, scene))
-    for flag, value in (("--effort", options.effort), ("--time-limit", options.time_limit)):
-        if value is not None and not math.isfinite(value):
-            faults.append(Fault.of(flag, f"is {value:g}; it must be finite"))
     if not read and not faults:
         faults.append(Fault.of("SCENES", "is missing, and there are no shipped benchmark scenes; name some scenes"))
     return read

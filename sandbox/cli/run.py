@@ -42,6 +42,7 @@ from sandbox.cli.options import (
     quiet_option,
     set_option,
     sweep_option,
+    takes,
     time_limit_option,
     verbose_option,
     workers_option,
@@ -147,13 +148,13 @@ class _Options(OutputOptions):
 @json_option
 @verbose_option
 @quiet_option()
-def run_command(**given: Any) -> int:
+@takes(_Options)
+def run_command(options: _Options) -> int:
     """Run scenes without a window and print the results.
 
     SCENES are files, folders of files, names of shipped scenes, recorded sessions (.json), or one study file, which
     names scenes and sweeps. Exit status 1: a run diverged or failed, or the engine refused the scene.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     study = _study(options, faults)
     plan = None if study is None else _plan(study, options, faults)

@@ -22,7 +22,7 @@ from sandbox.batch.query import (
 )
 from sandbox.batch.store import StoreError
 from sandbox.cli.common import collect_errors, exit_with_errors, parse_names, plural, require_plot_file
-from sandbox.cli.options import OutputOptions, json_option, quiet_option
+from sandbox.cli.options import OutputOptions, json_option, quiet_option, takes
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import new_table, print_line, print_table
 from sandbox.jsonable import in_json, to_json
@@ -125,13 +125,13 @@ class StoredRunsDocument:
 @click.option("--csv", "as_csv", is_flag=True, help="print comma-separated values on standard output")
 @json_option
 @quiet_option("print nothing but errors")
-def runs_command(**given: Any) -> int:
+@takes(_Options)
+def runs_command(options: _Options) -> int:
     """List, filter, group and plot the runs that `sandbox run … --out FOLDER` has stored.
 
     KEY, NAME: columns, such as status, seconds or contacts, and the paths of values that were set or swept, such as
     solver.dt or ball.cue.velocity.
     """
-    options = _Options(**given)
     faults = _option_faults(options)
     runs: StoredRuns | None = None
     if not faults:

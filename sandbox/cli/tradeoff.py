@@ -1,11 +1,9 @@
 """Command `tradeoff` and its tables."""
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -19,6 +17,8 @@ from sandbox.cli.common import (
     write_json,
 )
 from sandbox.cli.options import (
+    NOT_NEGATIVE,
+    POSITIVE,
     OutputOptions,
     engines_option,
     json_option,
@@ -26,6 +26,7 @@ from sandbox.cli.options import (
     plot_option,
     quiet_option,
     set_option,
+    takes,
     time_limit_option,
     verbose_option,
 )
@@ -243,7 +244,6 @@ def _indented(lines: Sequence[str]) -> list[str]:
 
 
 DEFAULT_FPS = 60.0
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,9 +278,7 @@ class _Options(OutputOptions):
     metavar="NAME",
     help=f"measure of the error; default: chosen from the scene. One of {', '.join(METRICS)}",
 )
-@click.option(
-    "--tolerance", type=click.FloatRange(min=0.0), metavar="X", help="largest allowed error, in the unit of the metric"
-)
+@click.option("--tolerance", type=NOT_NEGATIVE, metavar="X", help="largest allowed error, in the unit of the metric")
 @click.option("--budget", type=POSITIVE, metavar="MS", help="computing time per frame that is available, ms")
 @click.option(
     "--fps",
@@ -326,7 +324,8 @@ class _Options(OutputOptions):
 @json_option
 @verbose_option
 @quiet_option()
-def tradeoff_command(**given: Any) -> int:
+@takes(_Options)
+def tradeoff_command(options: _Options) -> int:
     """Measure error against cost over engines and settings, and recommend a setting.
 
     SCENE is a file, the name of a shipped scene, or a recorded session (.json), whose scene is measured without its
@@ -335,10 +334,9 @@ def tradeoff_command(**given: Any) -> int:
     counted work decides which is cheaper. Exit status 1: no setting is within the tolerance or the budget; the nearest
     is shown.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     names = parse_engines(options.engines, faults)
-    _check_numbers(options, faults)
+    _check_metric(options, faults)
     path, read, remarks = _read(options, faults)
     found: Tradeoff | None = None
     if read is not None and not faults:
@@ -382,25 +380,13 @@ def tradeoff_command(**given: Any) -> int:
     return max(status, _write_results(found, document, path, options))
 
 
-def _check_numbers(options: _Options, faults: list[Fault]) -> None:
-    """Add numbers out of range, and an unknown metric, to the faults."""
+def _check_metric(options: _Options, faults: list[Fault]) -> None:
+    """Add an unknown metric, and a tolerance that it cannot have, to the faults."""
     with collect_errors(faults, "--metric", (UnknownMetricError,)):
         check_objective(options.metric, None, None, DEFAULT_FPS)
     known = options.metric if options.metric in METRICS else None
-    for flag, figures in (
-        ("--tolerance", (known, options.tolerance, None, DEFAULT_FPS)),
-        ("--budget", (None, None, options.budget, DEFAULT_FPS)),
-        ("--fps", (None, None, None, options.fps)),
-    ):
-        with collect_errors(faults, flag, (ValueError,)):
-            check_objective(*figures)
-    for flag, value in (
-        ("--zoom", options.zoom),
-        ("--effort", options.effort),
-        ("--time-limit", options.time_limit),
-    ):
-        if value is not None and not math.isfinite(value):
-            faults.append(Fault.of(flag, f"is {value:g}; it must be positive and finite"))
+    with collect_errors(faults, "--tolerance", (ValueError,)):
+        check_objective(known, options.tolerance, None, DEFAULT_FPS)
 
 
 def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None, tuple[str, ...]]:

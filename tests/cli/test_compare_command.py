@@ -76,11 +76,11 @@ def test_run_that_diverges_is_status_1(tmp_path: Path, capfd: pytest.CaptureFixt
 def test_all_faults_are_reported_together(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "taken").write_text("")
     scene = write_scene(tmp_path, FAULTY)
-    arguments = ("compare", scene, "--engines", "nope,pymunk", "--out", str(tmp_path / "taken"), "--tolerance", "inf")
+    arguments = ("compare", scene, "--engines", "nope,pymunk", "--out", str(tmp_path / "taken"), "--force")
     status, document, err = json_of(capfd, *arguments)
     assert (status, document["engines"], document["truth"]) == (2, [], None)
     assert len(err) == len(document["faults"]) == 5
-    assert [line.split(":")[0] for line in err] == ["--engine", scene, scene, "--tolerance", "--out"]
+    assert [line.split(":")[0] for line in err] == ["--engine", scene, scene, "--out", "--force"]
 
 
 def test_sweeps_with_more_than_10_to_the_3000_runs_are_refused(capsys):

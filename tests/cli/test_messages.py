@@ -75,15 +75,15 @@ compare drop.toml --sweep solver.integratr=rk4 → integratr
 compare drop.toml --sweep world.duration=0.1,0.2 --out x → --out
 compare drop.toml --sweep solver.dt=0.1,0.2 --minimise → --minimise
 compare drop.toml --set world.duration=900000 --set solver.dt=0.001 --engine pymunk → GB
-tradeoff drop.toml --tolerance nan → --tolerance:
+tradeoff drop.toml --tolerance nan → is not finite
 tradeoff drop.toml --tolerance -1 → --tolerance
-tradeoff drop.toml --budget inf → --budget:
+tradeoff drop.toml --budget inf → is not finite
 tradeoff drop.toml --budget 0 → --budget
-tradeoff drop.toml --fps inf → --fps:
-tradeoff drop.toml --zoom nan → --zoom:
+tradeoff drop.toml --fps inf → is not finite
+tradeoff drop.toml --zoom nan → is not finite
 tradeoff drop.toml --zoom -1 → --zoom
-tradeoff drop.toml --time-limit inf → --time-limit:
-tradeoff drop.toml --effort inf → --effort:
+tradeoff drop.toml --time-limit inf → is not finite
+tradeoff drop.toml --effort inf → is not finite
 tradeoff drop.toml --seeds 0 → --seeds
 tradeoff drop.toml --points 0 → --points
 tradeoff drop.toml --set world.duration=0.1 --write → --write:
@@ -102,8 +102,8 @@ advise none.json → none.json
 advise run.npz → run.npz
 report drop.toml → --out
 report drop.toml --out drop.toml/a.html → --out:
-report drop.toml --out a.html --effort inf → --effort: is inf
-report drop.toml --out a.html --patience inf → --time-limit: is inf
+report drop.toml --out a.html --effort inf → is not finite
+report drop.toml --out a.html --patience inf → is not finite
 shots drop.toml → no [[shot]]
 shots 9-ball --window '12:upper left pocket' → --window: no ball is named '12'
 shots 9-ball --window cue:near → --window: no pocket is named 'near'
