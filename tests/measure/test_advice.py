@@ -10,7 +10,7 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.advice import Advice, advise, replays, scoring
+from sandbox.measure.advice import Advice, advise, scoring, study
 from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.advice.text import fallback_head
 from sandbox.measure.compare.ground_truth import truth_of
@@ -252,7 +252,7 @@ def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() ->
 
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bullet becomes so fast that no number of substeps that is tried stops it."""
-    monkeypatch.setattr(replays, "MAX_DOUBLINGS", 1)
+    monkeypatch.setattr(study, "MAX_DOUBLINGS", 1)
     scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.1, 0.0]")
     push = Impulse(time=0.05, body="bullet", impulse=(9e3, 0.0))  # of 1 kg
     advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2), **QUICK)

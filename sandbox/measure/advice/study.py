@@ -5,10 +5,11 @@ a game steps once a frame and substeps divide the step.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from sandbox.action import Switch
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.assembly import (
@@ -18,12 +19,13 @@ from sandbox.measure.advice.assembly import (
     settings_change,
 )
 from sandbox.measure.advice.forecast import forecast, game_notes
-from sandbox.measure.advice.replays import replay_actions
-from sandbox.measure.advice.result import Advice, FallbackKind
+from sandbox.measure.advice.result import Advice, FallbackKind, ReplayedActions
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
+from sandbox.measure.advice.text import setting_text
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
-from sandbox.measure.run.recorder import require_memory
+from sandbox.measure.run.recorder import TooLargeError, require_memory
+from sandbox.measure.run.runner import run
 from sandbox.measure.run.sessions import recorded_scene
 from sandbox.measure.seeds import is_random
 from sandbox.measure.tradeoff.configuration import (
@@ -37,6 +39,7 @@ from sandbox.measure.tradeoff.configuration import (
 from sandbox.measure.tradeoff.objective import Objective
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
+    by_cost,
     nearest_to_tolerance,
     recommend_cheapest,
     recommend_most_accurate,
@@ -61,6 +64,8 @@ MIN_FPS, MAX_FPS = 0.1, 1e6
 """Bounds of the frame rate: dt = 1/fps must be a valid setting."""
 SEARCH_REPEATS = 2
 """Timings of a setting during the search; the settings of the advice are then timed again, all in turns."""
+MAX_REPLAYS, MAX_DOUBLINGS = 4, 4
+"""Settings that were tried, and settings with twice the substeps each time, that are replayed if one misses contacts"""
 
 
 def advise(
@@ -159,7 +164,7 @@ def _advise(request: AdviceRequest) -> Advice:
         if not measured.interrupted:
             _turn_knobs(request, score, measured)
             _find_excess(request, score, measured)
-            replay_actions(request, score, measured)
+            _replay_actions(request, score, measured)
             _time_settings(request, measured)
     except KeyboardInterrupt:
         measured.interrupted = True
@@ -309,3 +314,62 @@ def _time_settings(request: AdviceRequest, measured: AdviceMeasurements) -> None
         for each, timing in zip(successful, timings, strict=True)
         if timing is not None
     }
+
+
+def _replay_actions(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> None:
+    """Run the present and the recommended setting with the actions of a recording.
+
+    A setting that misses contacts then is not recommended; the next dearer one is.
+    """
+    if request.recording is None or not request.recording.actions:
+        return
+    if measured.present.status != "refused":
+        _replay(request, measured, "present", measured.present)
+    for candidate in _candidates(request, score, measured):
+        if _replay(request, measured, "recommended", candidate):
+            measured.recommended = candidate
+            return
+        measured.replays[-1] = replace(measured.replays[-1], setting="rejected")
+    if measured.recommended is not None:
+        measured.fallback, measured.fallback_kind, measured.recommended = measured.recommended, "actions", None
+    elif measured.fallback is not None:
+        _replay(request, measured, "fallback", measured.fallback)
+
+
+def _candidates(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> Iterator[Evaluation]:
+    """Yield the recommended setting, dearer ones that were tried, and the last of them with more substeps."""
+    if measured.recommended is None or measured.found is None:
+        return
+    tried = [*measured.found.points, *measured.knobs]
+    within = by_cost([each for each in tried if each.engine == request.engine and each.meets(score.tolerance)])
+    keys = [evaluation_key(each) for each in within]
+    begin = keys.index(evaluation_key(measured.recommended)) + 1 if evaluation_key(measured.recommended) in keys else 0
+    last = measured.recommended
+    yield last
+    for last in within[begin : begin + MAX_REPLAYS]:
+        yield last
+    space = SearchSpace(request.scene, request.loop, (request.engine,), request.frame, has_fixed_dt=True)
+    for _ in range(MAX_DOUBLINGS):
+        finer = replace(last.configuration, substeps=2 * last.configuration.substeps)
+        if not space.is_valid(finer) or clock_without_compilation() > request.deadline:
+            return
+        limit = 2.0 * RUN_FRACTION * request.effort
+        last = evaluate(finer, space, [score.context], score.metric, score.tolerance, limit, request.deadline)
+        if last.meets(score.tolerance):
+            yield last
+
+
+def _replay(request: AdviceRequest, measured: AdviceMeasurements, name: str, point: Evaluation) -> bool:
+    """Run a setting with the actions of the recording; return whether it reaches the end without a missed contact."""
+    assert request.recording is not None
+    request.on_progress(Progress(f"the recording with the {name} setting"))
+    actions = tuple(each for each in request.recording.actions if not isinstance(each, Switch))
+    text = setting_text(point, request.fps)
+    try:
+        found = run(request.scene, request.engine, actions=actions, **point.asked.model_dump())
+    except TooLargeError as error:
+        measured.replays.append(ReplayedActions(name, text, "failed", str(error), None))
+        return False
+    missed = found.missed_contacts if found.status == "ok" else None
+    measured.replays.append(ReplayedActions(name, text, found.status, found.reason, missed))
+    return found.status == "ok" and not missed

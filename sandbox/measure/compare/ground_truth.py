@@ -99,6 +99,16 @@ class _Agreement(NamedTuple):
     """m, largest distance from the result"""
 
 
+@dataclass
+class _Budget:
+    """Cost of the second methods."""
+
+    remaining: float
+    """s, counted cost that is left"""
+    work: int = 0
+    """bodies × steps of all runs"""
+
+
 def confirm(scene: Scene, found: RefinedRun, settings: Settings, tolerance: float, until: float) -> Confirmation:
     """Return the time up to which a second method and the conservation laws confirm a result.
 
@@ -121,12 +131,11 @@ def confirm(scene: Scene, found: RefinedRun, settings: Settings, tolerance: floa
     else:
         limit = ""
     best: Confirmation | None = None
-    remaining, work = CONFIRMATION_LIMIT, 0
+    budget = _Budget(CONFIRMATION_LIMIT)
     for name, wanted in _second_methods(scene, found, settings):
-        if best is not None and work >= 2.0 * max(WORK_FRACTION * found.work, MIN_WORK):
+        if best is not None and budget.work >= 2.0 * max(WORK_FRACTION * found.work, MIN_WORK):
             break
-        agreement, added, cost = _refine_until_agreement(scene, name, wanted, found, tolerance, until, remaining)
-        work, remaining = work + added, remaining - cost
+        agreement = _refine_until_agreement(scene, name, wanted, found, tolerance, until, budget)
         if agreement is None:
             continue
         by = _method_name(scene, name, wanted, found)
@@ -179,48 +188,53 @@ def _method_name(scene: Scene, name: str, wanted: Settings, found: RefinedRun) -
 
 
 def _refine_until_agreement(
-    scene: Scene, engine: str, settings: Settings, found: RefinedRun, tolerance: float, until: float, limit: float
-) -> tuple[_Agreement | None, int, float]:
-    """Refine a second method until it agrees, contradicts, or exceeds its work; return also its work and counted cost.
+    scene: Scene,
+    engine: str,
+    settings: Settings,
+    found: RefinedRun,
+    tolerance: float,
+    until: float,
+    budget: _Budget,
+) -> _Agreement | None:
+    """Refine a second method until it agrees, contradicts, or exceeds its work, which the budget gets.
 
     The agreement is None if the method does not reach the end of the run.
     """
     moving, converged = ~scene.bodies.fixed, max(CONVERGED_TOLERANCES * tolerance, default_tolerance(scene))
     each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    allowed, work, cost = max(WORK_FRACTION * found.work, (2**MIN_RUNS - 1) * each, MIN_WORK), 0, 0.0
+    allowed = budget.work + max(WORK_FRACTION * found.work, (2**MIN_RUNS - 1) * each, MIN_WORK)
     coarse: Trajectory | None = None
     changed: list[FloatArray] = []
     """by each halving, at each frame, m"""
     agreement: _Agreement | None = None
-    while work + each <= allowed:
+    finer: Settings | None = settings
+    while finer is not None and budget.work + each <= allowed:
+        settings = finer
         try:
-            run, counted = bounded_run(scene, engine, settings, limit - cost)
+            run, cost = bounded_run(scene, engine, settings, budget.remaining)
         except RunTimeoutError:
-            cost = limit
+            budget.remaining = 0.0
             break
-        cost += counted
+        budget.remaining -= cost
         if run.status != "ok":
             break
         away = errors(run, found.trajectory, moving)
-        if coarse is not None:
+        if coarse is None:
+            if not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
+                agreement = _Agreement(until, False, 0.0)
+        else:
             step = errors(run, coarse, moving).position
             before = 0.5 * changed[-1] if changed else step
             fastest = float(np.hypot(*np.moveaxis(run.velocity[run.time <= until], 2, 0)).max(initial=0.0))
             slack = tolerance + CONTRADICTION_CHANGES * np.maximum(step, before) + IMPACT_STEPS * fastest * settings.h
             agreement = _agreement_of(run, away, step, slack, tolerance, converged, until)
-            contradicts = agreement.contradicts and len(changed) + 2 >= MIN_RUNS
-            agreement = agreement._replace(contradicts=contradicts)
-            if agreement.until >= until or contradicts:
-                break
+            agreement = agreement._replace(contradicts=agreement.contradicts and len(changed) + 2 >= MIN_RUNS)
             changed.append(step)
-        elif not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
-            return _Agreement(until, False, 0.0), work + each, cost
-        coarse, work, each = run, work + each, 2 * each
-        finer = halve_step(settings)
-        if finer is None:
+        coarse, each, finer = run, 2 * each, halve_step(settings)
+        budget.work += each // 2
+        if agreement is not None and (agreement.until >= until or agreement.contradicts):
             break
-        settings = finer
-    return agreement, work, cost
+    return agreement
 
 
 def _agreement_of(

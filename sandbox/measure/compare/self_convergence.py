@@ -115,57 +115,112 @@ def preferred_settings(scene: Scene) -> tuple[dict[str, object], ...]:
 def _refine_settings(scene: Scene, engine: str, settings: Settings, tolerance: float) -> RefinedRun | None:
     """Refine one choice of settings; None if the first run does not reach its end."""
     try:
-        coarse, _ = bounded_run(scene, engine, settings, COST_LIMIT / 5.0, audit=False)
-        if coarse.status != "ok":
-            return None
-        # Beyond the time at which a perturbation matters, results need not agree.
-        other = perturb(scene)
-        required, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
+        refinement = _Refinement.begin(scene, engine, settings, tolerance)
     except RunTimeoutError:
         return None
-    remaining = COST_LIMIT
-    work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
-    agrees, halvings, about = 0.0, 0, "dt was not halved further"
-    last: Errors | None = None
-    horizon: float | None = None
-    while halvings < MAX_HALVINGS:
-        each *= 2
-        finer = halve_step(settings)
-        if work + each > MAX_WORK:
-            about = "further halving would take too long"
-            break
-        if finer is None or scene.world.duration / finer.dt > MAX_STEPS:
-            about = "dt cannot be halved further"
-            break
+    about: str | None = None
+    while refinement is not None and about is None:
         try:
-            fine, counted = bounded_run(scene, engine, finer, remaining)
-            remaining -= counted
-            if fine.status != "ok":
-                about = f"the next halving {fine.status}: {fine.reason}"
-                break
-            # Two runs in which a body tunnels through the same wall agree as well.
-            missed = float(np.min(fine.missed_time, initial=np.inf))
-            close = min(agreement_time(fine, coarse, scene, AGREEMENT_FRACTION * tolerance), missed)
-            agrees = min(agreement_time(fine, coarse, scene, tolerance), missed)
-            last = errors(fine, coarse, ~scene.bodies.fixed)
-            coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
-            horizon = None
-            if close >= required:
-                horizon, jumps = _predictable_until(scene, other, engine, settings, coarse, tolerance)
-                required = max(required, horizon)
-                if close >= required and not jumps:  # a jump is proportional to the step
-                    about = f"agrees with the previous halving within {AGREEMENT_FRACTION * tolerance:.2g} m"
-                    break
+            about = refinement.halve()
         except RunTimeoutError:
             about = "further halving would take too long"
-            break
-    try:
+    return None if refinement is None else refinement.result(str(about))
+
+
+@dataclass
+class _Refinement:
+    """Halvings of one choice of settings so far."""
+
+    scene: Scene
+    engine: str
+    settings: Settings
+    """of the finest run"""
+    tolerance: float
+    finest: Trajectory
+    perturbed: Setup | None
+    required: float
+    """s, time up to which two results must agree: beyond the time at which a perturbation matters they need not"""
+    step_work: int
+    """bodies × steps of the finest run"""
+    work: int
+    """bodies × steps of all runs"""
+    remaining: float = COST_LIMIT
+    """s, counted cost that is left"""
+    halvings: int = 0
+    agrees: float = 0.0
+    """s, end of the agreement of the last two runs within the tolerance"""
+    change: Errors | None = None
+    """difference of the last two runs"""
+    horizon: float | None = None
+    """s, predictability horizon of the finest run, if it is known"""
+
+    @classmethod
+    def begin(cls, scene: Scene, engine: str, settings: Settings, tolerance: float) -> "_Refinement | None":
+        """Make the first run; None if it does not reach its end.
+
+        Raises:
+            RunTimeoutError: it costs more than a fifth of `COST_LIMIT`.
+        """
+        first, _ = bounded_run(scene, engine, settings, COST_LIMIT / 5.0, audit=False)
+        if first.status != "ok":
+            return None
+        perturbed = perturb(scene)
+        required, _ = _predictable_until(scene, perturbed, engine, settings, first, tolerance)
+        work = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
+        return cls(scene, engine, settings, tolerance, first, perturbed, required, work, work)
+
+    def halve(self) -> str | None:
+        """Make a run with half the step; return the reason why it is the last one, or None.
+
+        Raises:
+            RunTimeoutError: it costs more than what is left.
+        """
+        scene, finer, work = self.scene, halve_step(self.settings), 2 * self.step_work
+        if self.halvings == MAX_HALVINGS:
+            return "dt was not halved further"
+        if self.work + work > MAX_WORK:
+            return "further halving would take too long"
+        if finer is None or scene.world.duration / finer.dt > MAX_STEPS:
+            return "dt cannot be halved further"
+        run, cost = bounded_run(scene, self.engine, finer, self.remaining)
+        self.remaining -= cost
+        if run.status != "ok":
+            return f"the next halving {run.status}: {run.reason}"
+        # Two runs in which a body tunnels through the same wall agree as well.
+        missed = float(np.min(run.missed_time, initial=np.inf))
+        close_within = AGREEMENT_FRACTION * self.tolerance
+        close = min(agreement_time(run, self.finest, scene, close_within), missed)
+        self.agrees = min(agreement_time(run, self.finest, scene, self.tolerance), missed)
+        self.change = errors(run, self.finest, ~scene.bodies.fixed)
+        self.finest, self.settings, self.step_work = run, finer, work
+        self.halvings, self.work, self.horizon = self.halvings + 1, self.work + work, None
+        if close >= self.required:
+            self.horizon, jumps = self._predictable_until()
+            self.required = max(self.required, self.horizon)
+            if close >= self.required and not jumps:  # a jump is proportional to the step
+                return f"agrees with the previous halving within {close_within:.2g} m"
+        return None
+
+    def result(self, about: str) -> RefinedRun:
+        """Return the finest run.
+
+        Args:
+            about: reason why it was not refined further.
+        """
+        horizon = self.horizon
         if horizon is None:
-            horizon, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
-    except RunTimeoutError:
-        horizon = min(required, agrees)
-    difference = 0.0 if last is None else last.largest("position", min(agrees, horizon)) or 0.0
-    return RefinedRun(engine, settings, halvings, coarse, agrees, about, difference, horizon, work)
+            try:
+                horizon, _ = self._predictable_until()
+            except RunTimeoutError:
+                horizon = min(self.required, self.agrees)
+        end = min(self.agrees, horizon)
+        difference = 0.0 if self.change is None else self.change.largest("position", end) or 0.0
+        return RefinedRun(
+            self.engine, self.settings, self.halvings, self.finest, self.agrees, about, difference, horizon, self.work
+        )
+
+    def _predictable_until(self) -> tuple[float, bool]:
+        return _predictable_until(self.scene, self.perturbed, self.engine, self.settings, self.finest, self.tolerance)
 
 
 def _predictable_until(
