@@ -42,13 +42,13 @@ if TYPE_CHECKING:
     from sandbox.engines.registry import ENGINES as ENGINES, UnknownEngineError as UnknownEngineError
     from sandbox.engines.switching import start as start
     from sandbox.frame_table import FrameTable as FrameTable
-    from sandbox.games.billiards.shots import (
+    from sandbox.measure.shots import (
         horizon as horizon,
         odds as odds,
         sensitivity as sensitivity,
         windows as windows,
     )
-    from sandbox.games.billiards.shots.shot import Spread as Spread
+    from sandbox.measure.shots.shot import Spread as Spread
     from sandbox.measure.compare import compare as compare
     from sandbox.measure.run.ensemble import Ensemble as Ensemble, ensemble as ensemble
     from sandbox.measure.run.runner import run as run
@@ -96,8 +96,8 @@ _NAMES = {
     "sandbox.engines.registry": "ENGINES UnknownEngineError",
     "sandbox.engines.switching": "start",
     "sandbox.frame_table": "FrameTable",
-    "sandbox.games.billiards.shots": "horizon odds sensitivity windows",
-    "sandbox.games.billiards.shots.shot": "Spread",
+    "sandbox.measure.shots": "horizon odds sensitivity windows",
+    "sandbox.measure.shots.shot": "Spread",
     "sandbox.measure.compare": "compare",
     "sandbox.measure.run.ensemble": "Ensemble ensemble",
     "sandbox.measure.run.runner": "run",

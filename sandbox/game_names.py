@@ -13,7 +13,7 @@ import sys
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
-from sandbox.game_spec import Environment, GameSpec, import_part
+from sandbox.game_spec import GameSpec, import_part
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -51,9 +51,9 @@ def game_tables() -> dict[str, str]:
     return {heading: path for spec in game_specs() for heading, path in spec.tables.items()}
 
 
-def environments() -> tuple[Environment, ...]:
-    """Return the Gymnasium environments of the games of this package."""
-    return tuple(environment for spec in game_specs() for environment in spec.environments)
+def games_with_rules() -> tuple[str, ...]:
+    """Return the names of the games of this package whose rules always start with the scene."""
+    return tuple(name for spec in game_specs() if spec.starts_rules(on_request=False) for name in spec.names)
 
 
 def games_with_bot() -> tuple[str, ...]:

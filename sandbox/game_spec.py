@@ -23,8 +23,22 @@ class Environment:
     """number of steps per action"""
     engine: str = "pymunk"
     """name of the engine"""
-    is_vectorised: bool = False
-    """whether the game has `GameSpec.vector_rules`"""
+
+
+@dataclass(frozen=True)
+class WindowGame:
+    """How the window plays a game, beyond its rules and view: by import strings, and without them as other games."""
+
+    controls: str | None = None
+    """`(host, scene, options) -> GameControls`: input for games with other input than the keys of `Rules.controls`;
+    `scene` is as in its file, `options` has the chosen values of `GameControls.parameters`"""
+    plays: str | None = None
+    """`(scene) -> bool`: whether the window plays the game on a scene that names no game"""
+    prepare: str | None = None
+    """`(scene) -> scene`: the scene as the window plays it, for scenes that name the game"""
+    rules_on_request: bool = False
+    """whether scenes also run without the rules: the window always starts them, commands only if a player is given or
+    for a recording of a game"""
 
 
 @dataclass(frozen=True)
@@ -42,19 +56,11 @@ class GameSpec:
     bot: str | None = None
     """`(seed) -> Policy`: the player `skilled`"""
     view: str | None = None
-    """`() -> GameView`: draws the game-specific elements; only this part and `controls` import pygame"""
-    controls: str | None = None
-    """`(host, scene, options) -> GameControls`: input of the window, for games with other input than the keys of
-    `Rules.controls`; `scene` is as in its file, `options` has the chosen values of `GameControls.parameters`"""
+    """`() -> GameView`: draws the game-specific elements; only this part and `WindowGame.controls` import pygame"""
     environments: tuple[Environment, ...] = ()
     """Gymnasium environments; only for games of this package"""
-    rules_on_request: bool = False
-    """whether scenes also run without the rules: the window always starts them, commands only if a player is given or
-    for a recording of a game"""
-    plays: str | None = None
-    """`(scene) -> bool`: whether the window plays the game on a scene that names no game; default: it does not"""
-    prepare: str | None = None
-    """`(scene) -> scene`: the scene as the window plays it, for scenes that name the game"""
+    window: WindowGame | None = None
+    """how the window plays the game, if it does more than start the rules and draw the view"""
     real_time: bool = False
     """whether the game runs in real time from the first step: the window waits for a key press to start it"""
     hint: str = ""
@@ -64,6 +70,10 @@ class GameSpec:
     needs_player: str | None = None
     """`(scene) -> str | None`: the reason why the game does not proceed without input, with the player `none`; None if
     it does"""
+
+    def starts_rules(self, on_request: bool) -> bool:
+        """Return whether commands start the rules: always, or only on request."""
+        return self.rules is not None and (on_request or self.window is None or not self.window.rules_on_request)
 
 
 def import_part(path: str) -> Any:

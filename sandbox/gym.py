@@ -31,7 +31,7 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.kernel import COMPILED
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
-from sandbox.game_names import environments
+from sandbox.game_names import game_specs
 from sandbox.games.contract import HasObservation, Rules
 from sandbox.games.registry import required_rules
 from sandbox.measure.run.episode_batch import EpisodeBatch
@@ -41,7 +41,7 @@ from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 
-GAMES = {each.name: (each.scene, each.frame_skip) for each in environments()}
+GAMES = {each.name: (each.scene, each.frame_skip) for spec in game_specs() for each in spec.environments}
 """Shipped scene and number of steps per action, by the name in the environment id."""
 LIMIT = 1e6
 """bound to which observed numbers are clipped: learning algorithms expect bounded spaces"""
@@ -167,7 +167,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         levels = self._levels_of(action)
         before, failed = episode.rules.score, None
         try:
-            episode.press(levels)
+            episode.set_levels(levels)
             episode.advance(self.every)
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
@@ -519,10 +519,11 @@ def _body_indices(scene: Scene, names: Sequence[str] | None) -> list[int]:
     return [bodies.names.index(name) for name in names]
 
 
-for _each in environments():
-    gymnasium.register(
-        f"sandbox/{_each.name}-v0",
-        entry_point="sandbox.gym:SandboxEnv",
-        kwargs={"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine},
-        vector_entry_point="sandbox.gym:make_vector_env" if _each.is_vectorised else None,
-    )
+for _spec in game_specs():
+    for _each in _spec.environments:
+        gymnasium.register(
+            f"sandbox/{_each.name}-v0",
+            entry_point="sandbox.gym:SandboxEnv",
+            kwargs={"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine},
+            vector_entry_point="sandbox.gym:make_vector_env" if _spec.vector_rules is not None else None,
+        )

@@ -1,14 +1,14 @@
 """JSON documents from dataclasses: the values of a document, and its JSON Schema from the same types.
 
-A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field; the
-properties that a class lists in `json_head` precede the fields, those in `json_properties` follow them; each is listed
-by name or as (key, name). JSON has no number for nan and infinity: they become null, so that every float may be null in
-the schema.
+A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field. The
+fields and properties that a class lists in `json_head` precede the other fields, the properties in `json_properties`
+follow them; each is listed by name or as (key, name). `json_name` is the name of a class in schemas; default: the name
+of the class. JSON has no number for nan and infinity: they become null, so that every float may be null in the schema.
 """
 
 import math
 from collections.abc import Mapping, Sequence, Set
-from dataclasses import Field, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
@@ -45,10 +45,20 @@ class JsonField(NamedTuple):
     optional: bool = False
 
 
-def _options(each: "Field[Any]") -> JsonField:
-    """Return how a field appears in documents, with its key."""
-    found: JsonField = each.metadata.get("json", JsonField())
-    return found._replace(key=found.key or each.name)
+def _members(cls: Any) -> list[tuple[str, JsonField]]:
+    """Return the fields and properties that the documents of a class have, in order, and how they appear, with keys."""
+    if is_dataclass(cls):
+        options: dict[str, JsonField] = {each.name: each.metadata.get("json", JsonField()) for each in fields(cls)}
+    else:
+        options = dict.fromkeys(cls.model_fields if issubclass(cls, BaseModel) else cls._fields, JsonField())
+    head, last = getattr(cls, "json_head", ()), getattr(cls, "json_properties", ())
+    found = []
+    for each in (*head, *(name for name in options if name not in head), *last):
+        key, name = (None, each) if isinstance(each, str) else each
+        option = options.get(name, JsonField())
+        if not option.omit:
+            found.append((name, option._replace(key=key or option.key or name)))
+    return found
 
 
 def finite(value: float | None) -> float | None:
@@ -73,12 +83,12 @@ def to_json(value: Any) -> Any:
         return finite(value)
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json")
-    if is_dataclass(value) and not isinstance(value, type):
+    if (is_dataclass(value) and not isinstance(value, type)) or (
+        isinstance(value, tuple) and hasattr(value, "_fields")
+    ):
         return _object(value)
     if isinstance(value, Mapping):
         return {str(key): to_json(each) for key, each in value.items()}
-    if isinstance(value, tuple) and hasattr(value, "_fields"):
-        return {name: to_json(getattr(value, name)) for name in value._fields}
     if isinstance(value, Sequence | Set):
         return [to_json(each) for each in value]
     if isinstance(value, np.ndarray | np.generic):
@@ -87,24 +97,16 @@ def to_json(value: Any) -> Any:
 
 
 def _object(value: Any) -> dict[str, Any]:
-    found = {key: to_json(getattr(value, name)) for key, name in _properties(type(value), "json_head")}
-    for each in fields(value):
-        key, omit, inline, optional = _options(each)
-        own = getattr(value, each.name)
-        if omit or (own is None and (optional or inline)):
+    found: dict[str, Any] = {}
+    for name, (key, _, inline, optional) in _members(type(value)):
+        own = getattr(value, name)
+        if own is None and (optional or inline):
             continue
         if inline:
             found |= to_json(own)
         else:
             found[str(key)] = to_json(own)
-    for key, name in _properties(type(value), "json_properties"):
-        found[key] = to_json(getattr(value, name))
     return found
-
-
-def _properties(cls: type, listed: str) -> list[tuple[str, str]]:
-    """Return key and name of each property that a class lists."""
-    return [(each, each) if isinstance(each, str) else each for each in getattr(cls, listed, ())]
 
 
 def json_schema(document: type, *, is_open: bool = False) -> dict[str, Any]:
@@ -121,32 +123,24 @@ def json_schema(document: type, *, is_open: bool = False) -> dict[str, Any]:
 
 
 def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
-    """Return the schema of a dataclass or named tuple."""
+    """Return the schema of a dataclass, named tuple or inlined pydantic model."""
     hints = get_type_hints(cls)
     properties: dict[str, Any] = {}
     required: list[str] = []
     is_open = False
-
-    def add_properties(listed: str) -> None:
-        for key, name in _properties(cls, listed):
-            properties[key] = _schema(get_type_hints(getattr(cls, name).fget)["return"], definitions)
-            required.append(key)
-
-    add_properties("json_head")
-    for name, (key, omit, inline, optional) in _members(cls):
-        if omit:
-            continue
+    for name, (key, _, inline, optional) in _members(cls):
+        hint = hints[name] if name in hints else get_type_hints(getattr(cls, name).fget)["return"]
+        inlined = _without_none(hint)
         if not inline:
-            properties[str(key)] = _schema(hints[name], definitions)
+            properties[str(key)] = _schema(hint, definitions)
             required += [] if optional else [str(key)]
-        elif isinstance(inlined := _without_none(hints[name]), type) and is_dataclass(inlined):
+        elif isinstance(inlined, type) and (is_dataclass(inlined) or issubclass(inlined, BaseModel)):
             inner = _object_schema(inlined, definitions)
             properties |= inner["properties"]
-            required += inner["required"] if inlined is hints[name] else []
+            required += inner["required"] if inlined is hint else []
             is_open |= inner["additionalProperties"]
         else:
             is_open = True  # the keys of a mapping are not known
-    add_properties("json_properties")
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": is_open}
 
 
@@ -154,13 +148,6 @@ def _without_none(hint: Any) -> Any:
     """Return the type T of a hint `T | None`; any other hint unchanged."""
     others = [each for each in get_args(hint) if each is not NoneType]
     return others[0] if get_origin(hint) in (Union, UnionType) and len(others) == 1 else hint
-
-
-def _members(cls: Any) -> list[tuple[str, JsonField]]:
-    """Return the fields of a dataclass or named tuple, and how they appear in documents."""
-    if is_dataclass(cls):
-        return [(each.name, _options(each)) for each in fields(cls)]
-    return [(name, JsonField(name)) for name in cls._fields]
 
 
 def _schema(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -182,10 +169,11 @@ def _schema(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     if isinstance(hint, type) and issubclass(hint, BaseModel):
         return {"type": "object"}
     if isinstance(hint, type) and (is_dataclass(hint) or hasattr(hint, "_fields")):
-        if hint.__name__ not in definitions:
-            definitions[hint.__name__] = {}  # a type may refer to itself
-            definitions[hint.__name__] = _object_schema(hint, definitions)
-        return {"$ref": f"#/$defs/{hint.__name__}"}
+        name = getattr(hint, "json_name", hint.__name__)
+        if name not in definitions:
+            definitions[name] = {}  # a type may refer to itself
+            definitions[name] = _object_schema(hint, definitions)
+        return {"$ref": f"#/$defs/{name}"}
     if isinstance(origin, type) and issubclass(origin, Mapping):
         values = _schema(arguments[1], definitions)
         return {"type": "object", **({"additionalProperties": values} if values else {})}

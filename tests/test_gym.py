@@ -11,10 +11,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from sandbox.engines.contract import Refusal, SnapshotError
-from sandbox.games import registry
+from sandbox.game_names import games_with_rules
 from sandbox.games.contract import Control, UnsuitableSceneError
 from sandbox.games.landing import rules as landing
-from sandbox.games.registry import RULES
 from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.run.sessions import rerun
 from sandbox.scene.files.load import load, loads
@@ -55,7 +54,7 @@ def test_observed_numbers_have_distinct_names_and_stay_in_the_space(name: str) -
 
 
 def test_every_shipped_game_has_an_id() -> None:
-    games = {scene.name for scene in shipped() if load(scene.path).play.game in RULES}
+    games = {scene.name for scene in shipped() if load(scene.path).play.game in games_with_rules()}
     on_request = {"billiards/8-ball", "billiards/9-ball"}  # scenes whose rules start only on request
     assert {scene for scene, _ in GAMES.values()} == games | on_request
 
@@ -109,7 +108,7 @@ def test_analogue_action_sets_the_thrust() -> None:
 
 
 def test_episode_is_truncated_at_the_duration(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Toy)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Toy)
     env = SandboxEnv(loads(TOY), every=30)
     episode = play_episode(env, None)
     assert episode[-1][2:] == (False, True)
@@ -121,7 +120,7 @@ class Digital(Toy):
 
 
 def test_digital_controls_have_a_discrete_action_space(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Digital)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Digital)
     env = SandboxEnv(loads(TOY), every=10)
     check_env(env, skip_render_check=True)  # the render check makes an environment from an id
     assert env.action_space == gymnasium.spaces.MultiDiscrete([2])
@@ -227,7 +226,7 @@ def test_steps_that_the_rules_do_not_see_change_nothing(
 ) -> None:
     """All numbers of an episode equal those of an episode whose rules are called after every step."""
     if name == "empty tank":
-        monkeypatch.setattr(landing, "TANK", 5.0)
+        monkeypatch.setattr(landing, "TANK_CAPACITY", 5.0)
     quiet, called = (SandboxEnv("landing", engine, every=every) for _ in range(2))
     quiet.action_space.seed(4)
     actions, end = EPISODES.get(name) or ([quiet.action_space.sample() for _ in range(1000)], None)

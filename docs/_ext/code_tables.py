@@ -17,8 +17,9 @@ from sandbox.batch.stored_run import StoredRun
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import ENGINES
+from sandbox.game_names import games_with_rules
 from sandbox.games.billiards.view.controls import CUE_KEY_HELP
-from sandbox.games.registry import RULES, required_rules
+from sandbox.games.registry import required_rules
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.resource_limits import LIMITS
 from sandbox.run_file import KINDS, OPTIONAL, SHAPES
@@ -186,7 +187,7 @@ def cue_keys() -> str:
 def game_keys() -> str:
     """Return the keys of each game with rules, as its help lists them."""
     parts = []
-    for name in sorted(RULES):
+    for name in sorted(games_with_rules()):
         rules = required_rules(sandbox.load(SCENES[name]))
         parts.append(f"### {name.capitalize()}\n\n{_keys(control_help(tuple(rules.controls)))}")
     return "\n\n".join(parts)

@@ -31,6 +31,7 @@ from sandbox.atomic_write import atomic_write
 from sandbox.batch.store import DATABASE, VERSION, Store, StoreError, value_columns
 from sandbox.batch.stored_run import SOLVER, quoted_column
 from sandbox.echo import short_repr
+from sandbox.measure.proportion import wilson_interval
 from sandbox.scene.description.world import Settings
 from sandbox.signals import reraise_interrupt
 from sandbox.trajectory import Trajectory
@@ -48,8 +49,6 @@ FIRST = ("id", "scene", "title", "engine")
 LAST = ("seed", "status", "reason", *NUMBERS, "state_hash", "versions")
 MORE = ("created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
 """Columns that a table has only if they are named"""
-Z95 = 1.959963984540054
-"""97.5 % quantile of the normal distribution: two-sided bounds of 95 %"""
 PROGRESS_STEPS = 100_000
 """Instructions of the database between two looks for Ctrl-C, a few milliseconds"""
 READ_ACTIONS = (sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION)
@@ -452,20 +451,6 @@ def open_store(directory: str | Path) -> StoredRuns:
     return StoredRuns(directory)
 
 
-def wilson_bounds(successes: int, count: int) -> tuple[float, float]:
-    """Return the 95 % bounds of a probability from the successes of some trials; (0, 1) without trials.
-
-    Source: E. B. Wilson, Probable inference, the law of succession, and statistical inference, J. Am. Stat. Assoc. 22
-    (1927) 209-212.
-    """
-    if not count:
-        return 0.0, 1.0
-    rate, z2 = successes / count, Z95 * Z95
-    centre = (rate + z2 / (2.0 * count)) / (1.0 + z2 / count)
-    half = Z95 / (1.0 + z2 / count) * math.sqrt(rate * (1.0 - rate) / count + z2 / (4.0 * count * count))
-    return max(centre - half, 0.0), min(centre + half, 1.0)
-
-
 def cell_rows(found: Columns) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of a table, with None for cells without a value."""
     for row in zip(*(values.tolist() for values in found.values()), strict=True):
@@ -531,7 +516,7 @@ def _group(
     """
     by_engine = Counter(engine for engine, _ in {(row[-4], row[-3]) for row in rows})
     successes = sum(bool(row[-2]) for row in rows)
-    low, high = wilson_bounds(successes, len(rows))
+    low, high = wilson_interval(successes, len(rows))
     return RunGroup(
         keys=keys,
         runs=len(rows),

@@ -15,7 +15,7 @@ from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_MESSAGE, shorten
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
 from sandbox.games.contract import Control
-from sandbox.games.registry import fitting_rules
+from sandbox.games.registry import rules_of
 from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.preflight import (
     FAILED,
@@ -172,7 +172,7 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
         SceneError: the scene has faults.
     """
     path, scene, remarks = read_scene(name, overrides)
-    rules = fitting_rules(scene, path)
+    rules = rules_of(scene, path)
     items = bill(scene)
     missing = {each.name: each.missing(scene, scene.solver) for each in ENGINES.values()}
     safe = largest_safe_dt(scene, engine=engine)

@@ -1,13 +1,14 @@
 """Commands `match` and `miss`."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import click
 from click.core import ParameterSource
+from pydantic import TypeAdapter
 
 from sandbox.cli.common import (
     collect_errors,
@@ -26,7 +27,7 @@ from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
 from sandbox.games.billiards.bot import parse_bots
-from sandbox.games.billiards.headless import MAX_TURNS, FrameDocument, FrameRecord, FrameTurn, play_frame
+from sandbox.games.billiards.headless import MAX_TURNS, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.registry import RULESETS
@@ -38,11 +39,13 @@ from sandbox.scene.files.load import load
 from sandbox.signals import reraise_interrupt
 
 if TYPE_CHECKING:
-    from sandbox.games.artillery.landing_error import LandingErrorTable
+    from sandbox.measure.landing_error import LandingErrorTable
 
 
 TABLES = "8-ball, 9-ball, snooker, three-cushion, …"
 """Scenes that a message names as examples of tables."""
+
+_TURNS = TypeAdapter(tuple[FrameTurn, ...])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,51 +77,81 @@ class _Options(OutputOptions):
         return distance | ({"misses": True} if self.misses else {})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MatchFrame:
     """A frame of a match."""
 
-    frame: FrameDocument = field(metadata=in_json(inline=True))
+    game: str
+    winner: int | None
+    """player"""
+    over: bool
+    unfinished: str | None
+    """reason why the frame was abandoned"""
+    scores: Sequence[int]
+    """by seat"""
+    shots: int
+    duration: float
+    """s"""
+    state_hash: str | None
+    turns: Sequence[Mapping[str, object]]
+    """every decision and shot, without default values"""
     seed: int
     seats: tuple[int, ...]
     """player at each seat; seat 0 breaks"""
 
+    @classmethod
+    def of(cls, frame: FrameRecord, seed: int, seats: Sequence[int]) -> "MatchFrame":
+        """Return a played frame."""
+        state = frame.match.state
+        turns: list[dict[str, object]] = _TURNS.dump_python(frame.turns, mode="json", exclude_defaults=True)
+        return cls(
+            game=frame.match.rules.name,
+            winner=None if state.winner is None else seats[state.winner],
+            over=state.over,
+            unfinished=frame.unfinished,
+            scores=state.scores,
+            shots=len(frame.shots),
+            duration=frame.session.duration,
+            state_hash=frame.session.state_hash,
+            turns=turns,
+            seed=seed,
+            seats=tuple(seats),
+        )
 
-@dataclass(frozen=True, kw_only=True)
-class MatchDocument:
-    """JSON document of `match`."""
+
+@dataclass
+class MatchResult:
+    """Frames played so far; the JSON document of `match`."""
 
     scene: str
     players: Sequence[str]
     """as the user named them"""
-    wins: Sequence[int]
-    """frames that each player won"""
-    unfinished: int
-    """frames that were abandoned"""
-    frames: Sequence[MatchFrame]
-    """complete frames"""
-    interrupted: bool
-    """whether an interrupt ended the match early"""
-
-
-@dataclass
-class _MatchScore:
-    """Frames played so far."""
-
-    wins: list[int]
-    """by player"""
     frames: list[MatchFrame] = field(default_factory=list)
-    status: int = 0
+    """complete frames"""
+    status: int = field(default=0, metadata=in_json(omit=True))
     """exit status: 1 a frame was abandoned, 2 a session cannot be saved, 130 interrupted"""
+
+    json_head: ClassVar = ("scene", "players", "wins", "unfinished")
+    json_properties: ClassVar = ("interrupted",)
+
+    @property
+    def wins(self) -> Sequence[int]:
+        """Number of frames that each player won."""
+        return [sum(each.winner == player for each in self.frames) for player in range(len(self.players))]
 
     @property
     def unfinished(self) -> int:
         """Number of abandoned frames."""
-        return sum(each.frame.unfinished is not None for each in self.frames)
+        return sum(each.unfinished is not None for each in self.frames)
 
-    def text(self, names: list[str]) -> str:
+    @property
+    def interrupted(self) -> bool:
+        """Whether an interrupt ended the match early."""
+        return self.status == 130
+
+    def text(self) -> str:
         """Return the result of all frames as one line."""
-        players = enumerate(zip(names, self.wins, strict=True), 1)
+        players = enumerate(zip(self.players, self.wins, strict=True), 1)
         wins_text = ", ".join(f"player {number} ({name}) {won}" for number, (name, won) in players)
         drawn = len(self.frames) - sum(self.wins) - self.unfinished
         counts = ((drawn, "drawn"), (self.unfinished, "abandoned"))
@@ -190,25 +223,17 @@ def match_command(**given: Any) -> int:
         advice = engine_advice(scene, is_chosen)
         click.echo(f"{options.scene}: {Refusal(options.engine, missing, able(scene))}{advice}", err=True)
         return 1
-    score = _MatchScore([0] * len(options.names))
+    result = MatchResult(options.scene, options.names)
     try:
-        _play_frames(options, scene.world.seed if options.seed is None else options.seed, score)
+        _play_frames(options, scene.world.seed if options.seed is None else options.seed, result)
     except KeyboardInterrupt:
-        score.status = 130
-        click.echo(f"interrupted: {len(score.frames):,} of {options.frames:,} frames are complete", err=True)
+        result.status = 130
+        click.echo(f"interrupted: {len(result.frames):,} of {options.frames:,} frames are complete", err=True)
     if options.as_json:
-        document = MatchDocument(
-            scene=options.scene,
-            players=options.names,
-            wins=score.wins,
-            unfinished=score.unfinished,
-            frames=score.frames,
-            interrupted=score.status == 130,
-        )
-        print_json(to_json(document))
+        print_json(to_json(result))
     elif options.frames > 1 or options.quiet:
-        click.echo(score.text(options.names))
-    return score.status
+        click.echo(result.text())
+    return result.status
 
 
 def _table(options: _Options, faults: list[Fault]) -> Scene | None:
@@ -235,8 +260,8 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
     return scene
 
 
-def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None:
-    """Play all frames, and add each to the score when it ends."""
+def _play_frames(options: _Options, first_seed: int, result: MatchResult) -> None:
+    """Play all frames, and add each to the result when it ends."""
     path, count = scene_path(options.scene), len(options.names)
     for k in range(options.frames):
         table = load(path, (*options.overrides, ("world.seed", first_seed + k)))
@@ -251,21 +276,16 @@ def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None
                 time_limit=options.time_limit,
                 on_turn=None if progress is None else _turn_progress(progress, k + 1, options.frames, seats),
             )
-        winning_seat = frame.match.state.winner
-        winner = None if winning_seat is None else seats[winning_seat]
-        if winner is not None:
-            score.wins[winner] += 1
-        document = replace(frame.document(), winner=winner)
-        score.frames.append(MatchFrame(document, first_seed + k, tuple(seats)))
+        result.frames.append(MatchFrame.of(frame, first_seed + k, seats))
         if frame.unfinished is not None:
-            score.status = 1
+            result.status = 1
             click.echo(f"frame {k + 1}: abandoned: {frame.unfinished}", err=True)
         try:
             if options.out is not None:
                 frame.session.save(options.out / f"frame-{k + 1}.json")
         except OSError as error:
             click.echo(f"--out: {shorten(str(options.out), MAX_NAMED)}: {error.strerror or error}", err=True)
-            score.status = 2
+            result.status = 2
             return
         if not options.is_silent:
             click.echo(_frame_line(k + 1, frame, seats, options.names))
@@ -342,7 +362,7 @@ def miss_command(
 
     Gravity, drag and wind are those of SCENE, a file or the name of a shipped scene.
     """
-    from sandbox.games.artillery.landing_error import STEPS, landing_error_table  # imports the engines
+    from sandbox.measure.landing_error import STEPS, landing_error_table  # imports the engines
 
     try:
         read = load(scene_path(scene), overrides)
@@ -356,10 +376,7 @@ def miss_command(
             [Fault(scene, None, "" if falls else "world.gravity", str(error))], as_json, scene=scene
         )
     if as_json:
-        rows = [row._asdict() for row in found.rows]
-        refusals = [{"engine": engine, "reason": reason} for engine, reason in found.refused]
-        truth = {"range": found.range, "time": found.time}
-        print_json({"scene": scene, **truth, "rows": rows, "refused": refusals, "interrupted": found.interrupted})
+        print_json({"scene": scene, **to_json(found)})
     else:
         _print_landing_errors(scene, read, found, f"{speed:g} m/s at {angle:g}°")
     if found.interrupted:
@@ -382,7 +399,7 @@ def _print_landing_errors(name: str, scene: Scene, found: "LandingErrorTable", s
     add_columns(table, ("engine", "integrator"))
     add_columns(table, (f"dt {dt:.4g} s" for dt in dts), "right")
     for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
-        errors = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
+        errors = {row.dt: row.range_error for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
         cells = [f"{'+' if errors[dt] >= 0 else '−'}{format_deviation(abs(errors[dt]))}" for dt in dts if dt in errors]
         # A deviation below the resolution is "less than …", without a sign.
         table.add_row(engine, integrator or "", *(cell[1:] if cell[1:2] == "l" else cell for cell in cells))

@@ -10,10 +10,10 @@ DOCUMENTS = {
     "check": "sandbox.cli.check:CheckDocument",
     "compare": "sandbox.measure.compare.result:Comparison",
     "extremes": "sandbox.measure.extremes.runner:Extremes",
-    "match": "sandbox.cli.games:MatchDocument",
+    "match": "sandbox.cli.games:MatchResult",
     "run": "sandbox.cli.run_tables:RunsDocument",
     "runs": "sandbox.cli.runs:StoredRunsDocument",
-    "shots": "sandbox.games.billiards.shots.study:StudyDocument",
+    "shots": "sandbox.measure.shots.study:ShotStudy",
     "tradeoff": "sandbox.measure.tradeoff.result:Tradeoff",
 }
 """Dataclass of the document of each command, as `module:class`."""

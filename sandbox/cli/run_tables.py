@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
+import numpy as np
 
+from sandbox.arrays import FloatArray
 from sandbox.batch.run_row import RunRow
 from sandbox.cli.tables import add_columns, heads_of, new_table, print_legend, print_line, print_table
 from sandbox.engines.energy_ledger import Cause
 from sandbox.formatting import format_number, format_quantity
-from sandbox.games.scores import QUANTILES, Scores, ScoreStatistics
 from sandbox.jsonable import finite, in_json
 from sandbox.measure.metrics.energy import LedgerDocument
 
@@ -51,6 +52,54 @@ LEGEND = {
     "falls": "balls in pockets, and the pocket of each",
 }
 """Columns of the table and their meaning, for `--verbose`."""
+
+QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""probabilities of the quantiles"""
+MAX_BINS = 10
+"""number of bins over the range of the scores; rounding the outer edges to multiples of the width adds up to two"""
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Histogram of scores."""
+
+    edges: Sequence[float]
+    """bounds of the bins, one more than bins; a bin includes its lower edge"""
+    counts: Sequence[int]
+    """number of games in each bin"""
+
+
+@dataclass(frozen=True)
+class ScoreStatistics:
+    """Statistics of a sample of scores."""
+
+    count: int
+    mean: float
+    deviation: float
+    """sample standard deviation; 0 for a single game"""
+    quantiles: Mapping[str, float]
+    """by probability, one of `QUANTILES`"""
+    histogram: Histogram
+
+    @classmethod
+    def of(cls, scores: Sequence[float]) -> "ScoreStatistics":
+        """Return the statistics of scores.
+
+        Raises:
+            ValueError: there are no scores.
+        """
+        if not scores:
+            raise ValueError("no games, so no score statistics")
+        values = np.asarray(scores, dtype=np.float64)
+        counts, edges = np.histogram(values, _edges(values))
+        quantiles = zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True)
+        return cls(
+            count=len(values),
+            mean=float(values.mean()),
+            deviation=float(values.std(ddof=1)) if len(values) > 1 else 0.0,
+            quantiles={f"{fraction:g}": value for fraction, value in quantiles},
+            histogram=Histogram(edges.tolist(), counts.tolist()),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -358,6 +407,23 @@ EIGHTHS = " ▏▎▍▌▋▊▉█"
 """Block characters by their width in eighths of a character."""
 
 
+def _edges(scores: FloatArray) -> list[float]:
+    """Return the edges of bins that contain all scores; their width is 1, 2 or 5 times a power of ten.
+
+    If all scores are integers, the width is at least 1.
+    """
+    low, high = float(scores.min()), float(scores.max())
+    width = 10.0 ** math.floor(math.log10(max(high - low, 1.0) / MAX_BINS))
+    width *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if high - low <= width * factor * MAX_BINS)
+    if (scores == np.round(scores)).all():
+        width = max(width, 1.0)
+    first, last = math.floor(low / width), math.floor(high / width) + 1
+    if low < width * first:  # a negative score so small that the quotient is -0
+        first -= 1
+    parts = round(1.0 / width)  # bins per unit: 3 / 10 is exactly 0.3, 3 × 0.1 is not
+    return [k / parts if width < 1.0 else width * k for k in range(first, last + 1)]
+
+
 def score_rows(rows: Sequence[RunRow]) -> list[ScoresDocument]:
     """Return the distribution of scores over games that differ only in their seed, in the order of the rows.
 
@@ -376,7 +442,7 @@ def score_rows(rows: Sequence[RunRow]) -> list[ScoresDocument]:
             engine=row.engine,
             player=None if row.game is None else row.game.player,
             set=point,
-            distribution=Scores.of(scores).document(),
+            distribution=ScoreStatistics.of(scores),
         )
         for row, point, scores in found.values()
         if len(scores) > 1

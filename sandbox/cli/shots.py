@@ -21,10 +21,11 @@ from sandbox.cli.progress import status_line
 from sandbox.cli.shots_table import print_study
 from sandbox.cli.streams import print_json
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.games.billiards.shots.monte_carlo import DEFAULT_COUNT
-from sandbox.games.billiards.shots.predictability import PERTURBATION, TOLERANCE, By
-from sandbox.games.billiards.shots.shot import NoSuchShotError, ShotSetup, Spread, shot_setup
-from sandbox.games.billiards.shots.study import ShotStudy, pot_of, study_shot
+from sandbox.jsonable import to_json
+from sandbox.measure.shots.monte_carlo import DEFAULT_COUNT
+from sandbox.measure.shots.predictability import PERTURBATION, TOLERANCE, By
+from sandbox.measure.shots.shot import NoSuchShotError, ShotSetup, Spread, shot_setup
+from sandbox.measure.shots.study import ShotStudy, pot_of, study_shot
 from sandbox.progress import Progress
 from sandbox.scene.errors import Fault
 from sandbox.scene.files.load import load
@@ -176,7 +177,7 @@ def shots_command(**given: Any) -> int:
         found = _study(request.shot, request, options)
     except Exhaustion as error:
         return _failed(options, "failed", str(error))
-    document = {"scene": options.scene, "status": "ok", "reason": None, **found.document()}
+    document = {"scene": options.scene, "status": "ok", "reason": None, **to_json(found)}
     if options.as_json:
         print_json(document)
     elif not options.quiet:

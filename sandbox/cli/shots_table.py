@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from sandbox.cli.tables import add_columns, new_table, print_legend, print_line, print_table
-from sandbox.games.billiards.shots.aim_windows import Windows
-from sandbox.games.billiards.shots.monte_carlo import Odds, Proportion
-from sandbox.games.billiards.shots.predictability import Horizon, Separation
-from sandbox.games.billiards.shots.sensitivity import Slope
-from sandbox.games.billiards.shots.shot import UNITS, VARIABLES
-from sandbox.games.billiards.shots.study import ShotStudy
+from sandbox.measure.proportion import Proportion
+from sandbox.measure.shots.aim_windows import Windows
+from sandbox.measure.shots.monte_carlo import Odds
+from sandbox.measure.shots.predictability import Horizon, Separation
+from sandbox.measure.shots.sensitivity import Slope
+from sandbox.measure.shots.shot import UNITS, VARIABLES
+from sandbox.measure.shots.study import ShotStudy
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -16,7 +16,7 @@ from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_named, usual
 from sandbox.games.contract import UnsuitableSceneError
-from sandbox.games.registry import fitting_rules, has_rules, rules_in_window
+from sandbox.games.registry import has_rules, rules_in_window, rules_of
 from sandbox.recording import Recording
 from sandbox.recording_remarks import remarks_on
 from sandbox.scene.compile.scene import Scene
@@ -187,7 +187,7 @@ def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ..
         if scene is not None:
             path = Path(scene_path(scene))
             found = load(path, overrides)
-            fitting_rules(found, str(path))
+            rules_of(found, str(path))
             first = engine or usual(found)
             missing = engine_named(first).missing(found, found.solver) if not faults else ()
             if missing:

@@ -14,28 +14,18 @@ derive from the seed of the scene.
 Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `quiet_steps(dt)`,
 `view_state(time)`.
 
-`GameControls` is the input of a game in the window, where keys that set controls do not suffice. It acts on the game
-through its `GameHost`. Its pygame surfaces, rectangles and events are `Any` here, so that runs without a window do
-without pygame.
-
 The skill of a bot is a number from 0 to 1.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
-from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.contract import Members, WorldStates
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
 __all__ = [
     "Control",
-    "ControlBindings",
-    "GameControls",
-    "GameHud",
-    "GameParameter",
     "HasLamps",
     "HasLog",
     "HasObservation",
@@ -47,7 +37,6 @@ __all__ = [
     "Rules",
     "StepInfo",
     "UnsuitableSceneError",
-    "VectorRules",
 ]
 
 
@@ -174,42 +163,6 @@ class HasQuietSteps(Protocol):
         """
 
 
-class VectorRules(Protocol):
-    """Rules of M independent games of one scene, as arrays: what `Rules` of each game would do, bit for bit.
-
-    Only games whose controls set levels of thrusts can have them. A host calls:
-
-        restart(games, seeds)                  start states of new games
-        set_controls(games, levels)            controls, between two steps
-        on_step(games, states)                 after at most `quiet_steps(dt)` steps, and after a step with contacts
-
-    A game in which a body is removed is over.
-    """
-
-    controls: tuple[Control, ...]
-    score: IntArray
-    """(M,)"""
-    game_over: list[str | None]
-    """reason why each game is over; None while it runs"""
-    thrust_level: FloatArray
-    """(M, T) level of each thrust of the scene, as the rules set it"""
-
-    def restart(self, games: IntArray, seeds: Sequence[int]) -> Members:
-        """Start games, by their (K,) indices, with K seeds; return the K start states of their bodies."""
-
-    def set_controls(self, games: IntArray, levels: FloatArray) -> None:
-        """Set the controls of K games to levels (K, C), from 0 to 1."""
-
-    def quiet_steps(self, dt: float) -> IntArray:
-        """Return for each game, (M,), what `HasQuietSteps.quiet_steps` returns."""
-
-    def on_step(self, games: IntArray, states: WorldStates) -> None:
-        """Update games, by their (K,) indices, after steps; the states are those of all M worlds."""
-
-    def observation(self) -> FloatArray:
-        """Return the values (M, O) of the observation of each game."""
-
-
 @runtime_checkable
 class HasViewState(Protocol):
     """Rules that pass values to the `GameView` of their game."""
@@ -220,114 +173,6 @@ class HasViewState(Protocol):
         Times between the last two steps occur when the window interpolates. Earlier times occur when it shows the
         past, which the rules may not know.
         """
-
-
-class ControlBindings(NamedTuple):
-    """Keys that a game binds in the window."""
-
-    pressed: Mapping[int, Callable[[], object]]
-    """handlers of presses by pygame key code; they may raise `ActionError`"""
-    released: Mapping[int, Callable[[], object]]
-    """handlers of releases by pygame key code"""
-    help_rows: tuple[tuple[str, str], ...]
-    """(keys, action) for the help page"""
-
-
-class GameParameter(NamedTuple):
-    """Choice in the side panel that restarts the game."""
-
-    key: str
-    label: str
-    value: str
-    choices: tuple[str, ...]
-
-
-class GameHud(Protocol):
-    """Head-up display of a game in place of the score panel. Lengths are in px; `free` is the free area, a `Rect`."""
-
-    def draw(self, surface: Any, free: Any, left: int, ui_scale: float) -> None:
-        """Draw it.
-
-        Args:
-            surface: target.
-            free: free area.
-            left: right edge of the status plate at the upper left.
-            ui_scale: UI scale, 1 on a display of 1080 lines.
-        """
-
-    def reserved(self, free: Any, left: int, ui_scale: float) -> list[Any]:
-        """Return the rectangles of its plates, also of those that are hidden now; arguments as for `draw`."""
-
-    def plates(self, free: Any, ui_scale: float) -> dict[str, Any]:
-        """Return the rectangles of its plates as last drawn, by name."""
-
-    def handle_event(self, event: Any, run: Callable[[Callable[[], object]], bool]) -> bool:
-        """Handle a mouse event; return whether it was used. `run` calls a handler that may raise `ActionError`."""
-
-
-class GameControls(Protocol):
-    """Input of a game in the window, for games that need more than the keys of `Rules.controls`.
-
-    Positions are in m. The mouse handlers may raise `ActionError`, whose text is shown as a warning.
-    """
-
-    @property
-    def hint(self) -> str:
-        """Message at the start: how to play."""
-
-    @property
-    def hud(self) -> GameHud:
-        """Its head-up display."""
-
-    @property
-    def drag_refusal(self) -> str | None:
-        """Reason why the mouse may not drag bodies now; None if it may."""
-
-    @property
-    def is_own_score(self) -> bool:
-        """Whether the final score is that of a player at the window, and may enter the high scores."""
-
-    def bindings(self) -> ControlBindings:
-        """Return the key bindings; called once."""
-
-    def press(self, position: tuple[float, float], tolerance: float) -> bool:
-        """Handle a press of the left button; return whether it is used. `tolerance` for hits is in m."""
-
-    def move(
-        self,
-        before: tuple[float, float],
-        now: tuple[float, float],
-        pixels: tuple[float, float],
-        fine: bool,
-        time: float,
-    ) -> None:
-        """Handle a movement of the mouse.
-
-        Args:
-            before: previous position.
-            now: present position.
-            pixels: movement to the right and downwards, px at UI scale 1.
-            fine: whether Shift is held.
-            time: s, of the event.
-        """
-
-    def release(self, position: tuple[float, float], moved: bool, picked: int | None) -> None:
-        """Handle a release of the left button; `moved` if it was no click, `picked` is the index of a clicked body."""
-
-    def update(self, elapsed: float) -> None:
-        """Advance animations and bots by an interval of real time, s; it may raise `ActionError`."""
-
-    def messages(self) -> list[tuple[str, str]]:
-        """Return (level, text) of the messages since the last call."""
-
-    def parameters(self) -> tuple[GameParameter, ...]:
-        """Return the choices for the side panel. A changed one is among the options of the restarted game."""
-
-    def annotate(self, snapshot: Any) -> Any:
-        """Return a `Snapshot` with the values that the view of the game draws."""
-
-    def close(self) -> None:
-        """Release resources, such as threads."""
 
 
 class Policy(Protocol):

@@ -17,7 +17,7 @@ from sandbox.echo import short_repr, shorten
 from sandbox.game_names import games_with_bot
 from sandbox.game_spec import import_part
 from sandbox.games.contract import Control, Policy, Press, Rules, StepInfo, UnsuitableSceneError
-from sandbox.games.registry import find_spec, fitting_rules
+from sandbox.games.registry import find_spec, rules_of
 from sandbox.games.session import HeadlessGame
 from sandbox.recording import Recording
 from sandbox.resource_limits import read_limited
@@ -269,7 +269,7 @@ class PlayerSpec:
         Raises:
             SceneError: the scene lacks an element that its game needs, or the game lacks a control of the script.
         """
-        rules = fitting_rules(scene, file, on_request=True)
+        rules = rules_of(scene, file, on_request=True)
         if rules is None:
             return None
         if self.name == RECORDED:

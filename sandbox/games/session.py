@@ -2,7 +2,8 @@
 
 `GameSession` sets the times of actions, passes the player's actions to the rules, and records the inputs. In the replay
 of a recorded game it repeats the recorded inputs, and detects when the rules act differently than in the recording.
-`HeadlessGame` is a session of a run without a window, played by a policy or replayed.
+`HeadlessGame` is a session of a run without a window, played by a policy or replayed. `SteppedGame` is a session with a
+simulation of its own, which its caller advances: an episode of an environment, or a match between bots.
 
 `LampRecorder` and `LampLog` record which lamps were lit at which time. They are stored with a run, because viewing a
 run does not execute the rules.
@@ -14,7 +15,10 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Self
 
 from sandbox.action import Action, Switch
+from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.games.contract import HasLamps, HasLog, HasWaiting, Policy, Press, Rules, StepInfo
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 LAMP_INTERVAL = 0.04
@@ -283,3 +287,88 @@ class HeadlessGame:
             **log,
             **({"lamps": lamps} if (lamps := self._lamps.changes()) else {}),
         }
+
+
+class SteppedGame:
+    """A simulation with its game, advanced step by step by its caller, with its actions and inputs so far."""
+
+    def __init__(self, scene: Scene, engine: str, rules: Rules) -> None:
+        """Start the simulation of a scene, with the rules of a new game.
+
+        Raises:
+            Refusal: the engine does not support the scene.
+        """
+        self.scene, self.engine, self.rules = scene, engine, rules
+        self.session = GameSession(rules)
+        self.simulation: SwitchableSimulation = start(scene, engine)
+        """the running simulation"""
+        self.simulation.contacts()  # contacts are recorded from now on
+        self._done: list[Action] = []
+        self._frame: Frame | None = None  # present state, until an action or step changes it
+        self._update_rules(Contacts.none())
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.simulation.time
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        if self._frame is None:
+            self._frame = self.simulation.frame()
+        return self._frame
+
+    def press(self, control: str, value: float) -> None:
+        """Set a control, and apply the actions that result.
+
+        Raises:
+            ActionError: an action is invalid.
+        """
+        self.act(self.session.press(self.time, control, value))
+
+    def act(self, actions: Sequence[Action]) -> None:
+        """Apply actions of the player.
+
+        Raises:
+            ActionError: an action is invalid.
+        """
+        self._apply(actions)
+        self.session.note_actions(actions)
+
+    def step(self) -> None:
+        """Make one step, and apply the actions of the rules.
+
+        Raises:
+            Divergence, Exhaustion: the engine cannot continue.
+            ActionError: an action of the rules is invalid.
+        """
+        self._frame = None
+        self.simulation.step()
+        self._update_rules(self.simulation.contacts())
+
+    def recording(self) -> Recording:
+        """Return the session so far as a recording."""
+        return Recording(
+            scene=self.scene,
+            engine=self.engine,
+            settings=self.scene.solver,
+            actions=tuple(self._done),
+            duration=self.time,
+            state_hash=self.simulation.state_hash(),
+            presses=self.session.presses,
+            score=self.rules.score,
+        )
+
+    def close(self) -> None:
+        """Release the engine."""
+        self.simulation.close()
+
+    def _update_rules(self, contacts: Contacts) -> None:
+        """Pass the present state to the rules, and apply their actions."""
+        self._apply(self.session.on_step(self.time, self.frame(), contacts))
+
+    def _apply(self, actions: Sequence[Action]) -> None:
+        for action in actions:
+            self._frame = None
+            self.simulation.apply(action)
+            self._done.append(action)

@@ -14,8 +14,8 @@ from matplotlib.patches import Circle, Patch
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.exact.tabletop.shots import ShotBatch
-from sandbox.games.billiards.shots.monte_carlo import Odds
-from sandbox.games.billiards.shots.study import ShotStudy
+from sandbox.measure.shots.monte_carlo import Odds
+from sandbox.measure.shots.study import ShotStudy
 from sandbox.report.style import COLOURS, FAINT, INK, literal, shortened, write_figure
 from sandbox.scene.compile.scene import Scene
 

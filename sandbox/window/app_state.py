@@ -12,7 +12,7 @@ from typing import Any, Concatenate, ParamSpec
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
-from sandbox.games.contract import GameControls, UnsuitableSceneError
+from sandbox.games.contract import UnsuitableSceneError
 from sandbox.games.registry import is_real_time, rules_in_window, scene_in_window
 from sandbox.games.session import GameSession
 from sandbox.recording import Recording
@@ -23,6 +23,7 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import Override, from_document, load
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.window.camera import ViewBox
+from sandbox.window.game_controls import GameControls
 from sandbox.window.game_host import GameHost, controls_of, host_of
 from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes

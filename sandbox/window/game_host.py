@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 from sandbox.action import Action
 from sandbox.game_spec import import_part
-from sandbox.games.contract import Control, GameControls, HasLamps, HasLog, HasWaiting, Rules
+from sandbox.games.contract import Control, HasLamps, HasLog, HasWaiting, Rules
 from sandbox.games.registry import spec_in_window
 from sandbox.games.session import GameSession
 from sandbox.scene.compile.scene import Scene
+from sandbox.window.game_controls import GameControls
 from sandbox.window.playback.live import LiveView
 
 MAX_ENTRIES = 10_000
@@ -81,9 +82,9 @@ def controls_of(host: "GameHost", file: Scene, options: Mapping[str, str]) -> Ga
         options: values of `GameControls.parameters` that were chosen.
     """
     spec = spec_in_window(host.live.scene)
-    if spec is None or spec.controls is None:
+    if spec is None or spec.window is None or spec.window.controls is None:
         return None
-    controls: GameControls = import_part(spec.controls)(host, file, options)
+    controls: GameControls = import_part(spec.window.controls)(host, file, options)
     return controls
 
 

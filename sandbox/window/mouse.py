@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pygame
 
-from sandbox.games.contract import GameControls
 from sandbox.window.context import WindowContext
+from sandbox.window.game_controls import GameControls
 
 ZOOM_PER_NOTCH = 1.15
 """zoom factor of one notch of the wheel"""

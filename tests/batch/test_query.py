@@ -20,13 +20,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import parquet
-from scipy.stats import binomtest
 
 import sandbox
-from sandbox.batch.query import QueryError, StoredRuns, open_store, wilson_bounds
+from sandbox.batch.query import QueryError, StoredRuns, open_store
 from sandbox.batch.store import Store, StoreError
 from sandbox.batch.stored_run import StoredRun
 from sandbox.cli.main import call
+from sandbox.measure.proportion import wilson_interval
 from sandbox.scene.description.world import Settings
 from tests.batch.test_store import sample_run
 from tests.environment import with_root_on_path
@@ -201,24 +201,13 @@ def test_statistics_of_groups_are_those_of_their_values(tmp_path: Path) -> None:
             assert value == pytest.approx(expected.quantile(float(fraction)), rel=1e-12)
         successes = int((members["contacts"] < 100).sum())
         assert each.success_rate == successes / len(members)
-        assert (each.success_low, each.success_high) == wilson_bounds(successes, len(members))
+        assert (each.success_low, each.success_high) == wilson_interval(successes, len(members))
     (whole,) = runs_in(tmp_path).group([])
     assert whole.runs == 300
 
 
 def runs_in(folder: Path) -> StoredRuns:
     return open_store(folder)
-
-
-@given(st.integers(1, 500).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_wilson_bounds_are_those_of_scipy(case: tuple[int, int]) -> None:
-    expected = binomtest(*case).proportion_ci(0.95, "wilson")
-    # 1e-12: rounding of a few operations
-    assert wilson_bounds(*case) == pytest.approx((expected.low, expected.high), abs=1e-12)
-
-
-def test_bounds_without_runs_are_those_of_any_probability() -> None:
-    assert wilson_bounds(0, 0) == (0.0, 1.0)
 
 
 def test_group_of_texts_has_no_statistics(runs: StoredRuns) -> None:

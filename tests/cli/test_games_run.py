@@ -8,7 +8,6 @@ import pytest
 from sandbox.batch.find_run import read_run
 from sandbox.batch.store import Store
 from sandbox.cli.window import _computed
-from sandbox.games import registry
 from sandbox.measure.run.sessions import play_out
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Trajectory
@@ -20,7 +19,7 @@ pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that
 
 @pytest.fixture(autouse=True)
 def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Toy)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Toy)
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 import sandbox.cli.check as checking
-import sandbox.games.artillery.landing_error as missing
-import sandbox.games.billiards.shots.study as studying
 import sandbox.measure.compare.comparison as comparing
+import sandbox.measure.landing_error as missing
+import sandbox.measure.shots.study as studying
 from tests.cli.calling import json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long

@@ -76,6 +76,24 @@ def test_document_has_the_fields_of_the_dataclass_in_order() -> None:
     json.dumps(document, allow_nan=False)
 
 
+@dataclass(frozen=True)
+class Listed:
+    size: int
+    name: str
+
+    json_head: ClassVar = ("name", ("surface", "area"))
+    json_name: ClassVar = "Square"
+
+    @property
+    def area(self) -> int:
+        return self.size**2
+
+
+def test_listed_members_precede_the_other_fields() -> None:
+    assert list(to_json(Listed(3, "n")).items()) == [("name", "n"), ("surface", 9), ("size", 3)]
+    assert list(json_schema(Listed)["properties"]) == ["name", "surface", "size"]
+
+
 def test_value_that_json_cannot_hold_is_refused() -> None:
     with pytest.raises(TypeError, match="complex"):
         to_json([1j])

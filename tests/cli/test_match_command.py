@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.games.billiards.headless import FrameRecord, MatchTable, NoRestError, play_frame
+from sandbox.games.billiards.headless import FrameRecord, NoRestError, play_frame
 from sandbox.games.billiards.match import Match
 from tests.cli.calling import json_of, lines_of
 
@@ -78,7 +78,7 @@ def test_failed_shot_abandons_the_frame(error, monkeypatch, capfd):
     def failing(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(MatchTable, "play", failing)
+    monkeypatch.setattr("sandbox.games.billiards.headless.play_shot", failing)
     status, document, (line,) = json_of(capfd, *QUICK)
     assert (status, document["unfinished"]) == (1, 1)
     assert str(error) in document["frames"][0]["unfinished"]

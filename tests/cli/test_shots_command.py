@@ -9,9 +9,9 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Exhaustion
-from sandbox.games.billiards.shots.shot import ShotSetup, Spread, shot_setup
-from sandbox.games.billiards.shots.study import study_shot
 from sandbox.measure.run.runner import run
+from sandbox.measure.shots.shot import ShotSetup, Spread, shot_setup
+from sandbox.measure.shots.study import study_shot
 from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
 from tests.cli.calling import document_from, document_of, json_of, lines_of, output_of, write_scene

@@ -9,14 +9,14 @@ from sandbox.engines.switching import start
 from sandbox.games.contract import HasRanking, Press, StepInfo, UnsuitableSceneError
 from sandbox.games.landing.bot import LandingBot
 from sandbox.games.landing.rules import (
-    DOWN,
-    ELSEWHERE,
-    FASTER,
-    FOR_A_CRASH,
-    FOR_FUEL,
-    FOR_LANDING,
+    FUEL_POINTS,
     LANDED,
-    TANK,
+    LANDING_POINTS,
+    MAX_CRASH_POINTS,
+    MAX_DESCENT_SPEED,
+    MAX_START_DRIFT,
+    MAX_START_OFFSET,
+    TANK_CAPACITY,
     Landing,
 )
 from sandbox.games.players import POLICIES, ScriptedInput
@@ -60,7 +60,7 @@ def assert_free_fall_crash(game: PlayedGame, height: float) -> None:
 def test_bot_lands_on_every_engine(engine: str) -> None:
     game = play_out(SCENE, LandingBot(1, 1.0), engine)
     assert game.over == LANDED
-    assert FOR_LANDING < game.score < FOR_LANDING + FOR_FUEL
+    assert LANDING_POINTS < game.score < LANDING_POINTS + FUEL_POINTS
     assert game.trajectory.status == "ok"
 
 
@@ -72,7 +72,8 @@ def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     assert game.over == LANDED
     assert game.score > 300  # of 100 for the landing and 900 for a full tank
     displacement = game.trajectory.position[1, 0] - SCENE.bodies.position[0]  # after the first step
-    assert abs(displacement[0]) <= ELSEWHERE + 0.01 * (5.0 + FASTER)  # plus the distance flown in that step
+    in_that_step = 0.01 * (5.0 + MAX_START_DRIFT)
+    assert abs(displacement[0]) <= MAX_START_OFFSET + in_that_step
 
 
 @pytest.mark.fail_slow(60)  # compiles kernels of `reference`
@@ -82,21 +83,23 @@ def test_ship_without_thrust_falls_freely_and_crashes(engine: str) -> None:
 
 
 def test_slow_contact_is_a_landing_and_remaining_fuel_scores() -> None:
-    """Dropped from a height that gives less than `DOWN` it lands without thrust, with a full tank."""
-    height = 0.9 * DOWN**2 / (2.0 * G)
+    """Dropped from a height that gives less than `MAX_DESCENT_SPEED` it lands without thrust, with a full tank."""
+    height = 0.9 * MAX_DESCENT_SPEED**2 / (2.0 * G)
     game = play_out(flat(1.0 + height), "none")
-    assert (game.over, game.score) == (LANDED, FOR_LANDING + FOR_FUEL)
-    burn_time = 0.5  # s of throttle 0.1, which hardly slows the fall: it burns 5 m/s² · 0.1 · 0.5 s of TANK m/s
+    assert (game.over, game.score) == (LANDED, LANDING_POINTS + FUEL_POINTS)
+    burn_time = 0.5  # s of throttle 0.1, which hardly slows the fall: it burns 5 m/s² · 0.1 · 0.5 s
     burning = play_out(flat(1.0 + height), ScriptedInput([Press(0.0, "engine", 0.1), Press(burn_time, "engine", 0.0)]))
     assert burning.over == LANDED
     # One step of tolerance: the rules read a throttle at the end of the first step in which it acts.
-    assert burning.score == pytest.approx(FOR_LANDING + FOR_FUEL * (1.0 - 5.0 * 0.1 * burn_time / TANK), abs=1.0)
+    assert burning.score == pytest.approx(
+        LANDING_POINTS + FUEL_POINTS * (1.0 - 5.0 * 0.1 * burn_time / TANK_CAPACITY), abs=1.0
+    )
 
 
 def test_tilted_contact_is_a_crash() -> None:
     game = play_out(flat(1.7, angle=0.4), "none")
     assert game.over == "crashed: tilted by 23° (limit 15°)"
-    assert 0 < game.score <= FOR_A_CRASH
+    assert 0 < game.score <= MAX_CRASH_POINTS
 
 
 @pytest.mark.fail_slow(60)  # takes over half a second
@@ -105,7 +108,7 @@ def test_empty_tank_stops_the_engine() -> None:
     stop = game.recording.actions[-1]
     assert stop.kind == "throttle"
     assert stop.level == 0.0
-    assert stop.time == pytest.approx(TANK / 5.0, abs=0.011)  # s, at 5 m/s²: within a step
+    assert stop.time == pytest.approx(TANK_CAPACITY / 5.0, abs=0.011)  # s, at 5 m/s²: within a step
     # From then on gravity alone acts.
     run = game.trajectory
     late = run.time > stop.time + 0.02
@@ -116,7 +119,7 @@ def test_empty_tank_stops_the_engine() -> None:
 def test_ship_that_flies_away_is_lost() -> None:
     game = play_out(SCENE, ScriptedInput([Press(0.0, "engine", 1.0)]))
     assert game.over == "lost in space"
-    assert game.score <= FOR_A_CRASH
+    assert game.score <= MAX_CRASH_POINTS
 
 
 def test_contact_beside_the_pad_is_a_crash() -> None:

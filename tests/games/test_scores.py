@@ -9,8 +9,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from sandbox.cli.run_tables import MAX_BINS, ScoreStatistics
 from sandbox.games.high_scores import BEST, FILE, HighScores, initials_of, opened, table_of
-from sandbox.games.scores import MAX_BINS, QUANTILES, Scores
 from sandbox.scene.files.load import loads
 
 SCORES = st.lists(st.one_of(st.integers(-1000, 10_000_000), st.floats(-1e6, 1e6)), min_size=1, max_size=60)
@@ -18,19 +18,19 @@ SCORES = st.lists(st.one_of(st.integers(-1000, 10_000_000), st.floats(-1e6, 1e6)
 
 @given(scores=SCORES)
 def test_statistics_are_those_of_the_sample(scores: list[float]) -> None:
-    found = Scores.of(scores)
-    assert found.count == len(scores) == sum(found.counts)
+    found = ScoreStatistics.of(scores)
+    assert found.count == len(scores) == sum(found.histogram.counts)
     assert found.mean == pytest.approx(np.mean(scores), rel=1e-12, abs=1e-9)  # rounding
-    assert found.quantiles[0] == min(scores)
-    assert found.quantiles[-1] == max(scores)
-    assert list(found.quantiles) == sorted(found.quantiles)
-    assert found.quantiles[QUANTILES.index(0.5)] == pytest.approx(np.median(scores), rel=1e-12, abs=1e-9)
+    quantiles = found.quantiles
+    assert (quantiles["0"], quantiles["1"]) == (min(scores), max(scores))
+    assert list(quantiles.values()) == sorted(quantiles.values())
+    assert quantiles["0.5"] == pytest.approx(np.median(scores), rel=1e-12, abs=1e-9)
 
 
 @given(scores=SCORES)
 @example(scores=[11.0, -5e-324])  # divided by the bin width it is -0
 def test_bins_contain_all_scores_and_have_round_widths(scores: list[float]) -> None:
-    found = Scores.of(scores)
+    found = ScoreStatistics.of(scores).histogram
     assert len(found.edges) == len(found.counts) + 1
     assert len(found.counts) <= MAX_BINS + 2  # the lowest and the highest score may each need one more bin
     assert found.edges[0] <= min(scores)
@@ -41,25 +41,25 @@ def test_bins_contain_all_scores_and_have_round_widths(scores: list[float]) -> N
 
 @given(st.lists(st.integers(-40, 40), min_size=1, max_size=30))
 def test_bins_of_integer_scores_have_integer_edges(scores: list[int]) -> None:
-    assert all(edge == round(edge) for edge in Scores.of(scores).edges)
+    assert all(edge == round(edge) for edge in ScoreStatistics.of(scores).histogram.edges)
 
 
 @pytest.mark.parametrize(("score", "edge"), [(0.3, 3), (0.6, 6), (0.7, 7)])
 def test_bins_include_their_lower_edges(score: float, edge: int) -> None:
-    found = Scores.of([score, 0.05, 1.0])
+    found = ScoreStatistics.of([score, 0.05, 1.0]).histogram
     k = found.edges.index(edge / 10)  # in floating point 3 × 0.1 is more than 0.3
     assert found.counts[k] == 1
 
 
 def test_one_score_gives_one_bin() -> None:
-    found = Scores.of([7])
-    assert (found.deviation, found.counts) == (0.0, (1,))
-    assert found.edges[0] <= 7 < found.edges[1]
+    found = ScoreStatistics.of([7])
+    assert (found.deviation, found.histogram.counts) == (0.0, [1])
+    assert found.histogram.edges[0] <= 7 < found.histogram.edges[1]
 
 
 def test_empty_sample_is_refused() -> None:
     with pytest.raises(ValueError, match="no game"):
-        Scores.of([])
+        ScoreStatistics.of([])
 
 
 @pytest.fixture
@@ -105,6 +105,7 @@ def test_file_survives_a_crash_in_the_middle_of_writing(scores: HighScores) -> N
     # The process dies as in a power cut, with half a file on the disk.
     crash = f"""
 import os, pathlib
+from sandbox.cli.run_tables import MAX_BINS, ScoreStatistics
 from sandbox.games.high_scores import HighScores
 write = pathlib.Path.write_text
 def half(self, text, **rest):

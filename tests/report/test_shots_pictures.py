@@ -7,8 +7,8 @@ import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from sandbox.games.billiards.shots.shot import Spread, shot_setup
-from sandbox.games.billiards.shots.study import ShotStudy, study_shot
+from sandbox.measure.shots.shot import Spread, shot_setup
+from sandbox.measure.shots.study import ShotStudy, study_shot
 from sandbox.report.shots_plot import draw_aims, draw_rests, plot_shots
 from sandbox.scene.files.load import loads
 

@@ -23,9 +23,9 @@ from sandbox.batch.job import Job, RunOptions, run_job
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.store import Store
-from sandbox.games.billiards.shots import odds
 from sandbox.measure.run.ensemble import ensemble
 from sandbox.measure.run.runner import run
+from sandbox.measure.shots import odds
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, load
 from sandbox.scene.files.shipped_scenes import find

@@ -53,7 +53,7 @@ class ArtilleryBot:
             random = draws(Stream.AIM, self._seed, rules.turn)
             self._planner = BotPlanner(rules.world, rules.field, rules.shooter, random, self.skill)
             self._turn = rules.turn
-        return self._planner.go_on()
+        return self._planner.advance()
 
     def _wanted(self, rules: ArtilleryRules, aim: FiringSolution, step: float) -> set[str]:
         """Return the keys to hold now; a key is tapped by releasing it at every second step."""

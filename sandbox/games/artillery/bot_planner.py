@@ -20,7 +20,7 @@ EQUAL_MISS_FRACTION = 0.2
 BIG_WEAPON_PROBABILITY = 0.5
 """probability of a weapon that costs money, if the tank can pay for it"""
 WORK = 6_000
-"""work of the search per step, as counted by `AimSolver.go_on`: 1 to 4 ms, so that the window remains responsive; a
+"""work of the search per step, as counted by `AimSolver.advance`: 1 to 4 ms, so that the window remains responsive; a
 search takes about 80 steps"""
 
 
@@ -64,14 +64,14 @@ class BotPlanner:
                 ground=field.ground,
                 edges=field.artillery.edges,
                 full_speed=self._full_speed,
-                at=target.position[0],
+                target_x=target.position[0],
                 tolerance=EQUAL_MISS_FRACTION * WEAPONS[self.weapon].radius,
             )
         )
 
-    def go_on(self, work: int = WORK) -> FiringSolution | None:
+    def advance(self, work: int = WORK) -> FiringSolution | None:
         """Continue the search by an amount of work; return the shot once it is found, with the error of the bot."""
-        aim = self._search.go_on(work)
+        aim = self._search.advance(work)
         if aim is None:
             return None
         angle_error, speed_error = self._errors

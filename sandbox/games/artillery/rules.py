@@ -374,7 +374,7 @@ class ArtilleryRules:
             self._planner = BotPlanner(self.world, self.field, tank, turn_generator(self.world.seed, 2 * self.turn + 1))
             tank.weapon = self._planner.weapon
         if self._aim is None:
-            self._aim = self._planner.go_on()
+            self._aim = self._planner.advance()
         if self._aim is None:
             return []
         reached = self._gunner.move_towards(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)

@@ -133,7 +133,7 @@ MAX_CHECKS = 6
 CHECK_WORK = 10_000
 """work of one check, in the unit of `TrialShots.fly`"""
 
-Stage = Literal["fan", "finer", "shaken", "checked"]
+Stage = Literal["coarse", "refine", "perturb", "verify"]
 """Stages of the search: coarse grid; subdivision of brackets; candidates and their perturbations; checks of the best
 candidates."""
 
@@ -161,7 +161,7 @@ class TargetingProblem(NamedTuple):
     """behaviour of a shell at the left and right end of the terrain"""
     full_speed: float
     """m/s, full speed"""
-    at: float
+    target_x: float
     """m, x of the target"""
     tolerance: float
     """m, tolerance: shots that land within this distance of the target are hits"""
@@ -176,55 +176,55 @@ class TargetingProblem(NamedTuple):
         muzzle = self.muzzle.at(np.array([aim.angle]))[0]
         velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
         landed = landing(self.world, muzzle, velocity, self.ground, self.edges)
-        return aim._replace(miss=math.inf if landed is None else landed.position[0] - self.at)
+        return aim._replace(miss=math.inf if landed is None else landed.position[0] - self.target_x)
 
 
 class AimSolver:
     """Incremental search for a shot that hits a target. A copy is independent of the original."""
 
-    def __init__(self, range_: TargetingProblem) -> None:
+    def __init__(self, problem: TargetingProblem) -> None:
         self.found: FiringSolution | None = None
         """the shot; None until the search is complete"""
-        self._range = range_
-        self._stage: Stage = "fan"
+        self._problem = problem
+        self._stage: Stage = "coarse"
         angle, fraction = (each.reshape(-1) for each in np.meshgrid(ANGLES, SPEED_FRACTIONS))
-        self._angle, self._speed = angle, range_.full_speed * fraction  # of the trial shots
-        self._trials = range_.trial_shots(self._angle, self._speed, COARSE_STEP)
+        self._angle, self._speed = angle, problem.full_speed * fraction  # of the trial shots
+        self._trials = problem.trial_shots(self._angle, self._speed, COARSE_STEP)
         self._brackets = np.empty((0, 3))  # two angles, between which the miss changes sign, and the speed
         self._subdivisions = 0
         self._candidates: list[FiringSolution] = []  # candidates to check
         self._best: FiringSolution | None = None  # best checked candidate
 
-    def go_on(self, work: int) -> FiringSolution | None:
+    def advance(self, work: int) -> FiringSolution | None:
         """Continue the search by an amount of work; return the shot once it is found.
 
         Args:
             work: in the unit of `TrialShots.fly`; exceeded to complete a step or a check.
         """
         while self.found is None and work > 0:
-            if self._stage == "checked":
+            if self._stage == "verify":
                 work -= CHECK_WORK
                 self._check_next()
             elif not self._trials.done:
                 work -= self._trials.fly(work)
-            elif self._stage == "fan":
+            elif self._stage == "coarse":
                 self._choose_brackets()
-            elif self._stage == "finer":
+            elif self._stage == "refine":
                 self._refine_brackets()
             else:
                 self._order_candidates()
         return self.found
 
-    def all(self) -> FiringSolution:
+    def solve(self) -> FiringSolution:
         """Complete the search, and return the shot."""
         while self.found is None:
-            self.go_on(CHECK_WORK)
+            self.advance(CHECK_WORK)
         return self.found
 
     def _choose_brackets(self) -> None:
         """Choose brackets from the coarse grid: those with the closest impacts and the shortest flights first."""
         trial_shots, angle, speed = self._trials, self._angle, self._speed
-        miss = trial_shots.landing_x - self._range.at
+        miss = trial_shots.landing_x - self._problem.target_x
         at = np.flatnonzero((miss[1:] * miss[:-1] <= 0.0) & (speed[1:] == speed[:-1]))
         jump = np.abs(miss[at + 1] - miss[at])
         at = at[np.argsort(jump + 0.5 * trial_shots.when[at], kind="stable")][:MAX_BRACKETS]
@@ -237,18 +237,18 @@ class AimSolver:
     def _subdivide(self) -> None:
         """Subdivide each bracket by trial shots; without brackets, check the best shot of the grid."""
         if not len(self._brackets):
-            self._stage = "checked"
+            self._stage = "verify"
             return
         low, high, speed = self._brackets.T
         fan = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, BRACKET_PARTS + 1)
-        self._angle, self._speed, self._stage = fan.reshape(-1), np.repeat(speed, BRACKET_PARTS + 1), "finer"
-        self._trials = self._range.trial_shots(self._angle, self._speed, FINE_STEP)
+        self._angle, self._speed, self._stage = fan.reshape(-1), np.repeat(speed, BRACKET_PARTS + 1), "refine"
+        self._trials = self._problem.trial_shots(self._angle, self._speed, FINE_STEP)
 
     def _refine_brackets(self) -> None:
         """Replace each bracket by its part with the change of sign; after the last subdivision, do the secant step."""
         row = np.arange(len(self._brackets))
         fan = self._angle.reshape(len(row), -1)
-        miss = (self._trials.landing_x - self._range.at).reshape(fan.shape)
+        miss = (self._trials.landing_x - self._problem.target_x).reshape(fan.shape)
         jump = np.abs(miss[:, 1:] - miss[:, :-1])
         jump[~(miss[:, 1:] * miss[:, :-1] <= 0.0)] = np.inf
         k = np.argmin(jump, axis=1)
@@ -265,13 +265,13 @@ class AimSolver:
         low, high, speed = self._brackets.T
         angle = low + np.clip(fraction, 0.0, 1.0) * (high - low)
         self._angle = (angle + np.array([[0.0], [-ANGLE_PERTURBATION], [ANGLE_PERTURBATION]])).reshape(-1)
-        self._speed, self._stage = np.tile(speed, 3), "shaken"
-        self._trials = self._range.trial_shots(self._angle, self._speed, FINE_STEP)
+        self._speed, self._stage = np.tile(speed, 3), "perturb"
+        self._trials = self._problem.trial_shots(self._angle, self._speed, FINE_STEP)
 
     def _order_candidates(self) -> None:
         """Order the candidates for the checks."""
-        trial_shots, tolerance, count = self._trials, self._range.tolerance, len(self._brackets)
-        perturbed = (trial_shots.landing_x - self._range.at).reshape(3, -1)
+        trial_shots, tolerance, count = self._trials, self._problem.tolerance, len(self._brackets)
+        perturbed = (trial_shots.landing_x - self._problem.target_x).reshape(3, -1)
         miss, when, speed = perturbed[0], trial_shots.when[:count], self._speed[:count]
         is_sensitive = ~(
             np.abs(perturbed).max(axis=0, initial=0.0) <= INSENSITIVE_FACTOR * tolerance
@@ -280,13 +280,13 @@ class AimSolver:
         shots = [
             FiringSolution(float(self._angle[k]), float(speed[k]), float(miss[k])) for k in order[:MAX_CHECKS].tolist()
         ]
-        self._candidates, self._stage = [*shots, *self._candidates], "checked"
+        self._candidates, self._stage = [*shots, *self._candidates], "verify"
 
     def _check_next(self) -> None:
         """Check the next candidate; take the first within the tolerance, else the nearest of all."""
         assert self._best is not None
-        aim = self._range.with_exact_miss(self._candidates.pop(0))
+        aim = self._problem.with_exact_miss(self._candidates.pop(0))
         if abs(aim.miss) < abs(self._best.miss):
             self._best = aim
-        if abs(aim.miss) <= self._range.tolerance or not self._candidates:
+        if abs(aim.miss) <= self._problem.tolerance or not self._candidates:
             self.found = self._best

@@ -22,7 +22,7 @@ A `Match` can be used without `BilliardsRules`, as follows:
 Applying the moves of the match before a shot undoes the shot.
 """
 
-from sandbox.game_spec import Environment, GameSpec
+from sandbox.game_spec import Environment, GameSpec, WindowGame
 
 GAME = GameSpec(
     names=("8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"),
@@ -30,14 +30,16 @@ GAME = GameSpec(
     tables={"billiards": "sandbox.games.billiards.scene:BILLIARDS"},
     bot="sandbox.games.billiards.bot:BilliardsPolicy",
     view="sandbox.games.billiards.view.view:BilliardsView",
-    controls="sandbox.games.billiards.view.controls:BilliardsControls",
     environments=(
         Environment("EightBall", "billiards/8-ball", 50, "exact"),
         Environment("NineBall", "billiards/9-ball", 50, "exact"),
     ),
     presents="sandbox.games.billiards.scene:presents",
-    rules_on_request=True,
-    plays="sandbox.games.billiards.game:plays",
-    prepare="sandbox.games.billiards.game:without_shots",
+    window=WindowGame(
+        controls="sandbox.games.billiards.view.controls:BilliardsControls",
+        plays="sandbox.games.billiards.game:plays",
+        prepare="sandbox.games.billiards.game:without_shots",
+        rules_on_request=True,
+    ),
     needs_player="sandbox.games.billiards.game:needs_player",
 )

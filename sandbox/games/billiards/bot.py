@@ -18,11 +18,11 @@ from sandbox.games.billiards.placement import spread
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
 from sandbox.games.billiards.shot_search import (
     ShotEvaluator,
+    best_pot_chance,
     break_candidates,
     directions_all_around,
-    ease,
     pot_candidates,
-    straight,
+    straight_pots,
 )
 from sandbox.games.contract import Rules, StepInfo
 from sandbox.scene.description.base import Point
@@ -72,13 +72,13 @@ class BilliardsBot:
         return MAX_SPEED_ERROR * math.pow(0.1, self.skill)
 
     def decide(self, match: Match) -> Decision:
-        """Return the decision after which the next shot is best for this player, by `ease`."""
+        """Return the decision after which the next shot is best for this player, by `best_pot_chance`."""
         player, best, best_value = match.turn, match.choices.decisions[0], -math.inf
         for decision in match.choices.decisions:
             if decision == "claim":
                 return decision
             after = match.decide(decision)
-            good = 1.0 if after.over else ease(after, self.sigma) * (1.0 if after.turn == player else -1.0)
+            good = 1.0 if after.over else best_pot_chance(after, self.sigma) * (1.0 if after.turn == player else -1.0)
             if decision.startswith("rerack"):
                 good = 0.3 if after.turn == player else -0.3
             if good > best_value:
@@ -156,9 +156,9 @@ class BilliardsBot:
             return at
         radius = match.layout.radius[match.layout.number[match.cue]]
         others = [disc for name, disc in match.on_table.items() if name != match.cue]
-        best, best_value = at, straight(match, self.sigma).chance.max(initial=0.0)
+        best, best_value = at, straight_pots(match, self.sigma).chance.max(initial=0.0)
         for point in spread(match.layout, place, radius, others)[::2]:
-            chance = straight(match.place(point), self.sigma).chance.max(initial=0.0)
+            chance = straight_pots(match.place(point), self.sigma).chance.max(initial=0.0)
             if chance > best_value + 1e-9:
                 best, best_value = point, chance
         return best

@@ -1,27 +1,23 @@
 """Headless frames between bots, and their recordings, for `sandbox match`.
 
-`play_frame` runs `BilliardsRules` in a `GameSession`, like every headless game, with two differences: time advances
-only during shots, and each player receives the `Match` at its turn.
+`play_frame` runs `BilliardsRules` in a `SteppedGame`. Time advances only during shots, and each player receives the
+`Match` at its turn.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
 
-from pydantic import TypeAdapter
-
 from sandbox.action import Action, Move
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.engines.switching import start
 from sandbox.games.billiards.game import BilliardsRules
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
-from sandbox.games.session import GameSession
+from sandbox.games.session import SteppedGame
 from sandbox.recording import Recording
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
-from sandbox.trajectory import Contacts
 
 MAX_SHOT_TIME = 300.0
 """s, simulated; a longer shot is abandoned"""
@@ -73,8 +69,6 @@ class FrameTurn:
 class FrameRecord:
     """Played frame, as an immutable value."""
 
-    first: Match
-    """match at the start"""
     match: Match
     """match at the end"""
     turns: tuple[FrameTurn, ...]
@@ -87,72 +81,6 @@ class FrameRecord:
     def shots(self) -> tuple[FrameTurn, ...]:
         """The turns with a shot."""
         return tuple(turn for turn in self.turns if turn.plan is not None)
-
-    def replayed(self) -> "FrameRecord":
-        """Return the frame that the same turns lead to in a new simulation.
-
-        Raises:
-            GameError: the turns cannot be repeated, because the versions differ.
-        """
-        script = FrameScript(self.turns)
-        return play_frame(self.first, (script, script), self.session.engine, most=len(self.turns))
-
-    def document(self) -> "FrameDocument":
-        """Return the frame as it appears in JSON documents, without the session."""
-        plain: list[dict[str, object]] = _TURNS.dump_python(self.turns, mode="json", exclude_defaults=True)
-        state = self.match.state
-        return FrameDocument(
-            game=self.match.rules.name,
-            winner=state.winner,
-            over=state.over,
-            unfinished=self.unfinished,
-            scores=state.scores,
-            shots=len(self.shots),
-            duration=self.session.duration,
-            state_hash=self.session.state_hash,
-            turns=plain,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class FrameDocument:
-    """JSON document of a frame."""
-
-    game: str
-    winner: int | None
-    """seat, or player in a match of several frames"""
-    over: bool
-    unfinished: str | None
-    """why the frame was abandoned"""
-    scores: Sequence[int]
-    """by seat"""
-    shots: int
-    duration: float
-    """s"""
-    state_hash: str | None
-    turns: Sequence[Mapping[str, object]]
-    """every decision and shot, without default values"""
-
-
-class FrameScript:
-    """Player that repeats recorded turns."""
-
-    def __init__(self, turns: Sequence[FrameTurn]) -> None:
-        self._turns = iter(turns)
-
-    def decide(self, match: Match) -> Decision:
-        """Return the next decision."""
-        turn = next(self._turns, None)
-        if turn is None or turn.decision is None or turn.player != match.turn:
-            raise GameError("the frame does not reach this decision")
-        return turn.decision
-
-    def plan(self, match: Match) -> FramePlan:
-        """Return the next shot."""
-        turn = next(self._turns, None)
-        if turn is None or turn.plan is None or turn.player != match.turn:
-            raise GameError("the frame does not reach this shot")
-        return turn.plan
 
 
 def play_frame(
@@ -184,132 +112,76 @@ def play_frame(
     """
     if len(players) != match.state.players:
         raise GameError(f"the match has {match.state.players} players, not {len(players)}")
-    table = MatchTable(match, engine)
-    first, turns = match, list[FrameTurn]()
+    rules = BilliardsRules(match)
+    game = SteppedGame(match.scene, engine, rules)
+    turns: list[FrameTurn] = []
     unfinished: str | None = None
     start_time = perf_counter()
-    while not table.match.over:
+    while not rules.match.over:
         if len(turns) >= most:
             unfinished = f"not finished after {len(turns):,} turns"
         elif time_limit is not None and perf_counter() - start_time > time_limit:
             unfinished = f"not finished after {time_limit:g} s and {len(turns):,} turns"
         if unfinished is not None:
             break
-        match = table.match
+        match = rules.match
         player, number = players[match.turn], match.turn
         decision: Decision | None = None
         plan: FramePlan | None = None
         if match.choices.decisions and not (turns and turns[-1].decision is not None and turns[-1].player == number):
             decision = player.decide(match)
-            table.decide(decision)
+            _decide(game, rules, decision)
         else:
             plan = player.plan(match)
             try:
-                table.play(plan)
+                play_shot(game, rules, plan)
             except (NoRestError, Divergence, Exhaustion) as error:
                 unfinished = f"turn {len(turns) + 1}: {error}"
                 break
-        verdict = table.match.verdict
+        verdict = rules.match.verdict
         outcome = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
         turns.append(FrameTurn(number, decision, plan, *outcome))
         if on_turn is not None:
-            on_turn(turns[-1], table.match)
-    recording = table.recording()
-    table.close()
-    return FrameRecord(first, table.match, tuple(turns), recording, unfinished)
+            on_turn(turns[-1], rules.match)
+    recording = game.recording()
+    game.close()
+    return FrameRecord(rules.match, tuple(turns), recording, unfinished)
 
 
-class MatchTable:
-    """Simulation of a table with its game. Time advances only while a shot is in progress."""
+def _decide(game: SteppedGame, rules: BilliardsRules, decision: Decision) -> None:
+    """Take a decision.
 
-    def __init__(self, match: Match, engine: str) -> None:
-        self._scene, self._engine = match.scene, engine
-        self._simulation = start(match.scene, engine)
-        self._simulation.contacts()  # the recording begins
-        self._rules = BilliardsRules(match)
-        self._game = GameSession(self._rules)
-        self._actions: list[Action] = []
-        self._pending = list(
-            self._run_rules(Contacts.none())
-        )  # actions of the rules that are applied with the next shot
-
-    @property
-    def match(self) -> Match:
-        """The match between two shots."""
-        return self._rules.match
-
-    def decide(self, decision: Decision) -> None:
-        """Take a decision.
-
-        Raises:
-            GameError: the decision is not offered now.
-        """
-        options = self.match.choices.decisions
-        if decision not in options:
-            raise GameError(f"{decision!r} is not offered now; options: {', '.join(options) or 'none'}")
-        self._press(self._rules.decision_input(decision))
-
-    def play(self, plan: FramePlan) -> None:
-        """Place the cue ball, make the call, play the stroke, and step until every ball is at rest.
-
-        Raises:
-            GameError: the place or the call is not allowed.
-            NoRestError: the balls do not come to rest.
-            Divergence: the simulation diverged.
-            Exhaustion: the engine cannot continue.
-        """
-        time, match = self._simulation.time, self.match
-        match.choices.check(plan.call)
-        acts: list[Action] = []
-        if plan.place is not None:
-            match = match.place(plan.place)
-            acts.append(Move(time=time, body=match.cue, position=plan.place, velocity=(0.0, 0.0)))
-        for control in self._rules.call_inputs(plan.call):
-            self._press(control)
-        acts.append(match.strike(plan.stroke, time))
-        # Applied only now, because an action is recorded with the step that follows it.
-        self._pending += acts
-        self._apply_pending()
-        self._game.note_actions(acts)
-        limit = time + MAX_SHOT_TIME
-        while True:
-            self._simulation.step()
-            self._pending = list(self._run_rules(self._simulation.contacts()))
-            if self._rules.waiting or self.match.over:
-                break
-            if self._simulation.time > limit:
-                raise NoRestError(f"a shot does not come to rest within {MAX_SHOT_TIME:g} s")
-
-    def recording(self) -> Recording:
-        """Apply the actions of the rules that are due, and return the scene, and the actions and inputs up to now."""
-        scene, simulation = self._scene, self._simulation
-        self._apply_pending()
-        return Recording(
-            scene=scene,
-            engine=self._engine,
-            settings=scene.solver,
-            actions=tuple(self._actions),
-            duration=simulation.time,
-            state_hash=simulation.state_hash(),
-            presses=self._game.presses,
-            score=self._rules.score,
-        )
-
-    def close(self) -> None:
-        """Release the engine."""
-        self._simulation.close()
-
-    def _apply_pending(self) -> None:
-        for action in self._pending:
-            self._simulation.apply(action)
-        self._actions += self._pending
-        self._pending = []
-
-    def _press(self, control: tuple[str, float]) -> None:
-        self._pending += self._game.press(self._simulation.time, *control)
-
-    def _run_rules(self, contacts: Contacts) -> Sequence[Action]:
-        return self._game.on_step(self._simulation.time, self._simulation.frame(), contacts)
+    Raises:
+        GameError: the decision is not offered now.
+    """
+    options = rules.match.choices.decisions
+    if decision not in options:
+        raise GameError(f"{decision!r} is not offered now; options: {', '.join(options) or 'none'}")
+    game.press(*rules.decision_input(decision))
 
 
-_TURNS = TypeAdapter(tuple[FrameTurn, ...])
+def play_shot(game: SteppedGame, rules: BilliardsRules, plan: FramePlan) -> None:
+    """Place the cue ball, make the call, play the stroke, and step until every ball is at rest.
+
+    Raises:
+        GameError: the place or the call is not allowed.
+        NoRestError: the balls do not come to rest.
+        Divergence: the simulation diverged.
+        Exhaustion: the engine cannot continue.
+    """
+    time, match = game.time, rules.match
+    match.choices.check(plan.call)
+    actions: list[Action] = []
+    if plan.place is not None:
+        match = match.place(plan.place)
+        actions.append(Move(time=time, body=match.cue, position=plan.place, velocity=(0.0, 0.0)))
+    actions.append(match.strike(plan.stroke, time))
+    for control in rules.call_inputs(plan.call):
+        game.press(*control)
+    game.act(actions)
+    while True:
+        game.step()
+        if rules.waiting or rules.match.over:
+            return
+        if game.time > time + MAX_SHOT_TIME:
+            raise NoRestError(f"a shot does not come to rest within {MAX_SHOT_TIME:g} s")

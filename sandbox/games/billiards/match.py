@@ -241,32 +241,6 @@ class Match:
             for k, at in collision_free_moves(self.layout, now, self.position)
         )
 
-    def document(self) -> dict[str, Any]:
-        """Return the match as a JSON object, without its scene."""
-        return {
-            "game": self.rules.name,
-            "state": self.rules.document(self.state),
-            "position": [list(each) for each in self.position],
-            "before": None if self.before is None else [list(each) for each in self.before],
-            "shots": self.shots,
-        }
-
-    @classmethod
-    def restored(cls, scene: Scene, plain: dict[str, Any]) -> Self:
-        """Return the match of a JSON object on its scene, the inverse of `document`.
-
-        Raises:
-            GameError: the object is not a match of this scene.
-        """
-        try:
-            rules, layout = ruleset_named(plain["game"]), TableGeometry.of(scene)
-            state = rules.restored(plain["state"])
-            position, before, shots = plain["position"], plain["before"], int(plain["shots"])
-            placed = _points(position, layout)
-            return cls(layout, rules, state, placed, None if before is None else _points(before, layout), shots)
-        except (KeyError, TypeError, ValueError) as error:
-            raise GameError(f"not a match of this scene: {error}") from None
-
     @cached_property
     def against(self) -> frozenset[tuple[int, int]]:
         """Pairs of body indices that touch before the shot; computed once for all candidate shots."""
@@ -354,10 +328,3 @@ class Match:
         yield (*self.position[self.layout.number[self.cue]], radius)
         if place is not None:
             yield from ((x, y, radius) for x, y in spread(self.layout, place, radius, self._others))
-
-
-def _points(plain: Any, layout: TableGeometry) -> tuple[Point, ...]:
-    points = tuple((float(x), float(y)) for x, y in plain)
-    if len(points) != len(layout.names):
-        raise ValueError(f"expected {len(layout.names)} positions, one a body, but got {len(points)}")
-    return points

@@ -44,7 +44,7 @@ class PotOptions:
     """(T, P) m, distance from the cue ball to the ghost ball"""
 
 
-def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+def pocket_openings(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return aiming points in the mouths of P pockets, (P, 2) m, unit vectors into them, (P, 2), and radii, (P,) m."""
     pockets = np.array(list(layout.pockets.values()), dtype=float).reshape(-1, 3)
     (x0, y0), (x1, y1) = layout.area
@@ -68,7 +68,7 @@ def pot_options(
         others: (B, 2) m, positions of all object balls, including the balls on.
         sigma: standard deviation of the player's aim, rad.
     """
-    points, inward, width = mouths(layout, radius)
+    points, inward, width = pocket_openings(layout, radius)
     to_mouth = points[None] - targets[:, None]
     mouth_distance = np.maximum(np.hypot(to_mouth[..., 0], to_mouth[..., 1]), 1e-9)
     heading = to_mouth / mouth_distance[..., None]
@@ -150,7 +150,7 @@ class ShotEvaluator:
     def value_of(self, outcome: tuple[Match, ShotCall] | None) -> float:
         """Return the value of an outcome for the player: ±1.5 for a won or lost frame, −1 if it could not be computed.
 
-        Other outcomes have a value of −0.7 to 0.8 by the ease of the next shot, plus the value of the points, `UNIT`.
+        Other outcomes have a value of −0.7 to 0.8 by the chance of the next pot, plus the `POINT_VALUES` of the points.
         """
         if outcome is None:
             return -1.0
@@ -161,36 +161,36 @@ class ShotEvaluator:
         if after.verdict is not None and after.verdict.points:
             gained = sum(p if each == player else -p for each, p in enumerate(after.verdict.points))
         points = POINT_VALUES.get(after.rules.name, 0.0) * gained
-        keeps_turn = after.turn == player
-        return points + (0.3 + 0.5 * ease(after, self.sigma) if keeps_turn else -0.1 - 0.6 * ease(after, self.sigma))
+        chance = best_pot_chance(after, self.sigma)
+        return points + (0.3 + 0.5 * chance if after.turn == player else -0.1 - 0.6 * chance)
 
 
 POINT_VALUES = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
 """value of a point, by game; points of other games are ignored"""
 
 
-def ease(match: Match, sigma: float) -> float:
+def best_pot_chance(match: Match, sigma: float) -> float:
     """Return the probability of the player's best straight shot, 0 to 1; in carom an estimate by distances."""
     if match.state.in_hand is not None:
         return IN_HAND_CHANCE
-    cue, targets, others = standing(match)
+    cue, targets, others = ball_positions(match)
     if not len(targets):
         return 0.0
     if not match.layout.pockets:
         distances = np.hypot(*(others - cue).T)
         between = float(np.hypot(*(others[0] - others[-1])))
         return math.exp(-float(distances.min()) - between)
-    return float(straight(match, sigma).chance.max(initial=0.0))
+    return float(straight_pots(match, sigma).chance.max(initial=0.0))
 
 
-def straight(match: Match, sigma: float) -> PotOptions:
+def straight_pots(match: Match, sigma: float) -> PotOptions:
     """Return the straight shots of the player to shoot, at the balls on in the order of `match.state.table`."""
-    cue, targets, others = standing(match)
+    cue, targets, others = ball_positions(match)
     radius = match.layout.radius[match.layout.number[match.cue]]
     return pot_options(match.layout, radius, cue, targets, others, max(sigma, 1e-3))
 
 
-def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
+def ball_positions(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the positions of the cue ball, (2,), of the balls on, (T, 2), and of all object balls, (B, 2), m."""
     number, position, on = match.layout.number, match.position, match.targets
     cue = match.cue
@@ -236,9 +236,9 @@ COMBINATIONS = 5
 def pot_candidates(evaluator: ShotEvaluator, max_pairs: int = COMBINATIONS) -> list[Stroke]:
     """Return strokes that pot a ball on: for each speed and height, the middle of the aims that succeed.
 
-    A fan of aims is simulated for each of the `most` likeliest pairs of a ball and a pocket by geometry.
+    A fan of aims is simulated for each of the `max_pairs` likeliest pairs of a ball and a pocket by geometry.
     """
-    match, shots = evaluator.match, straight(evaluator.match, evaluator.sigma)
+    match, shots = evaluator.match, straight_pots(evaluator.match, evaluator.sigma)
     order = np.argsort(-shots.chance, axis=None, kind="stable")[:max_pairs]
     on = [ball for ball in match.state.table if ball in match.targets and ball != match.cue]
     pocket_names, found = list(match.layout.pockets), []
@@ -279,7 +279,7 @@ def directions_all_around(
     evaluator: ShotEvaluator, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
 ) -> Iterator[Stroke]:
     """Yield strokes in all directions, most densely towards the nearest balls: kicks, banks, caroms, safeties."""
-    cue, targets, others = standing(evaluator.match)
+    cue, targets, others = ball_positions(evaluator.match)
     aims = list(np.linspace(-math.pi, math.pi, count, endpoint=False))
     balls = targets if evaluator.match.layout.pockets else others
     if len(balls):
@@ -293,7 +293,7 @@ def directions_all_around(
 
 def break_candidates(evaluator: ShotEvaluator) -> Iterator[Stroke]:
     """Yield opening strokes of pool: hard, at or near the centre of the nearest ball."""
-    cue, targets, _ = standing(evaluator.match)
+    cue, targets, _ = ball_positions(evaluator.match)
     x, y = targets[np.argmin(np.hypot(*(targets - cue).T))] - cue
     half = 2.0 * evaluator.radius / math.hypot(x, y)
     for speed, part in product((7.5, 9.0), (-0.6, -0.3, -0.1, -0.03, 0.0, 0.03, 0.1, 0.3, 0.6)):

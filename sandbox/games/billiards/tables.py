@@ -165,11 +165,6 @@ TABLES: dict[TableName, TableSpec] = {
 }
 
 
-def spots_of(table: TableName) -> dict[str, Point]:
-    """Return the spots of a table by name, m."""
-    return dict(TABLES[table].spots)
-
-
 WHITE = "#f4f1e6"
 
 

@@ -7,6 +7,6 @@ GAME = GameSpec(
     rules="sandbox.games.landing.rules:Landing",
     vector_rules="sandbox.games.landing.vector_rules:VectorLanding",
     bot="sandbox.games.landing.bot:LandingBot",
-    environments=(Environment("Landing", "games/landing", 5, is_vectorised=True),),
+    environments=(Environment("Landing", "games/landing", 5),),
     real_time=True,
 )

@@ -33,19 +33,19 @@ from sandbox.trajectory import Frame
 SHIP, PAD = "ship", "pad"
 LANDED, LOST = "landed", "lost in space"
 OUTSIDE_PAD, TIPPED_OVER = "crashed outside the pad", "tipped over"
-TANK = 45.0
+TANK_CAPACITY = 45.0
 """N·s per kg of the ship, capacity of the tank: the change of velocity, m/s, in free space"""
-DOWN, ASIDE, TILT = 2.0, 1.0, math.radians(15.0)
+MAX_DESCENT_SPEED, MAX_SIDEWAYS_SPEED, MAX_TILT = 2.0, 1.0, math.radians(15.0)
 """m/s, m/s and rad: limits of vertical speed, horizontal speed and tilt at the first touch"""
 REST_SPEED, REST_TIME = 0.05, 1.0
 """m/s and s: the ship has landed when it has been slower than this for this duration"""
 TIPPED_OVER_ANGLE = math.radians(45.0)
 """rad, tilt on the pad beyond which the ship has tipped over"""
-FOR_LANDING, FOR_FUEL = 100, 900
+LANDING_POINTS, FUEL_POINTS = 100, 900
 """points for a landing, and for a full tank"""
-FOR_A_CRASH, CRASH_DISTANCE, CRASH_SPEED = 50, 50.0, 15.0
+MAX_CRASH_POINTS, CRASH_DISTANCE, CRASH_SPEED = 50, 50.0, 15.0
 """points for a crash; they decrease linearly to 0 at a distance from the pad, m, and at a speed, m/s"""
-ELSEWHERE, FASTER = 18.0, 3.0
+MAX_START_OFFSET, MAX_START_DRIFT = 18.0, 3.0
 """m and m/s, bounds of the random change of the initial horizontal position and velocity"""
 UNLIMITED_STEPS = 1_000_000
 """number of `quiet_steps` where no fuel can be burnt"""
@@ -97,7 +97,7 @@ class Landing:
         self._static_count = len(scene.fixed)
         form = geometry_of(bodies.elements[int(bodies.element[self.ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
-        self.full_tank = TANK * self.mass
+        self.full_tank = TANK_CAPACITY * self.mass
         """N·s"""
         self.forces = {name: math.hypot(*thrust.force) for name, thrust in self.thrusts.items()}
         """N, of each thrust at full level"""
@@ -199,18 +199,19 @@ class Landing:
 
     def landing_points(self, tank: float) -> int:
         """Return the points of a landing with fuel, N·s, left."""
-        return FOR_LANDING + round(FOR_FUEL * tank / self.full_tank)
+        return LANDING_POINTS + round(FUEL_POINTS * tank / self.full_tank)
 
     def crash_points(self, position: FloatArray, velocity: FloatArray) -> int:
         """Return the points of a crash, from the position, m, and the velocity, m/s, of the ship before it, (2,)."""
         proximity = max(1.0 - math.dist(position.tolist(), self.pad) / CRASH_DISTANCE, 0.0)
-        return round(FOR_A_CRASH * proximity * max(1.0 - float(np.hypot(*velocity)) / CRASH_SPEED, 0.0))
+        return round(MAX_CRASH_POINTS * proximity * max(1.0 - float(np.hypot(*velocity)) / CRASH_SPEED, 0.0))
 
     def random_start(self, seed: int, bodies: Bodies) -> Start:
         """Return the random initial position and velocity of the ship."""
         rng = draws(Stream.LANDING, seed)
         (x, y), (vx, vy) = bodies.position[self.ship].tolist(), bodies.velocity[self.ship].tolist()
-        x, vx = x + rng.uniform(-ELSEWHERE, ELSEWHERE), vx + rng.uniform(-FASTER, FASTER)
+        x += rng.uniform(-MAX_START_OFFSET, MAX_START_OFFSET)
+        vx += rng.uniform(-MAX_START_DRIFT, MAX_START_DRIFT)
         return {"position": (x, y), "velocity": (vx, vy)}
 
     def tilt(self, frame: Frame) -> float:
@@ -227,9 +228,9 @@ class Landing:
         return (
             fuel,
             ("height", f"{max(self.height(self._frame), 0.0):.1f} m"),
-            ("down", _marked(f"{format_signed(-up, 1)} m/s", -up > DOWN)),
-            ("sideways", _marked(f"{format_signed(sideways, 1)} m/s", abs(sideways) > ASIDE)),
-            ("tilt", _marked(f"{format_signed(-math.degrees(tilt), 0)}°", abs(tilt) > TILT)),
+            ("down", _marked(f"{format_signed(-up, 1)} m/s", -up > MAX_DESCENT_SPEED)),
+            ("sideways", _marked(f"{format_signed(sideways, 1)} m/s", abs(sideways) > MAX_SIDEWAYS_SPEED)),
+            ("tilt", _marked(f"{format_signed(-math.degrees(tilt), 0)}°", abs(tilt) > MAX_TILT)),
         )
 
     def observation(self) -> Sequence[tuple[str, float]]:
@@ -256,12 +257,14 @@ def crash_reason(velocity: FloatArray, angle: float) -> str | None:
         angle: rad.
     """
     sideways, up = velocity.tolist()
-    if -up > DOWN:
-        return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
-    if abs(sideways) > ASIDE:
-        return f"crashed: {abs(sideways):.1f} m/s sideways (limit {ASIDE:g})"
+    if -up > MAX_DESCENT_SPEED:
+        return f"crashed: {-up:.1f} m/s down (limit {MAX_DESCENT_SPEED:g})"
+    if abs(sideways) > MAX_SIDEWAYS_SPEED:
+        return f"crashed: {abs(sideways):.1f} m/s sideways (limit {MAX_SIDEWAYS_SPEED:g})"
     lean = abs(tilt(angle))
-    return f"crashed: tilted by {math.degrees(lean):.0f}° (limit {math.degrees(TILT):.0f}°)" if lean > TILT else None
+    if lean > MAX_TILT:
+        return f"crashed: tilted by {math.degrees(lean):.0f}° (limit {math.degrees(MAX_TILT):.0f}°)"
+    return None
 
 
 def tilt(angle: float) -> float:

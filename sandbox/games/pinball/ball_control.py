@@ -40,7 +40,7 @@ class Trough:
 
     def __init__(self, board: Playfield) -> None:
         self.board = board
-        self.live: list[int] = []
+        self.in_play: list[int] = []
         self.idle: list[int] = list(board.balls)
         """balls out of play, the next to be served first"""
         self.home_index: dict[int, int] = {ball: k for k, ball in enumerate(board.balls[1:])}
@@ -77,7 +77,7 @@ class Trough:
 
     def lose(self, ball: int) -> None:
         """Remove a ball from the balls in play without moving it, such as a body that no longer exists."""
-        self.live.remove(ball)
+        self.in_play.remove(ball)
         self.flown.discard(ball)
         self.lane_since.pop(ball, None)
 
@@ -87,7 +87,7 @@ class Trough:
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
         """Record which balls have left the lane, serve the next ball, and relaunch balls that are stuck in the lane."""
-        for ball in self.live:
+        for ball in self.in_play:
             if self.in_lane(ball, now):
                 self.flown.discard(ball)
             else:
@@ -108,7 +108,7 @@ class Trough:
     def _serve_next(self, now: StepContext) -> Iterator[Effect]:
         ball, automatic = self.idle.pop(0), self.queue.pop(0)
         self.home_index.pop(ball, None)
-        self.live.append(ball)
+        self.in_play.append(ball)
         self.next = now.time + SERVE_INTERVAL
         if automatic:
             self.lane_since[ball] = now.time
@@ -118,7 +118,7 @@ class Trough:
 
     def _relaunch_stuck(self, now: StepContext) -> Iterator[Effect]:
         """Relaunch balls that were launched automatically, and rest in the lane."""
-        for ball in self.live:
+        for ball in self.in_play:
             slow = math.hypot(*now.frame.velocity[ball].tolist()) < REST_SPEED
             if ball in self.flown or not slow or not self.in_lane(ball, now):
                 continue
@@ -131,7 +131,7 @@ class Trough:
         """Return whether no ball in play is at the position where balls are served."""
         clearance = 2.1 * self.board.radius
         x, y = self.board.serve
-        positions = (frame.position[ball].tolist() for ball in self.live)
+        positions = (frame.position[ball].tolist() for ball in self.in_play)
         return all(math.hypot(px - x, py - y) > clearance for px, py in positions)
 
 
@@ -181,14 +181,15 @@ class BallSearch(Device):
         for drive in sorted(drive for drive, when in self.off.items() if when <= now.time):
             del self.off[drive]
             yield Drive(time=now.time, drive=drive, level=0.0)
-        if now.up or not now.loose:  # a raised flipper may hold a ball; a ball in the lane waits for the player
+        # A raised flipper may hold a ball; a ball in the lane waits for the player.
+        if now.raised_sides or not now.loose_balls:
             self._reset(now.time)
             return
         if self.next is not None:
             yield from self._pulse_next(now)
             return
         quiet_time = now.time - self.last_switch
-        slow = all(math.hypot(*now.frame.velocity[ball].tolist()) < REST_SPEED for ball in now.loose)
+        slow = all(math.hypot(*now.frame.velocity[ball].tolist()) < REST_SPEED for ball in now.loose_balls)
         if quiet_time >= SEARCH_AFTER_AT_ANY_SPEED or (slow and quiet_time >= SEARCH_AFTER):
             self.next = (0, now.time)
             self.round += 1
@@ -220,15 +221,15 @@ class BallSearch(Device):
         """End a round: kick the balls or serve them anew; the next round starts after half the first waiting time."""
         self.next, self.last_switch = None, now.time - SEARCH_AFTER / 2.0
         if self.round == SEARCH_ROUNDS - 1:
-            for ball in now.loose:
+            for ball in now.loose_balls:
                 angle = self.rng.uniform(0.0, 2.0 * math.pi)
                 push = KICK_SPEED * self.board.mass[ball]
                 impulse = (push * math.cos(angle), push * math.sin(angle))
                 yield Impulse(time=now.time, body=self.board.names[ball], impulse=impulse)
         elif self.round >= SEARCH_ROUNDS:
             self._reset(now.time)
-            for ball in now.loose:
+            for ball in now.loose_balls:
                 yield RemoveBall(ball)
-            yield ServeBalls(len(now.loose))
+            yield ServeBalls(len(now.loose_balls))
             yield BallSave(0.0)
             yield ShowMessage("ball found")

@@ -81,7 +81,7 @@ class PinballBot:
 
     def _flip(self, control: str, flippers: tuple[PlayfieldElement, ...], info: StepInfo, rules: PinballRules) -> None:
         """Decide whether to flip, once for each ball that comes into reach."""
-        near = any(_is_in_reach(each, ball, info, rules) for each in flippers for ball in rules.trough.live)
+        near = any(_is_in_reach(each, ball, info, rules) for each in flippers for ball in rules.trough.in_play)
         if near and not self._was_near.get(control) and self._rng.random() < self.skill:
             late = self._rng.normal(0.0, TIMING_ERROR * (1.0 - self.skill))
             self._press_times.setdefault(control, info.time + max(late, 0.0))
@@ -93,7 +93,7 @@ class PinballBot:
         position, velocity = info.frame.position, info.frame.velocity
         waits = any(
             rules.board.in_lane(*position[ball].tolist()) and math.hypot(*velocity[ball].tolist()) < REST_SPEED
-            for ball in rules.trough.live
+            for ball in rules.trough.in_play
         )
         if waits and PLUNGER not in self._release_times:
             self._press_times.setdefault(PLUNGER, info.time)

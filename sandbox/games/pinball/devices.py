@@ -132,10 +132,10 @@ class LaneLights(Device):
         if not all(self.lit):
             return
         self.lit = [False] * len(self.lit)
-        if self.role == "rollover" and now.sheet.times < MAX_BONUS_MULTIPLIER:
-            now.sheet.times += 1
-            yield ShowMessage(f"bonus × {now.sheet.times}")
-            if now.sheet.times == EXTRA_BALL_MULTIPLIER:
+        if self.role == "rollover" and now.sheet.bonus_multiplier < MAX_BONUS_MULTIPLIER:
+            now.sheet.bonus_multiplier += 1
+            yield ShowMessage(f"bonus × {now.sheet.bonus_multiplier}")
+            if now.sheet.bonus_multiplier == EXTRA_BALL_MULTIPLIER:
                 yield ExtraBall("lanes")
         yield PlaySound("set")
         yield Award(BANK_LABELS[self.role], BANK_AWARD[self.role], self.group, BANK_BONUS, hit.ball)

@@ -57,7 +57,7 @@ class DropTargetBanks(Device):
 
     def raise_targets(self, now: StepContext) -> Iterator[Effect]:
         """Raise the targets that are down; if a ball is above one of them, try again at the next step."""
-        if any(self._covers(index, ball, now) for index in self.down for ball in now.live):
+        if any(self._covers(index, ball, now) for index in self.down for ball in now.balls_in_play):
             self.rise = now.time
             return
         self.rise = None

@@ -29,19 +29,19 @@ class PlayerState:
     score: int = 0
     ball: int = 1
     """number of the ball, from 1; `BALLS` + 1 after the last one"""
-    again: int = 0
+    extra_balls: int = 0
     """number of extra balls"""
     bonus: int = 0
     """points that are added at the end of the ball"""
-    times: int = 1
+    bonus_multiplier: int = 1
     """multiplier of the bonus"""
     locked: int = 0
     """balls locked for multiball"""
-    lit: bool = False
+    is_lock_lit: bool = False
     """whether the lock is lit"""
     modes: int = 0
     """number of modes started"""
-    had: set[str] = field(default_factory=set)
+    awarded_reasons: set[str] = field(default_factory=set)
     """reasons for which extra balls were awarded"""
 
     @property
@@ -51,11 +51,11 @@ class PlayerState:
 
     def end_ball(self) -> None:
         """Advance to the next ball, or use an extra ball."""
-        if self.again:
-            self.again -= 1
+        if self.extra_balls:
+            self.extra_balls -= 1
         else:
             self.ball += 1
-        self.bonus, self.times = 0, 1
+        self.bonus, self.bonus_multiplier = 0, 1
 
 
 IMPACT_STEPS = 2
@@ -205,15 +205,15 @@ class StepContext:
     frame: Frame
     sheet: PlayerState
     """state of the present player"""
-    live: tuple[int, ...] = ()
+    balls_in_play: tuple[int, ...] = ()
     """balls in play, including the plunger lane"""
-    loose: tuple[int, ...] = ()
-    """live balls that are neither in the lane nor held by a kicker"""
+    loose_balls: tuple[int, ...] = ()
+    """balls in play that are neither in the lane nor held by a kicker"""
     lane: dict[int, bool] = field(default_factory=dict)
     """ball → whether it is in the plunger lane; cache"""
     waiting: int = 0
     """number of balls to be served"""
-    up: frozenset[str] = field(default_factory=frozenset)
+    raised_sides: frozenset[str] = field(default_factory=frozenset)
     """sides whose flippers are up"""
 
 

@@ -56,7 +56,7 @@ class GameFlow:
     @property
     def balls_left(self) -> bool:
         """Whether any ball is left."""
-        return bool(self.trough.live or self.trough.idle)
+        return bool(self.trough.in_play or self.trough.idle)
 
     def save(self, until: float) -> None:
         """Set the end of the ball save, s."""
@@ -78,8 +78,8 @@ class GameFlow:
 
     def recover_balls(self, now: StepContext) -> Iterator[Effect]:
         """Return balls that have left the table to the plunger, and drop balls that were removed from the scene."""
-        for ball in now.live:
-            if ball not in self.trough.live:
+        for ball in now.balls_in_play:
+            if ball not in self.trough.in_play:
                 continue
             if not now.frame.present[ball]:
                 self.holes.forget(ball)
@@ -110,31 +110,31 @@ class GameFlow:
 
     def award_extra_ball(self, reason: str) -> bool:
         """Award an extra ball, once for each reason; return whether it was awarded."""
-        if reason in self.sheet.had:
+        if reason in self.sheet.awarded_reasons:
             return False
-        self.sheet.had.add(reason)
-        self.sheet.again += 1
+        self.sheet.awarded_reasons.add(reason)
+        self.sheet.extra_balls += 1
         return True
 
     def _update_play(self, now: StepContext) -> Iterator[Effect]:
         trough, tilted, sheet = self.trough, self.nudge.tilted, self.sheet
         if self.fresh and trough.flown:
             self.save(now.time + BALL_SAVE_TIME)
-        elif trough.live and not trough.flown and not self.touched:
+        elif trough.in_play and not trough.flown and not self.touched:
             self.fresh = True  # a weak shot that fell back into the lane
-        if trough.live or (trough.queue and trough.idle):
+        if trough.in_play or (trough.queue and trough.idle):
             return
         trough.queue.clear()
         self.phase, self.until = "count", now.time + (TILT_PAUSE if tilted else BONUS_TIME)
         if sheet.bonus and not tilted:
             yield PlaySound("bonus")
-            yield ShowMessage(f"bonus {sheet.bonus * sheet.times:,}")
+            yield ShowMessage(f"bonus {sheet.bonus * sheet.bonus_multiplier:,}")
 
     def _end_ball(self) -> None:
         """Add the bonus, and pass the turn to the next player."""
-        sheet, again = self.sheet, self.sheet.again > 0
+        sheet, again = self.sheet, self.sheet.extra_balls > 0
         if not self.nudge.tilted:
-            sheet.score += sheet.bonus * sheet.times
+            sheet.score += sheet.bonus * sheet.bonus_multiplier
         sheet.end_ball()
         if not again:
             self.turn = (self.turn + 1) % len(self.sheets)

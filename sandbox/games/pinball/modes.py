@@ -60,12 +60,12 @@ class Multiball(Device):
                 yield PlaySound("jackpot")
                 yield ShowMessage("jackpot")
                 yield Award("jackpot", JACKPOT, bonus=2_000)
-        elif award.kind in ("bank", "standups") and not now.sheet.lit:
-            now.sheet.lit = True
+        elif award.kind in ("bank", "standups") and not now.sheet.is_lock_lit:
+            now.sheet.is_lock_lit = True
             yield PlaySound("ready")
             yield ShowMessage("lock is lit")
-        elif award.kind == "kicker" and award.group == LOCK_GROUP and now.sheet.lit and award.ball is not None:
-            now.sheet.lit = False
+        elif award.kind == "kicker" and award.group == LOCK_GROUP and now.sheet.is_lock_lit and award.ball is not None:
+            now.sheet.is_lock_lit = False
             now.sheet.locked += 1
             yield Award("lock", LOCK)
             if now.sheet.locked < self.size:
@@ -79,7 +79,7 @@ class Multiball(Device):
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
         """End multiball when one ball is left."""
-        if self.on and len(now.live) + now.waiting <= 1:
+        if self.on and len(now.balls_in_play) + now.waiting <= 1:
             self.on = False
             yield ShowMessage("multiball is over")
 
@@ -90,7 +90,7 @@ class Multiball(Device):
 
     def lights(self, now: StepContext) -> Iterator[Light]:
         """Light the lock."""
-        return (Light(name) for name in self.holes if now.sheet.lit and not self.on)
+        return (Light(name) for name in self.holes if now.sheet.is_lock_lit and not self.on)
 
     def _start(self, now: StepContext) -> Iterator[Effect]:
         """Start multiball: serve all other balls; the kicker releases its ball."""
@@ -156,7 +156,7 @@ class Modes(Device):
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
         """Advance the clock while a ball is loose."""
-        if self.mode is None or not now.loose:
+        if self.mode is None or not now.loose_balls:
             return
         self.left -= self.board.dt
         if self.left <= TIME_ROUNDING:

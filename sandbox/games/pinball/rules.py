@@ -75,13 +75,13 @@ def observation(
     sheet, nudge = flow.sheet, flow.nudge
     yield "player", flow.turn
     yield "ball", sheet.ball
-    yield "shoot again", sheet.again
+    yield "shoot again", sheet.extra_balls
     yield "bonus", sheet.bonus
-    yield "bonus times", sheet.times
+    yield "bonus times", sheet.bonus_multiplier
     yield "ball save", saved
-    yield "balls in play", len(flow.trough.live)
+    yield "balls in play", len(flow.trough.in_play)
     yield "locked", sheet.locked
-    yield "lock lit", sheet.lit
+    yield "lock lit", sheet.is_lock_lit
     yield "multiball", multiball.on
     yield "mode ready", modes.ready
     yield "mode", 0 if modes.mode is None else 1 + modes.modes.index(modes.mode)
@@ -113,13 +113,13 @@ def display_lines(
     """
     sheet = sheets[turn]
     ball = f"{min(sheet.ball, BALLS)} of {BALLS}"
-    lines = [("Ball", f"{ball}, shoot again" if sheet.again else ball)]
+    lines = [("Ball", f"{ball}, shoot again" if sheet.extra_balls else ball)]
     if len(sheets) > 1:
         lines.insert(0, ("Player", f"{turn + 1} of {len(sheets)}"))
         lines += [(f"Player {k + 1}", f"{each.score:,}") for k, each in enumerate(sheets) if k != turn]
-    lines.append(("Bonus", f"{sheet.bonus:,} × {sheet.times}"))
-    if sheet.locked or sheet.lit:
-        lit = ["lock is lit"] if sheet.lit else []
+    lines.append(("Bonus", f"{sheet.bonus:,} × {sheet.bonus_multiplier}"))
+    if sheet.locked or sheet.is_lock_lit:
+        lit = ["lock is lit"] if sheet.is_lock_lit else []
         lines.append(("Locked", ", ".join([str(sheet.locked), *lit])))
     if modes.mode is not None:
         lines.append((modes.mode.name.capitalize(), f"{modes.to_go} to go, {modes.left:.0f} s"))
@@ -163,7 +163,7 @@ class PinballRules:
         self._lamped = tuple(each for each in self.devices if type(each).lights is not Device.lights)
         self.flow = GameFlow(board, self.holes, self.nudge)
         self.flow.devices = self.devices
-        self.up: set[str] = set()
+        self.raised_sides: set[str] = set()
         """sides whose flippers are up"""
         self.message = ("", 0.0)
         """last message, and the time until which it is shown, s"""
@@ -251,16 +251,16 @@ class PinballRules:
 
     def _update_context(self, now: StepContext) -> None:
         """Update the context by the state of trough and kickers."""
-        trough = self.trough
-        now.sheet, now.live, now.waiting = self.sheet, tuple(trough.live), len(trough.queue)
-        now.loose = tuple(ball for ball in trough.live if ball not in self.holes.held and not trough.in_lane(ball, now))
-        now.up = frozenset(self.up)
+        trough, held = self.trough, self.holes.held
+        now.sheet, now.balls_in_play, now.waiting = self.sheet, tuple(trough.in_play), len(trough.queue)
+        now.loose_balls = tuple(ball for ball in trough.in_play if ball not in held and not trough.in_lane(ball, now))
+        now.raised_sides = frozenset(self.raised_sides)
 
     def _step(self, info: StepInfo, now: StepContext) -> Iterator[Effect]:
         """Yield the effects of a step; each is applied before the next is computed."""
         self._update_context(now)
         for hit in self.switches.read(info):
-            if hit.ball in now.live:
+            if hit.ball in now.balls_in_play:
                 yield from self._hit(hit, now)
         yield from self.flow.recover_balls(now)
         self._update_context(now)
@@ -269,14 +269,14 @@ class PinballRules:
             yield from device.tick(now)
         if self.nudge.tilted and not tilted:
             self.flow.save(0.0)
-            for side in sorted(self.up):
+            for side in sorted(self.raised_sides):
                 yield from self._set_flippers(side, False, now)
             self._update_context(now)
         yield from self.trough.tick(now)
         yield from self.flow.update(now)
 
     def _hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
-        if hit.ball not in self.trough.live:  # an earlier hit of this step removed it
+        if hit.ball not in self.trough.in_play:  # an earlier hit of this step removed it
             return
         self.flow.touched = True
         if hit.element.role == "drain":
@@ -287,12 +287,12 @@ class PinballRules:
 
     def _set_flippers(self, side: str, up: bool, now: StepContext) -> list[Action]:
         """Raise or release the flippers of a side."""
-        if up and side not in self.up:
+        if up and side not in self.raised_sides:
             self._cues.append("flipper")
             for lamps in self.lamps:
                 lamps.rotate(side)
-        (self.up.add if up else self.up.discard)(side)
-        now.up = frozenset(self.up)
+        (self.raised_sides.add if up else self.raised_sides.discard)(side)
+        now.raised_sides = frozenset(self.raised_sides)
         return [Drive(time=now.time, drive=each.name, level=float(up)) for each in self.board.flippers(side)]
 
     def _set_plunger(self, value: float, now: StepContext) -> Iterator[Effect]:
@@ -301,7 +301,7 @@ class PinballRules:
         if plungers:
             yield from (Drive(time=now.time, drive=each.name, level=value) for each in plungers)
         elif not value:
-            for ball in now.live:
+            for ball in now.balls_in_play:
                 if self.trough.in_lane(ball, now):
                     yield from self.trough.launch(ball, now)
 

@@ -126,7 +126,7 @@ class NudgeAndTilt(Device):
         struck = self._step_bob(now.time)
         self.jolts = [(began, a) for began, a in self.jolts if began + JOLT_TIME > now.time + _TIME_ROUNDING]
         yield from self._forces(now)
-        if not struck or self.tilted or now.time < self.quiet or not now.loose:
+        if not struck or self.tilted or now.time < self.quiet or not now.loose_balls:
             return
         self.quiet = now.time + SAME_PUSH_TIME
         self.warnings += 1
@@ -161,8 +161,8 @@ class NudgeAndTilt(Device):
     def _forces(self, now: StepContext) -> Iterator[Effect]:
         """Yield the forces that change."""
         wanted = self._mean_acceleration(now.time, now.time + self.board.dt) if self.jolts else 0j
-        for ball in sorted({*self.pushed, *now.loose}) if wanted or self.pushed else ():
-            push = wanted if ball in now.loose else 0j
+        for ball in sorted({*self.pushed, *now.loose_balls}) if wanted or self.pushed else ():
+            push = wanted if ball in now.loose_balls else 0j
             if push == self.pushed.get(ball, 0j):
                 continue
             self.pushed[ball] = push

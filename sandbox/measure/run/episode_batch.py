@@ -1,16 +1,54 @@
 """Many episodes of a game, advanced together by compiled calls."""
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.contract import HasWorldBatch, WorldBatch
+from sandbox.engines.contract import HasWorldBatch, Members, WorldBatch, WorldStates
 from sandbox.engines.registry import start
-from sandbox.games.contract import VectorRules
-from sandbox.games.registry import vector_rules_of
+from sandbox.game_spec import import_part
+from sandbox.games.contract import Control
+from sandbox.games.registry import find_spec
 from sandbox.measure.seeds import is_random
 from sandbox.scene.compile.scene import Scene
+
+
+class VectorRules(Protocol):
+    """Rules of M independent games of one scene, as arrays: what `Rules` of each game would do, bit for bit.
+
+    Only games whose controls set levels of thrusts can have them. A host calls:
+
+        restart(games, seeds)                  start states of new games
+        set_controls(games, levels)            controls, between two steps
+        on_step(games, states)                 after at most `quiet_steps(dt)` steps, and after a step with contacts
+
+    A game in which a body is removed is over.
+    """
+
+    controls: tuple[Control, ...]
+    score: IntArray
+    """(M,)"""
+    game_over: list[str | None]
+    """reason why each game is over; None while it runs"""
+    thrust_level: FloatArray
+    """(M, T) level of each thrust of the scene, as the rules set it"""
+
+    def restart(self, games: IntArray, seeds: Sequence[int]) -> Members:
+        """Start games, by their (K,) indices, with K seeds; return the K start states of their bodies."""
+
+    def set_controls(self, games: IntArray, levels: FloatArray) -> None:
+        """Set the controls of K games to levels (K, C), from 0 to 1."""
+
+    def quiet_steps(self, dt: float) -> IntArray:
+        """Return for each game, (M,), what `HasQuietSteps.quiet_steps` returns."""
+
+    def on_step(self, games: IntArray, states: WorldStates) -> None:
+        """Update games, by their (K,) indices, after steps; the states are those of all M worlds."""
+
+    def observation(self) -> FloatArray:
+        """Return the values (M, O) of the observation of each game."""
 
 
 class EpisodeBatch:
@@ -34,9 +72,10 @@ class EpisodeBatch:
             UnsuitableSceneError: the scene lacks an element that its game needs.
             Refusal: the engine does not support the scene.
         """
-        rules = vector_rules_of(scene, count)
-        if rules is None or is_random(scene):
+        spec = find_spec(scene.play.game)
+        if spec is None or spec.vector_rules is None or is_random(scene):
             return None
+        rules: VectorRules = import_part(spec.vector_rules)(scene, scene.bodies, count)
         simulation = start(scene, engine)
         worlds = simulation.world_batch(count) if isinstance(simulation, HasWorldBatch) else None
         simulation.close()

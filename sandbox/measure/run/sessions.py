@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sandbox.action import Action, Switch, actions_from_json
+from sandbox.action import Switch, actions_from_json
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import UnknownEngineError, engine_named
-from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.frame_table import FrameTable
-from sandbox.games.contract import Control, HasQuietSteps, Policy, Press, Rules
+from sandbox.games.contract import Control, HasQuietSteps, Policy, Press
 from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import required_rules
-from sandbox.games.session import GameSession, HeadlessGame
+from sandbox.games.session import HeadlessGame, SteppedGame
 from sandbox.measure.run.runner import run
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
@@ -89,7 +88,7 @@ def rerun(
     Raises:
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
-        UnfitError: the scene lacks an element that its game needs.
+        UnsuitableSceneError: the scene lacks an element that its game needs.
     """
     return run(recording, engine, audit=audit, on_progress=on_progress)
 
@@ -128,7 +127,7 @@ def play_out(
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
     Raises:
-        UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+        UnsuitableSceneError: the scene has no game with rules, or lacks an element that its game needs.
         SceneError: the script has faults.
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
@@ -165,37 +164,20 @@ MAX_QUIET_STEPS = 64
 """Largest number of steps that an `Episode` makes at once."""
 
 
-class Episode:
-    """Scene with a game that runs step by step, for environments."""
+class Episode(SteppedGame):
+    """Scene with a game that runs to the duration of the scene, for environments."""
 
     def __init__(self, scene: Scene, engine: str) -> None:
         """Start the scene and its game.
 
         Raises:
-            UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+            UnsuitableSceneError: the scene has no game with rules, or lacks an element that its game needs.
             Refusal: the engine does not support the scene.
         """
-        self.scene, self.engine = scene, engine
-        self._session = GameSession(required_rules(scene))
-        self.simulation: SwitchableSimulation = start(scene, engine)
-        """the running simulation"""
-        self.simulation.contacts()
-        self._done: list[Action] = []
-        self._state: Frame | None = None  # present state, until an action or step changes it
+        super().__init__(scene, engine, required_rules(scene))
         self._table = FrameTable(MAX_QUIET_STEPS, len(self.simulation.bodies))
         self._quiet_rules = self.rules if isinstance(self.rules, HasQuietSteps) else None
         self._levels = [0.0] * len(self.rules.controls)
-        self._update_rules(Contacts.none())
-
-    @property
-    def rules(self) -> Rules:
-        """Rules of the game in their present state."""
-        return self._session.rules
-
-    @property
-    def time(self) -> float:
-        """Simulated time, s."""
-        return self.simulation.time
 
     @property
     def late(self) -> bool:
@@ -207,26 +189,17 @@ class Episode:
         """Whether the scene or the game is over."""
         return self.late or self.rules.game_over is not None
 
-    def frame(self) -> Frame:
-        """Return the present state."""
-        if self._state is None:
-            self._state = self.simulation.frame()
-        return self._state
-
-    def press(self, levels: Sequence[float]) -> None:
+    def set_levels(self, levels: Sequence[float]) -> None:
         """Set each control to a level from 0 to 1; a digital control is on above one half.
 
         Raises:
             ActionError: an action of the game is invalid.
         """
-        time = self.simulation.time
         for k, (control, level) in enumerate(zip(self.rules.controls, levels, strict=True)):
             value = _value(control, level)
             if value != self._levels[k]:
                 self._levels[k] = value
-                acts = self._session.press(time, control.name, value)
-                self._apply(acts)
-                self._session.note_actions(acts)
+                self.press(control.name, value)
 
     def advance(self, steps: int) -> None:
         """Advance by a number of steps dt, or to the end, and apply the actions of the rules after each.
@@ -245,16 +218,14 @@ class Episode:
             if quiet > 1:
                 steps -= self._advance_quietly(quiet)
             else:
-                self._state = None
-                self.simulation.step()
-                self._update_rules(self.simulation.contacts())
+                self.step()
                 steps -= 1
 
     def _advance_quietly(self, steps: int) -> int:
         """Make at most so many steps, of which the rules see only the last, and the one before if something happens."""
         simulation, table, retired = self.simulation, self._table, self.simulation.retired
         table.clear()
-        self._state = None
+        self._frame = None
         try:
             simulation.advance(steps, table, until_event=True)
         except (Divergence, Exhaustion):
@@ -272,7 +243,7 @@ class Episode:
 
     def _show_quiet_step(self, frame: Frame) -> None:
         """Pass a step without contacts to the rules, after others have followed it."""
-        if self._session.on_step(frame.time, frame, Contacts.none()):
+        if self.session.on_step(frame.time, frame, Contacts.none()):
             raise RuntimeError(f"the rules of {self.scene.play.game!r} acted in a step announced as quiet")
 
     @property
@@ -280,33 +251,6 @@ class Episode:
         """Number of steps to the duration of the scene."""
         dt = self.scene.solver.dt
         return math.ceil((self.scene.world.duration - self.simulation.time) / dt - 0.5)
-
-    def recording(self) -> Recording:
-        """Return the session so far as a recording."""
-        return Recording(
-            scene=self.scene,
-            engine=self.engine,
-            settings=self.scene.solver,
-            actions=tuple(self._done),
-            duration=self.simulation.time,
-            state_hash=self.simulation.state_hash(),
-            presses=self._session.presses,
-            score=self.rules.score,
-        )
-
-    def close(self) -> None:
-        """Release the engine."""
-        self.simulation.close()
-
-    def _update_rules(self, contacts: Contacts) -> None:
-        """Pass the present state to the rules, and apply their actions."""
-        self._apply(self._session.on_step(self.simulation.time, self.frame(), contacts))
-
-    def _apply(self, acts: Sequence[Action]) -> None:
-        for action in acts:
-            self._state = None
-            self.simulation.apply(action)
-            self._done.append(action)
 
 
 def _value(control: Control, level: float) -> float:

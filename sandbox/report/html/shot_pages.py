@@ -13,7 +13,7 @@ from markupsafe import Markup
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shot_result import ShotEvent, ShotResult
 from sandbox.formatting import UNKNOWN, format_number, format_plural
-from sandbox.games.billiards.shots.monte_carlo import Odds
+from sandbox.measure.shots.monte_carlo import Odds
 from sandbox.report.html.page import (
     Content,
     HtmlColumn,

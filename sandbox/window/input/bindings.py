@@ -10,10 +10,11 @@ from typing import NamedTuple
 import pygame
 
 from sandbox.action import Action, Drive, Throttle
-from sandbox.games.contract import Control, GameControls
+from sandbox.games.contract import Control
 from sandbox.scene.compile.drives import names_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import default_name
+from sandbox.window.game_controls import GameControls
 from sandbox.window.game_host import GameHost
 from sandbox.window.input.body_tools import BodyTools
 from sandbox.window.input.keymap import GLOBAL

@@ -55,7 +55,7 @@ def assert_hit(
     ground, air = hills(seed, roughness, (a, b)), world(*drags, wind)
     origin, target = (b, a) if back else (a, b)
     muzzle = Muzzle((origin, ground.under(origin, 1.5) + 0.75), 2.25)
-    aim = AimSolver(TargetingProblem(air, muzzle, ground, edges, 75.0, target, 0.2 * RADIUS)).all()
+    aim = AimSolver(TargetingProblem(air, muzzle, ground, edges, 75.0, target, 0.2 * RADIUS)).solve()
     velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
     found = landing(air, muzzle.at(np.array([aim.angle]))[0], velocity, ground, edges)
     assert found is not None
@@ -84,7 +84,7 @@ def battlefield(bot: float) -> Battlefield:
 
 def solution(turn: int, bot: float) -> FiringSolution:
     field = battlefield(bot)
-    aim = BotPlanner(loads(DUEL).world, field, field.tanks.every[0], turn_generator(0, turn)).go_on(10**9)
+    aim = BotPlanner(loads(DUEL).world, field, field.tanks.every[0], turn_generator(0, turn)).advance(10**9)
     assert aim is not None
     return aim
 
@@ -94,10 +94,10 @@ def test_search_in_steps_and_in_copies_finds_the_same_solution(edges: Edges) -> 
     ground, air = hills(5, 0.4, (60.0, 240.0)), world(0.05, 0.0, 4.0)
     muzzle = Muzzle((60.0, ground.under(60.0, 1.5) + 0.75), 2.25)
     problem = TargetingProblem(air, muzzle, ground, edges, 75.0, 240.0, 0.2 * RADIUS)
-    complete, stepwise, copies = AimSolver(problem).all(), AimSolver(problem), 0
-    while stepwise.go_on(20_000) is None:
+    complete, stepwise, copies = AimSolver(problem).solve(), AimSolver(problem), 0
+    while stepwise.advance(20_000) is None:
         original, stepwise = stepwise, copy.deepcopy(stepwise)
-        original.go_on(50_000)  # continuing the original does not change the copy
+        original.advance(50_000)  # continuing the original does not change the copy
         copies += 1
     assert copies >= 10
     assert stepwise.found == complete

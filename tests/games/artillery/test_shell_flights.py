@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 
 from sandbox.engines.reference.integrators import INTEGRATORS, transition
 from sandbox.games.artillery.ballistics import Flight, crossing, first_strike, inputs_of, landing, plain_air, rk4
-from sandbox.games.artillery.landing_error import exact_landing
 from sandbox.games.artillery.terrain import Ground
+from sandbox.measure.landing_error import exact_landing
 from sandbox.scene.description.world import World
 from tests.games.artillery.grounds import G, flat, hills, shot, world
 

@@ -1,5 +1,6 @@
 """Billiards tables of tests: the shipped scenes, and matches with balls at given positions."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -25,13 +26,16 @@ def match(name: str, **terms: Any) -> Match:
 
 def match_with_balls_at(name: str, positions: dict[str, Point], **terms: Any) -> Match:
     """Return a match with balls at given positions; the other balls are at their initial positions."""
-    scene = table(name)
-    position = scene.bodies.position.copy()
-    for ball, at in positions.items():
-        position[scene.bodies.names.index(ball)] = at
-    initial = Match.begin(scene, **terms)
-    document = initial.document() | {"position": position.tolist()}
-    return Match.restored(scene, document)
+    initial = match(name, **terms)
+    return changed_match(replace(initial, position=initial.layout.start), positions)
+
+
+def changed_match(now: Match, positions: dict[str, Point] | None = None, **state: Any) -> Match:
+    """Return a match with balls at other positions, and other values of the fields of its state."""
+    position = list(now.position)
+    for ball, at in (positions or {}).items():
+        position[now.layout.number[ball]] = at
+    return replace(now, position=tuple(position), state=replace(now.state, **state), verdict=None)
 
 
 def run_until_rest(simulation: Simulation) -> Contacts:

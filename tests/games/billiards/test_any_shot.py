@@ -1,6 +1,5 @@
 """Every game with random shots: no exception, valid states, and every frame ends."""
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.games.billiards.rules.base import BallEvent, GameError, Ruleset, Ruling, ShotCall, Situation
+from sandbox.games.billiards.rules.base import BallEvent, Ruleset, Ruling, ShotCall, Situation
 from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.rules.snooker import SnookerState, remaining
 
@@ -57,7 +56,6 @@ def assert_valid_state(rules: Ruleset[Any], state: Any) -> None:
     assert targets <= set(state.table)
     assert bool(targets) != state.over
     assert state.over or state.decisions[:1] in ((), ("play",))
-    assert rules.restored(json.loads(json.dumps(rules.document(state)))) == state
 
 
 def assert_valid_transition(rules: Ruleset[Any], before: Any, verdict: Ruling[Any]) -> None:
@@ -129,12 +127,3 @@ def test_frame_of_successful_shots_with_some_mistakes_ends(name: str, players: i
         if state.over:
             break
     assert state.over
-
-
-@pytest.mark.parametrize("name", RULESETS)
-def test_malformed_state_is_refused(name: str) -> None:
-    rules = RULESETS[name]
-    good = rules.document(rules.start())
-    for bad in ({}, [], {**good, "turn": "who"}, {**good, "turn": 2}, {**good, "more": 1}):
-        with pytest.raises(GameError):
-            rules.restored(bad)

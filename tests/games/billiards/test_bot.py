@@ -8,10 +8,10 @@ from sandbox.games.billiards.bot import MAX_AIM_ERROR, MIN_AIM_ERROR, BilliardsB
 from sandbox.games.billiards.headless import play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
-from sandbox.games.billiards.shot_search import ease, pot_options
+from sandbox.games.billiards.shot_search import best_pot_chance, pot_options
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
-from tests.games.billiards.tables_by_hand import match, match_with_balls_at, table
+from tests.games.billiards.tables_by_hand import changed_match, match, table
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
@@ -20,9 +20,7 @@ FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
 
 def match_with_one_at(one: Point, cue: Point) -> Match:
     """Return a match with the 1 on and the other balls away from it."""
-    document = match_with_balls_at("9-ball", {**FAR, "1": one, "cue": cue}).document()
-    document["state"] |= {"opening": False, "in_hand": None}
-    return Match.restored(table("9-ball"), document)
+    return changed_match(match("9-ball"), {**FAR, "1": one, "cue": cue}, opening=False, in_hand=None)
 
 
 def pots_the_one(bot: BilliardsBot, now: Match) -> bool:
@@ -70,23 +68,19 @@ def test_same_seed_gives_the_same_plan_and_errors_have_the_stated_deviation() ->
 
 
 def test_ball_in_hand_is_placed_where_a_pot_is_easier() -> None:
-    document = match_with_one_at((0.9, 2.0), (0.3, 0.5)).document()
-    document["state"] |= {"in_hand": "anywhere"}
-    now = Match.restored(table("9-ball"), document)
+    now = changed_match(match_with_one_at((0.9, 2.0), (0.3, 0.5)), in_hand="anywhere")
     plan = BilliardsBot(0.5, 1).intend(now)
     assert plan.place is not None
     assert now.refusal(plan.place) is None
     before, after = match_with_one_at((0.9, 2.0), (0.3, 0.5)), match_with_one_at((0.9, 2.0), plan.place)
-    assert ease(after, 0.01) > ease(before, 0.01)
+    assert best_pot_chance(after, 0.01) > best_pot_chance(before, 0.01)
 
 
 def test_snookered_bot_hits_the_ball_on() -> None:
     # The 1 lies behind a row of other balls: it can be hit only by a cushion.
     row = {str(k): (0.36 + 0.06 * k, 1.2) for k in range(2, 10)}
-    document = match_with_balls_at("9-ball", {**row, "1": (0.7, 1.6), "cue": (0.7, 0.9)}).document()
-    document["state"] |= {"opening": False, "in_hand": None}
-    now = Match.restored(table("9-ball"), document)
-    assert ease(now, 0.001) == 0.0
+    now = changed_match(match("9-ball"), {**row, "1": (0.7, 1.6), "cue": (0.7, 0.9)}, opening=False, in_hand=None)
+    assert best_pot_chance(now, 0.001) == 0.0
     plan = BilliardsBot(1.0, 1).intend(now)
     outcome = Table(now.scene).with_balls(dict(zip(now.layout.names, now.position, strict=True))).shoot(plan.stroke)
     after = now.played(outcome.contacts, outcome.position, plan.call)
@@ -94,7 +88,7 @@ def test_snookered_bot_hits_the_ball_on() -> None:
     assert not after.verdict.fouls
 
 
-def test_ease_is_the_pot_probability_under_normal_errors() -> None:
+def test_chance_of_a_pot_is_the_pot_probability_under_normal_errors() -> None:
     """Straight pot, where the error of the object ball is that of the contact point: erf(δ / √2 σ)."""
     layout = TableGeometry.of(table("9-ball"))
     radius = layout.radius[0]
@@ -136,14 +130,9 @@ def test_higher_skill_wins_more_frames(name: str, terms: dict[str, int]) -> None
 
 def test_bot_calls_the_eight_and_its_pocket() -> None:
     now = match("8-ball")
-    document = now.document()
-    document["state"] |= {"opening": False, "in_hand": None, "groups": ["solids", "stripes"], "table": ["8", "9"]}
-    pocket = table("8-ball").pockets[2].position
-    for ball in range(1, 16):
-        if ball not in (8, 9):
-            document["position"][now.layout.number[str(ball)]] = list(pocket)
-    document["position"][now.layout.number["8"]] = [1.0, 1.27]
-    document["position"][now.layout.number["9"]] = [0.3, 0.3]
-    document["position"][now.layout.number["cue"]] = [0.7, 1.27]
-    plan = BilliardsBot(0.9, 1).intend(Match.restored(table("8-ball"), document))
+    pocketed = dict.fromkeys(map(str, range(1, 16)), table("8-ball").pockets[2].position)
+    positions = {**pocketed, "8": (1.0, 1.27), "9": (0.3, 0.3), "cue": (0.7, 1.27)}
+    groups = ("solids", "stripes")
+    now = changed_match(now, positions, opening=False, in_hand=None, groups=groups, table=("8", "9"))
+    plan = BilliardsBot(0.9, 1).intend(now)
     assert (plan.call.ball, plan.call.pocket) == ("8", "right pocket")

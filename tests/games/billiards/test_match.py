@@ -1,7 +1,5 @@
 """Match: verdicts of shots, spotted balls, undone shots."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -12,7 +10,7 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placement import placement_refusal
 from sandbox.games.billiards.rules.base import GameError, ShotCall
 from sandbox.scene.description.surface import Stroke
-from tests.games.billiards.tables_by_hand import match, match_with_balls_at, run_until_rest, table
+from tests.games.billiards.tables_by_hand import changed_match, match, match_with_balls_at, run_until_rest, table
 
 pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
 
@@ -43,9 +41,7 @@ OPEN = {"opening": False, "in_hand": None}
 
 
 def after_break(positions: dict[str, tuple[float, float]], name: str = "9-ball", **state: object) -> Match:
-    document = match_with_balls_at(name, positions).document()
-    document["state"] |= {**OPEN, **state}
-    return Match.restored(table(name), document)
+    return changed_match(match_with_balls_at(name, positions), **{**OPEN, **state})
 
 
 def test_game_that_does_not_fit_the_table_is_refused_with_every_missing_part() -> None:
@@ -171,10 +167,7 @@ def test_miss_of_snooker_restores_every_ball() -> None:
 def test_last_turn_of_carom_begins_with_the_cue_balls_exchanged() -> None:
     now = match("straight-rail", distance=1)
     start = {name: position_of(now, name) for name in now.layout.names}
-    document = now.document()
-    document["state"] |= {"opening": False}
-    document["position"] = [[0.5, 0.5], [0.5, 1.0], [0.56, 0.8]]  # white, yellow, red
-    initial = Match.restored(table("straight-rail"), document)
+    initial = changed_match(now, {"white": (0.5, 0.5), "yellow": (0.5, 1.0), "red": (0.56, 0.8)}, opening=False)
     shots = (shot(initial, Stroke(aim=aim, speed=2.0)) for aim in np.linspace(1.2, 1.5, 31).tolist())
     last = next(each for each in shots if each.state.scores == (1, 0))  # off the red to the yellow
     assert (last.turn, last.state.last) == (1, True)
@@ -182,15 +175,6 @@ def test_last_turn_of_carom_begins_with_the_cue_balls_exchanged() -> None:
     assert position_of(last, "yellow") == start["white"]
     assert position_of(last, "white") == start["yellow"]
     assert position_of(last, "red") == start["red"]
-
-
-def test_match_survives_a_json_round_trip() -> None:
-    now = shot(after_break(straight_pot()), Stroke(aim=0.0, speed=1.5))
-    document = json.loads(json.dumps(now.document()))
-    assert Match.restored(table("9-ball"), document) == now
-    for wrong in ({}, document | {"position": [[0.0, 0.0]]}, document | {"game": "chess"}, document | {"state": {}}):
-        with pytest.raises(GameError):
-            Match.restored(table("9-ball"), wrong)
 
 
 def strokes(seed: int, count: int) -> FloatArray:
@@ -230,8 +214,7 @@ def test_moves_permute_balls_without_overlap(seed: int) -> None:
     order = np.random.default_rng(seed).permutation(len(now.position))
     pocket = table("9-ball").pockets[0].position
     positions = [now.position[k] if k != 4 else pocket for k in order.tolist()]
-    document = now.document() | {"position": [list(each) for each in positions]}
-    other = Match.restored(table("9-ball"), document)
+    other = changed_match(now, dict(zip(now.layout.names, positions, strict=True)))
     simulation = sandbox.start(now.scene, "exact")
     for target in (other, now, other):
         for action in target.moves(simulation.frame().position):

@@ -9,7 +9,7 @@ import pytest
 import shapely
 from shapely import LineString, Point, Polygon, box, unary_union
 
-from sandbox.games.billiards.tables import BCA_CORNER, BCA_SIDE, INCH, TABLES, WPA_CORNER, WPA_SIDE, TableName, spots_of
+from sandbox.games.billiards.tables import BCA_CORNER, BCA_SIDE, INCH, TABLES, WPA_CORNER, WPA_SIDE, TableName
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 
@@ -166,7 +166,7 @@ def test_facings_meet_the_noses_at_the_cut_angle(name: str) -> None:
 
 
 def test_snooker_spots_follow_the_rules() -> None:
-    spots = spots_of("snooker-12ft")
+    spots = TABLES["snooker-12ft"].spots
     length, width = 3.569, 1.778
     assert spots["brown"] == (width / 2.0, 0.737)
     assert math.dist(spots["brown"], spots["yellow"]) == pytest.approx(0.292, abs=1e-15)  # one rounding

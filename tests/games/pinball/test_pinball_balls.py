@@ -24,7 +24,7 @@ def drain(game: Table, ball: int = 0) -> None:
 
 def next_ball(game: Table) -> int:
     """Return the ball in play."""
-    (ball,) = game.game.trough.live
+    (ball,) = game.game.trough.in_play
     return ball
 
 
@@ -95,13 +95,13 @@ def test_bonus_is_multiplied_by_the_lanes_at_the_end_of_a_ball() -> None:
     game.play()
     game.advance(("lane 1", 0.0), ("lane 2", 0.0), ("lane 3", 0.0), ("drop 1", 0.5))
     before, sheet = game.game.score, game.game.sheet
-    assert (sheet.bonus, sheet.times) == (3 * 100 + 2_000 + 200, 2)
+    assert (sheet.bonus, sheet.bonus_multiplier) == (3 * 100 + 2_000 + 200, 2)
     game.advance(("drain", 0.0))
     game.wait(BONUS_TIME - 0.1)
     assert game.game.score == before
     game.wait(0.15)
     assert game.game.score == before + 2 * 2_500
-    assert (sheet.bonus, sheet.times) == (0, 1)
+    assert (sheet.bonus, sheet.bonus_multiplier) == (0, 1)
 
 
 @pytest.mark.parametrize("balls", [1, 2, 3])
@@ -110,7 +110,7 @@ def test_balls_are_never_placed_onto_each_other(balls: int) -> None:
     for _ in range(3):
         game.wait(1.0)
         for saved in (True, False):
-            (ball,) = game.game.trough.live
+            (ball,) = game.game.trough.in_play
             game.put(ball, OPEN)
             game.wait(0.5 if saved else 9.0)
             game.advance(("drain", 0.0, ball))
@@ -126,7 +126,7 @@ def test_game_ends_after_three_balls() -> None:
     game = Table(table())
     for _ in range(3):
         assert game.game.game_over is None
-        drain(game, next_ball(game) if game.game.trough.live else 0)
+        drain(game, next_ball(game) if game.game.trough.in_play else 0)
     assert game.game.game_over == "game over"
     assert "over" in game.cues
 
@@ -158,7 +158,7 @@ def test_extra_ball_is_played_once_by_the_same_player() -> None:
     for _ in range(3 * 4):  # four sets of lanes, for an extra ball
         game.advance(("lane 1", 0.0), ("lane 2", 0.0), ("lane 3", 0.0))
         game.advance()
-    assert game.game.sheet.again == 1
+    assert game.game.sheet.extra_balls == 1
     assert game.lines()["Ball"] == "1 of 3, shoot again"
     game.advance(("drain", 0.0))
     game.wait(WAIT)
@@ -183,7 +183,7 @@ def test_ball_that_left_the_table_is_returned_to_the_plunger_and_reported(positi
     assert served[-1][1] == SERVE
     assert game.lines()[""] == "ball returned"
     assert game.lines()["Ball"] == "1 of 3"
-    assert len(game.game.trough.live) == 1
+    assert len(game.game.trough.in_play) == 1
 
 
 def test_removed_ball_ends_the_ball_and_the_last_one_the_game() -> None:

@@ -62,7 +62,7 @@ def test_drop_target_is_lit_while_it_is_down_and_a_full_bank_blinks(game: Table)
 def test_ready_lock_is_lit() -> None:
     game = Table(table("bumper a", "spinner", "hole", balls=2))  # without a mode that the hole could start
     game.play()
-    game.game.sheet.lit = True
+    game.game.sheet.is_lock_lit = True
     assert lit_lamps_over(game)[-1] == {"lock"}
 
 

@@ -65,13 +65,13 @@ def test_modes_without_their_elements_are_left_out() -> None:
 
 def lock(game: Table) -> int:
     """Light the lock, and lock the ball in play; return the next ball."""
-    (ball,) = game.game.trough.live
+    (ball,) = game.game.trough.in_play
     game.put(ball, OPEN)
     game.wait(0.5)
     game.advance(("standup 1", 0.5, ball), ("standup 2", 0.5, ball))
     game.advance(("lock", 0.0, ball))
     game.wait(1.0)
-    return game.game.trough.live[0]
+    return game.game.trough.in_play[0]
 
 
 def test_unlit_lock_acts_as_a_hole() -> None:
@@ -99,28 +99,28 @@ def multiball() -> Table:
     game.play()
     for _ in range(2):
         lock(game)
-    (ball,) = game.game.trough.live
+    (ball,) = game.game.trough.in_play
     game.put(ball, OPEN)
     game.wait(0.5)
     game.advance(("standup 1", 0.5, ball), ("standup 2", 0.5, ball))
     game.advance(("lock", 0.0, ball))
     for _ in range(4):
         game.wait(1.0)
-        for each in game.game.trough.live:
+        for each in game.game.trough.in_play:
             game.put(each, (0.1 * each + 0.1, 0.5))
     return game
 
 
 def test_last_lock_starts_multiball_with_all_balls() -> None:
     game = multiball()
-    assert sorted(game.game.trough.live) == [0, 1, 2]
+    assert sorted(game.game.trough.in_play) == [0, 1, 2]
     assert game.game.multiball.on
     assert "multiball" in game.cues
 
 
 def test_ramp_scores_a_jackpot_in_multiball() -> None:
     game = multiball()
-    ball, before = game.game.trough.live[0], game.game.score
+    ball, before = game.game.trough.in_play[0], game.game.score
     game.advance(("ramp in", 0.0, ball))
     game.advance(("ramp out", 0.0, ball))
     assert game.game.score == before + 10_000 + 50_000
@@ -128,22 +128,22 @@ def test_ramp_scores_a_jackpot_in_multiball() -> None:
 
 def test_multiball_saves_balls_at_first_and_ends_with_one_ball_left() -> None:
     game = multiball()
-    first = game.game.trough.live[0]
+    first = game.game.trough.in_play[0]
     game.advance(("drain", 0.0, first))
     assert "save" in game.cues
     game.wait(1.0)
-    assert len(game.game.trough.live) == 3
+    assert len(game.game.trough.in_play) == 3
     for _ in range(4):
         game.wait(3.0)
-        for each in game.game.trough.live:
+        for each in game.game.trough.in_play:
             game.put(each, (0.1 * each + 0.1, 0.5))
     for remaining in (2, 1):
-        game.advance(("drain", 0.0, game.game.trough.live[0]))
+        game.advance(("drain", 0.0, game.game.trough.in_play[0]))
         game.advance()
-        assert len(game.game.trough.live) == remaining
+        assert len(game.game.trough.in_play) == remaining
         assert game.game.multiball.on is (remaining > 1)
     assert game.lines()["Ball"] == "1 of 3"
-    game.advance(("drain", 0.0, game.game.trough.live[0]))
+    game.advance(("drain", 0.0, game.game.trough.in_play[0]))
     game.wait(1.6)
     assert game.lines()["Ball"] == "2 of 3"
 
@@ -164,7 +164,7 @@ def test_locks_are_counted_per_player() -> None:
     game.advance(("drain", 0.0, ball))
     game.wait(2.0)
     assert (game.lines()["Player"], game.game.sheet.locked) == ("2 of 2", 0)
-    (ball,) = game.game.trough.live
+    (ball,) = game.game.trough.in_play
     game.play(ball)
     game.advance(("drain", 0.0, ball))
     game.wait(2.0)

@@ -61,8 +61,8 @@ class BallChecker:
         assert (positions <= self.high).all(), (frame.time, positions)
         for ball in balls:
             in_lane = rules.board.in_lane(*frame.position[ball].tolist())
-            waits = ball not in rules.trough.live or ball in rules.holes.held or in_lane
-            rests = not waits and not rules.up and math.hypot(*frame.velocity[ball].tolist()) < 0.005
+            waits = ball not in rules.trough.in_play or ball in rules.holes.held or in_lane
+            rests = not waits and not rules.raised_sides and math.hypot(*frame.velocity[ball].tolist()) < 0.005
             self.rest[ball] = self.rest[ball] + self.dt if rests else 0.0
             # a ball search takes half of SEARCH_AFTER
             assert self.rest[ball] <= SEARCH_AFTER + SEARCH_AFTER / 2.0, (frame.time, frame.position[ball])

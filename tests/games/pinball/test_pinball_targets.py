@@ -32,9 +32,9 @@ def test_hit_scores_the_points_of_the_element_or_of_its_role(game: Table, name: 
 
 def test_full_set_of_lanes_scores_and_increases_the_bonus_multiplier(game: Table) -> None:
     for name in ("lane 1", "lane 2", "lane 2", "lane 3"):
-        assert game.game.sheet.times == 1
+        assert game.game.sheet.bonus_multiplier == 1
         game.advance((name, 0.5))
-    assert game.game.sheet.times == 2
+    assert game.game.sheet.bonus_multiplier == 2
     assert game.game.score == 4 * 1_000 + 10_000
     assert not any(game.game.lamps[0].lit)
 

@@ -8,7 +8,6 @@ import pytest
 
 from sandbox.action import Impulse
 from sandbox.engines.registry import ENGINES, start
-from sandbox.games import registry
 from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
 from sandbox.games.players import POLICIES, RandomInput, ScriptedInput
 from sandbox.games.session import HeadlessGame
@@ -24,7 +23,7 @@ pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
 @pytest.fixture(autouse=True)
 def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Toy)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Toy)
 
 
 @pytest.mark.parametrize("player", [name for name in POLICIES if name != "skilled"])  # which plays pinball only
@@ -68,7 +67,7 @@ class Short(Toy):
 
 @pytest.mark.parametrize("every", [1, 7])
 def test_run_ends_with_the_game(monkeypatch: pytest.MonkeyPatch, every: int) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Short)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Short)
     scene = loads(TOY, overrides=[("solver.record_every", every)])
     game = play_out(scene, "none")
     assert game.over == "enough"

@@ -9,9 +9,9 @@ import pygame
 import pytest
 
 from sandbox.action import Action, Impulse
-from sandbox.games import registry
+from sandbox.game_names import games_with_rules
 from sandbox.games.contract import Control, StepInfo
-from sandbox.games.registry import RULES, rules_of
+from sandbox.games.registry import rules_of
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find, shipped
 from sandbox.window.app import App
@@ -47,7 +47,7 @@ class Buttons(Toy):
 
 @pytest.fixture(autouse=True)
 def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Buttons)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Buttons)
 
 
 @pytest.fixture
@@ -393,7 +393,7 @@ def test_controls_of_every_shipped_game_have_valid_keys_and_buttons(monkeypatch:
     words = {word for layout in (XBOX, PLAYSTATION) for word in (*layout.buttons.values(), *layout.triggers.values())}
     words |= {f"{sign}{stick}" for stick in XBOX.sticks.values() for sign in "+-"} | {"left", "right", "up", "down"}
     scenes = [load(each.path) for each in shipped()]
-    games = {scene.play.game: scene for scene in scenes if scene.play.game in RULES}
+    games = {scene.play.game: scene for scene in scenes if scene.play.game in games_with_rules()}
     assert {"artillery", "curling", "landing", "pinball"} <= set(games)
     for name, scene in games.items():
         controls = rules_of(scene).controls
@@ -477,7 +477,7 @@ class WaitingToy(Buttons):
 
 
 def test_time_stops_while_the_rules_wait_for_the_player(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", WaitingToy)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", WaitingToy)
     with open_window(TOY, tmp_path) as window:
         window.app_state.start_game()
         for _ in range(5):

@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Switch
-from sandbox.games import registry
 from sandbox.games.session import GameSession
 from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
@@ -19,7 +18,7 @@ pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
 
 @pytest.fixture(autouse=True)
 def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Toy)
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Toy)
 
 
 def seek(session: Session, step: int) -> None:

@@ -3,10 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, ClassVar, Generic, Literal, Self, TypeVar
-
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from typing import Generic, Literal, Self, TypeVar
 
 
 class GameError(ValueError):
@@ -175,8 +172,6 @@ class RulesState:
         GameError: the number of players is not 1 or 2, or does not fit turn and scores.
     """
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
-
     players: int
     """1 or 2"""
     turn: int = 0
@@ -195,7 +190,7 @@ class RulesState:
     """index of the winner; None for a draw, or if a single player has lost"""
 
     def __post_init__(self) -> None:
-        counted(self.players)
+        checked_players(self.players)
         if not 0 <= self.turn < self.players == len(self.scores):
             raise GameError(f"turn {self.turn} and {len(self.scores)} scores do not fit {self.players} players")
 
@@ -218,7 +213,7 @@ class RulesState:
         return tuple(ball for ball in self.table if ball not in balls)
 
 
-def counted(players: int) -> int:
+def checked_players(players: int) -> int:
     """Return a valid number of players unchanged.
 
     Raises:
@@ -309,8 +304,6 @@ class Ruleset(ABC, Generic[S]):
     rack: str
     """name of the rack: `8-ball`, `9-ball`, `carom`, `snooker`"""
     cue_balls: tuple[str, ...] = ("cue",)
-    kind: type[S]
-    """class of the states"""
 
     @abstractmethod
     def start(self, players: int = 2) -> S:
@@ -366,27 +359,6 @@ class Ruleset(ABC, Generic[S]):
     def settle(self, state: S, situation: Situation) -> Ruling[S]:  # noqa: ARG002
         """Return the result of the situation after a shot or decision and respotting."""
         return Ruling(state)
-
-    def document(self, state: S) -> dict[str, Any]:
-        """Return a state as a JSON object."""
-        plain: dict[str, Any] = self._adapter.dump_python(state, mode="json")
-        return plain
-
-    def restored(self, plain: Any) -> S:
-        """Return the state of a JSON object, the inverse of `document`.
-
-        Raises:
-            GameError: the object is not a state of this game; the message names every fault.
-        """
-        try:
-            return self._adapter.validate_python(plain)
-        except ValidationError as error:
-            lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()]
-            raise GameError("\n".join(lines)) from None
-
-    @cached_property
-    def _adapter(self) -> TypeAdapter[S]:
-        return TypeAdapter(self.kind)
 
     @abstractmethod
     def _judge(self, state: S, call: ShotCall, shot: ShotSummary) -> Ruling[S]: ...

@@ -17,7 +17,7 @@ from sandbox.games.billiards.rules.base import (
     ShotSummary,
     Situation,
     balls_touched_by,
-    counted,
+    checked_players,
     player_name,
 )
 
@@ -47,7 +47,6 @@ class Carom(Ruleset[CaromState]):
 
     rack = "carom"
     cue_balls = WHITES
-    kind = CaromState
 
     def __init__(self, name: str, cushions: int, distance: int) -> None:
         """Define a game.
@@ -68,7 +67,7 @@ class Carom(Ruleset[CaromState]):
         points = self.distance if distance is None else distance
         if points < 1:
             raise GameError(f"distance {points} is out of range; it should be 1 or more")
-        none = (0,) * counted(players)
+        none = (0,) * checked_players(players)
         return CaromState(players=players, scores=none, innings=none, table=CAROM_NAMES, distance=points)
 
     def legal_targets(self, state: CaromState) -> frozenset[str]:

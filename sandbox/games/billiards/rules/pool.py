@@ -24,7 +24,7 @@ from sandbox.games.billiards.rules.base import (
     ShotCall,
     ShotChoices,
     ShotSummary,
-    counted,
+    checked_players,
     first_ball_hit,
     player_name,
 )
@@ -33,12 +33,12 @@ MIN_DRIVEN_BALLS = 4
 """number of object balls that a break must drive to a cushion if none is pocketed (WPA 2.3, 3.3)"""
 
 
-def scratch(shot: ShotSummary) -> list[str]:
+def scratch_fouls(shot: ShotSummary) -> list[str]:
     """Return the foul of a pocketed cue ball (WPA 6.1)."""
     return ["scratch"] if shot.scratched else []
 
 
-def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
+def wrong_ball_fouls(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
     """Return the foul of a wrong first contact (WPA 6.2); of simultaneous contacts, one must be legal."""
     if not shot.first:
         return ["the cue ball hit no ball"]
@@ -47,24 +47,24 @@ def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
     return []
 
 
-def no_rail(shot: ShotSummary) -> list[str]:
+def no_rail_fouls(shot: ShotSummary) -> list[str]:
     """Return the foul of a shot in which no ball reached a pocket or a cushion after the contact (WPA 6.3)."""
     return ["no rail after contact"] if shot.first and not shot.driven else []
 
 
-def from_behind(shot: ShotSummary) -> list[str]:
+def head_string_fouls(shot: ShotSummary) -> list[str]:
     """Return the foul of playing a cue ball in hand at a ball behind the head string (WPA 6.11)."""
     if not shot.stayed_behind:
         return []
     return [f"{first_ball_hit(shot)} behind the head string, and the cue ball had not crossed it"]
 
 
-def standard(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
+def standard_fouls(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
     """Return the standard fouls of a shot."""
-    return (*scratch(shot), *wrong_ball(shot, targets), *from_behind(shot), *no_rail(shot))
+    return (*scratch_fouls(shot), *wrong_ball_fouls(shot, targets), *head_string_fouls(shot), *no_rail_fouls(shot))
 
 
-def broke(shot: ShotSummary) -> bool:
+def is_legal_break(shot: ShotSummary) -> bool:
     """Return whether a break was legal: a ball pocketed, or `MIN_DRIVEN_BALLS` balls driven to a cushion."""
     return bool(shot.down) or len(shot.driven - {shot.cue}) >= MIN_DRIVEN_BALLS
 
@@ -98,12 +98,11 @@ class EightBall(Ruleset[EightBallState]):
 
     name = "8-ball"
     rack = "8-ball"
-    kind = EightBallState
 
     def start(self, players: int = 2) -> EightBallState:
         """Return the state before the break."""
         return EightBallState(
-            players=counted(players),
+            players=checked_players(players),
             scores=(0,) * players,
             table=EIGHT_BALL_NAMES,
             in_hand="behind the head string",
@@ -132,7 +131,7 @@ class EightBall(Ruleset[EightBallState]):
         return _counted(state, self._shot(state, call, shot))
 
     def _shot(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> Ruling[EightBallState]:
-        fouls = standard(shot, self.legal_targets(state))
+        fouls = standard_fouls(shot, self.legal_targets(state))
         if state.opening:
             return self._break(state, shot, fouls)
         if EIGHT in shot.down:
@@ -166,16 +165,16 @@ class EightBall(Ruleset[EightBallState]):
         """Judge a break (WPA 3.3). A weak break is not a foul, but the other player may ask for a rerack."""
         respot = (at_foot(EIGHT),) if EIGHT in shot.down else ()
         table = state.without(tuple(ball for ball in shot.down if ball != EIGHT))
-        place: Literal["behind the head string"] | None = "behind the head string" if scratch(shot) else None
+        place: Literal["behind the head string"] | None = "behind the head string" if scratch_fouls(shot) else None
         after = replace(state, table=table, opening=False, in_hand=place)
-        weak, continues = not broke(shot), bool(shot.down) and not fouls
+        weak, continues = not is_legal_break(shot), bool(shot.down) and not fouls
         offered: tuple[Decision, ...] = ()
         if weak:
             also: tuple[Decision, ...] = ("rerack and pass",) if state.players == 2 else ()
             offered = ("play", "rerack", *also)
         elif respot:  # (e), (f): the eight on the break neither wins nor loses
             offered = ("play", "rerack")
-        if fouls and not scratch(shot):  # (h)
+        if fouls and not scratch_fouls(shot):  # (h)
             offered = (*(offered or ("play",)), "in hand")
         after = replace(after, turn=state.turn if continues else state.other, decisions=offered)
         reasons = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
@@ -239,11 +238,10 @@ class NineBall(Ruleset[NineBallState]):
 
     name = "9-ball"
     rack = "9-ball"
-    kind = NineBallState
 
     def start(self, players: int = 2) -> NineBallState:
         """Return the state before the break."""
-        none = (0,) * counted(players)
+        none = (0,) * checked_players(players)
         return NineBallState(
             players=players, scores=none, fouls=none, table=NINE_BALL_NAMES, in_hand="behind the head string"
         )
@@ -292,11 +290,11 @@ class NineBall(Ruleset[NineBallState]):
     def _fouls(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> tuple[str, ...]:
         """Return the fouls: on a push-out only a scratch (WPA 2.4), on a break also a weak break (2.3)."""
         if call.push_out:
-            return tuple(scratch(shot))
-        wrong = [*scratch(shot), *wrong_ball(shot, self.legal_targets(state))]
+            return tuple(scratch_fouls(shot))
+        wrong = [*scratch_fouls(shot), *wrong_ball_fouls(shot, self.legal_targets(state))]
         if not state.opening:
-            return (*wrong, *no_rail(shot))
-        return (*wrong, *(["illegal break"] if shot.first and not broke(shot) else []))
+            return (*wrong, *no_rail_fouls(shot))
+        return (*wrong, *(["illegal break"] if shot.first and not is_legal_break(shot) else []))
 
 
 def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Ruling[NineBallState]:
@@ -336,7 +334,6 @@ class FreePlay(Ruleset[FreePlayState]):
 
     name = "free"
     rack = "8-ball"
-    kind = FreePlayState
 
     def start(self, players: int = 2, balls: tuple[str, ...] = EIGHT_BALL_NAMES, cue: str = "cue") -> FreePlayState:
         """Return the state before the first shot.
@@ -349,7 +346,7 @@ class FreePlay(Ruleset[FreePlayState]):
         Raises:
             GameError: the number of players is not 1 or 2, or the cue ball is an object ball.
         """
-        scores = (0,) * counted(players)
+        scores = (0,) * checked_players(players)
         if cue in balls:
             raise GameError(f"{cue!r} cannot be both the cue ball and an object ball")
         return FreePlayState(

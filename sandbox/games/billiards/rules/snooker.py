@@ -18,7 +18,7 @@ from sandbox.games.billiards.rules.base import (
     ShotChoices,
     ShotSummary,
     Situation,
-    counted,
+    checked_players,
     first_ball_hit,
     player_name,
 )
@@ -181,7 +181,6 @@ class Snooker(Ruleset[SnookerState]):
 
     name = "snooker"
     rack = "snooker"
-    kind = SnookerState
 
     def start(self, players: int = 2, misses: bool = False) -> SnookerState:
         """Return the state before the first stroke.
@@ -190,7 +189,7 @@ class Snooker(Ruleset[SnookerState]):
             players: 1 or 2.
             misses: whether the foul-and-a-miss rule applies.
         """
-        scores = (0,) * counted(players)
+        scores = (0,) * checked_players(players)
         return SnookerState(players=players, scores=scores, table=SNOOKER_NAMES, in_hand="in the D", misses=misses)
 
     def legal_targets(self, state: SnookerState) -> frozenset[str]:

@@ -18,9 +18,9 @@ from sandbox.games.billiards.view.bot_player import BotPlayer
 from sandbox.games.billiards.view.hud import BilliardsHud
 from sandbox.games.billiards.view.player import BOT, PLAYERS, BilliardsPlayer
 from sandbox.games.billiards.view.prediction import CueAim, CueState, ShotPredictor
-from sandbox.games.contract import ControlBindings, GameParameter
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
+from sandbox.window.game_controls import ControlBindings, GameParameter
 from sandbox.window.game_host import GameHost
 from sandbox.window.playback.snapshot import Snapshot
 

@@ -4,7 +4,7 @@ The rules in the session hold the match. Strokes and placements are actions of t
 inputs of the rules, so that a recording contains all of them.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from sandbox.action import ActionError, Move, Strike
@@ -27,6 +27,20 @@ STROKE_CONTROLS = frozenset({"shoot", "aim", "left english", "right english", "f
 """controls that belong to a stroke: an undo of the stroke removes their inputs"""
 
 
+@dataclass
+class _Turn:
+    """Preparation of the next stroke; a stroke ends it."""
+
+    strokes: int
+    """number of strokes before it"""
+    carried: Point | None = None
+    """position of a cue ball that is being placed, m"""
+    chosen: Decision | None = None
+    """selected decision; None for the first that is offered"""
+    plan: FramePlan | None = None
+    """next shot of the bot"""
+
+
 class BilliardsPlayer:
     """Player at the window: checks and applies strokes, calls, decisions and placements, and plays the bot's turns."""
 
@@ -36,9 +50,7 @@ class BilliardsPlayer:
         """whether the cue ball may not be placed under the pointer"""
         self.messages: list[tuple[str, str]] = []
         """(level, text); the reader empties the list"""
-        self._carried: tuple[int, Point] | None = None  # number of strokes at that time, and position
-        self._chosen: tuple[Match, int] | None = None  # index of the selected decision
-        self._bot_plan: tuple[int, FramePlan] | None = None  # number of strokes at that time, and the bot's next shot
+        self._latest_turn = _Turn(0)  # of the last access
         self._bot_strokes: set[float] = set()  # s, times of the strokes of the bot
         self._strokes = self.strokes  # after which the tip was centred last
         self._read = len(self.rules.log)  # number of log entries that are known
@@ -70,6 +82,14 @@ class BilliardsPlayer:
     def _strikes(self) -> list[int]:
         """Return the indices of the strokes among the actions of the session."""
         return [k for k, action in enumerate(self.live.session.actions) if isinstance(action, Strike)]
+
+    @property
+    def _turn(self) -> _Turn:
+        """Preparation of the next stroke."""
+        strokes = self.strokes
+        if self._latest_turn.strokes != strokes:
+            self._latest_turn = _Turn(strokes)
+        return self._latest_turn
 
     @property
     def players(self) -> Players:
@@ -113,12 +133,7 @@ class BilliardsPlayer:
     @property
     def is_bot_thinking(self) -> bool:
         """Whether the bot searches for its shot."""
-        return self.is_bots_turn and self._plan is None
-
-    @property
-    def _plan(self) -> FramePlan | None:
-        """Next shot of the bot, once it is found."""
-        return self._bot_plan[1] if self._bot_plan is not None and self._bot_plan[0] == self.strokes else None
+        return self.is_bots_turn and self._turn.plan is None
 
     @property
     def ball(self) -> int:
@@ -134,9 +149,8 @@ class BilliardsPlayer:
     @property
     def carried(self) -> Point | None:
         """Position of a cue ball that is being placed, m; None if none is."""
-        if self._carried is None or self._carried[0] != self.strokes or not self.is_own_turn:
-            return None
-        return self._carried[1]
+        carried = self._turn.carried
+        return carried if carried is not None and self.is_own_turn else None
 
     @property
     def place(self) -> Point:
@@ -161,12 +175,8 @@ class BilliardsPlayer:
     @property
     def choice(self) -> Decision | None:
         """The decision that Enter takes; None if none is offered."""
-        match = self.match
-        decisions = match.choices.decisions
-        if not decisions:
-            return None
-        chosen = self._chosen[1] if self._chosen is not None and self._chosen[0] is match else 0
-        return decisions[chosen % len(decisions)]
+        decisions, chosen = self.match.choices.decisions, self._turn.chosen
+        return chosen if chosen in decisions else next(iter(decisions), None)
 
     def choose_next(self) -> None:
         """Select the next of the offered decisions.
@@ -175,10 +185,10 @@ class BilliardsPlayer:
             ActionError: there are none.
         """
         self.require_turn()
-        now, match = self.choice, self.match
+        decisions, now = self.match.choices.decisions, self.choice
         if now is None:
             raise ActionError("there is nothing to decide")
-        self._chosen = match, match.choices.decisions.index(now) + 1
+        self._turn.chosen = decisions[(decisions.index(now) + 1) % len(decisions)]
 
     def take_choice(self) -> None:
         """Take the selected decision.
@@ -202,6 +212,7 @@ class BilliardsPlayer:
             self.match.decide(decision)
         except GameError as error:
             raise ActionError(str(error)) from None
+        self._turn.chosen = None
         self.host.press(*self.rules.decision_input(decision))
 
     def call_shot(self, call: ShotCall) -> None:
@@ -247,7 +258,7 @@ class BilliardsPlayer:
             if "in hand" not in self.match.choices.decisions:
                 raise ActionError("the cue ball is not in hand")
             self.decide("in hand")
-        self._carried, self.refused = (self.strokes, self.place), False
+        self._turn.carried, self.refused = self.place, False
 
     def carry(self, at: Point) -> None:
         """Move a cue ball that is being placed to the allowed place nearest to a point, m."""
@@ -256,7 +267,7 @@ class BilliardsPlayer:
             return
         self.refused = match.refusal(at) is not None
         try:
-            self._carried = self.strokes, match.nearest(at)
+            self._turn.carried = match.nearest(at)
         except GameError:  # no room on the table: the ball remains where it is
             self.refused = True
 
@@ -266,7 +277,7 @@ class BilliardsPlayer:
         Raises:
             ActionError: its place is not allowed.
         """
-        at, self._carried = self.carried, None
+        at, self._turn.carried = self.carried, None
         if at is not None:
             self._place(at)
 
@@ -321,7 +332,7 @@ class BilliardsPlayer:
         kept = is_undone.index(True) if True in is_undone else len(presses)
         self.live.retract(strikes[-1], kept)
         self._strokes = len([action for action in actions[: strikes[-1]] if isinstance(action, Strike)])
-        self._bot_plan, self._carried = None, None
+        self._latest_turn = _Turn(self._strokes)
         if self.opponent is not None:
             self.opponent.reset()
         self.cue = CueState(struck.aim, struck.speed, struck.side, struck.height)
@@ -349,7 +360,8 @@ class BilliardsPlayer:
 
     def _play_bot(self, opponent: BotPlayer, elapsed: float) -> None:
         """Continue the bot's turn: search, decide, place the cue ball, aim, and shoot."""
-        if self._plan is None:
+        turn = self._turn
+        if turn.plan is None:
             found = opponent.search(self.match)
             if found is None:
                 return
@@ -358,13 +370,13 @@ class BilliardsPlayer:
                 self.host.press(*self.rules.decision_input(found.decision))
             if found.plan is None:
                 return
-            self._bot_plan = self.strokes, found.plan
+            turn.plan = found.plan
             if found.plan.place is not None and self.match.state.in_hand is not None:
                 self._place(found.plan.place)
-        plan = self._plan
-        if plan is None or not opponent.animate(self.cue, plan.stroke, elapsed):
+        plan = turn.plan
+        if not opponent.animate(self.cue, plan.stroke, elapsed):
             return
-        self._bot_plan = None
+        turn.plan = None
         opponent.reset()
         self._press_call(plan.call)
         self._strike()

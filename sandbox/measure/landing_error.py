@@ -6,6 +6,7 @@ simulated impact is found on the cubic Hermite curve through the last two frames
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from sandbox.engines.registry import ENGINES, start
 from sandbox.games.artillery.ballistics import MAX_FLIGHT, NO_DISCS, ShellImpact, landing
 from sandbox.games.artillery.shells import SHELL_MASS, SHELL_RADIUS, FlightSegment
 from sandbox.games.artillery.terrain import Ground
+from sandbox.jsonable import in_json
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
@@ -33,7 +35,8 @@ MAX_RANGE = 1e6
 """m, limit of the range"""
 
 
-class LandingError(NamedTuple):
+@dataclass(frozen=True)
+class LandingError:
     """A row of the table."""
 
     engine: str
@@ -41,14 +44,21 @@ class LandingError(NamedTuple):
     """None for an engine without a choice of integrators"""
     dt: float
     """s, time step"""
-    place: float
-    """m, range"""
+    range: float = field(metadata=in_json(key="place"))
+    """m, simulated range"""
     time: float
     """s, time of flight"""
-    off: float
+    range_error: float = field(metadata=in_json(key="off"))
     """m, error of the range; negative if the shot falls short"""
-    late: float
+    time_error: float = field(metadata=in_json(key="late"))
     """s, error of the time of flight"""
+
+
+class RefusedFlight(NamedTuple):
+    """Engine that does not support the shot."""
+
+    engine: str
+    reason: str
 
 
 class LandingErrorTable(NamedTuple):
@@ -59,8 +69,7 @@ class LandingErrorTable(NamedTuple):
     time: float
     """s, exact time of flight"""
     rows: tuple[LandingError, ...]
-    refused: tuple[tuple[str, str], ...]
-    """engines that do not support the shot, and the reasons"""
+    refused: tuple[RefusedFlight, ...]
     interrupted: bool = False
     """whether Ctrl-C ended the computation before all rows were complete"""
 
@@ -105,8 +114,8 @@ def landing_error_table(
             break
         x, time = impact.position[0], impact.time
         rows.append(LandingError(engine, integrator, dt, x, time, x - exact.position[0], time - exact.time))
-    reasons = dict.fromkeys((engine, reason) for (engine, _), reason in refused.items())
-    return LandingErrorTable(exact.position[0], exact.time, tuple(rows), tuple(reasons), interrupted)
+    refusals = dict.fromkeys(RefusedFlight(engine, reason) for (engine, _), reason in refused.items())
+    return LandingErrorTable(exact.position[0], exact.time, tuple(rows), tuple(refusals), interrupted)
 
 
 def _engine_integrators() -> Iterator[tuple[str, str | None]]:
@@ -128,7 +137,7 @@ def exact_landing(world: World, velocity: FloatArray) -> ShellImpact:
 
 
 def _landing_on_level_ground(half_width: float, world: World, velocity: FloatArray) -> ShellImpact:
-    """Return the impact relative to the start, on ground that extends by `half`, m, to either side of it.
+    """Return the impact relative to the start, on ground that extends by `half_width`, m, to either side of it.
 
     Raises:
         ValueError: the shot does not land within the limits of time and range.
@@ -171,5 +180,5 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
 
 
 def _state(frame: Frame, offset: float) -> tuple[FloatArray, FloatArray]:
-    """Return position and velocity of the only body, shifted to the right by `aside`, m."""
+    """Return position and velocity of the only body, shifted to the right by `offset`, m."""
     return frame.position[0] + np.array([offset, 0.0]), frame.velocity[0]

@@ -11,13 +11,13 @@ is used within which the sequence of contacts changes; if it changes within all 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
-from sandbox.games.billiards.shots.shot import UNITS, VARIABLES, ShotSetup, Variable, shot_setup
+from sandbox.measure.shots.shot import UNITS, VARIABLES, ShotSetup, Variable, shot_setup
 from sandbox.scene.compile.scene import Scene
 
 
@@ -74,32 +74,13 @@ class Slope:
     reason: str | None
     """reason why there is no value"""
 
-    def document(self) -> "SlopeDocument":
-        """Return the slope as it appears in JSON documents."""
-        return SlopeDocument(
-            ball=self.ball,
-            variable=self.variable,
-            unit=f"m/{UNITS[self.variable]}",
-            value=self.value,
-            error=self.error,
-            fitted=self.fitted,
-            holds=self.holds,
-            reason=self.reason,
-        )
+    json_head: ClassVar = ("ball", "variable", "unit")
+    json_name: ClassVar = "SlopeDocument"
 
-
-@dataclass(frozen=True)
-class SlopeDocument:
-    """JSON document of a slope; the fields are those of `Slope`, with the unit of the values."""
-
-    ball: str
-    variable: Variable
-    unit: str
-    value: tuple[float, float] | None
-    error: float | None
-    fitted: tuple[float, float] | None
-    holds: float | None
-    reason: str | None
+    @property
+    def unit(self) -> str:
+        """Unit of the values."""
+        return f"m/{UNITS[self.variable]}"
 
 
 class _ShotPair(NamedTuple):

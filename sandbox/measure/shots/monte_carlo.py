@@ -1,12 +1,7 @@
-"""Success odds and final positions of a shot under execution noise, by Monte Carlo.
+"""Success odds and final positions of a shot under execution noise, by Monte Carlo."""
 
-Source of the confidence interval: E. B. Wilson 1927, J. Am. Stat. Assoc. 22, 209; unlike p ± z √(p(1−p)/n), it also
-holds near 0 and 1.
-"""
-
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
 import numpy as np
@@ -15,88 +10,25 @@ from sandbox.arrays import FloatArray
 from sandbox.echo import short_repr
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.shots import ShotBatch
-from sandbox.games.billiards.shots.shot import (
+from sandbox.html_repr import HtmlRepr
+from sandbox.jsonable import in_json
+from sandbox.measure.proportion import Proportion
+from sandbox.measure.shots.shot import (
     ShotSetup,
     Spread,
     perturb_stroke,
     shot_setup,
     without_miscues,
 )
-from sandbox.html_repr import HtmlRepr
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.compile.scene import Scene
 from sandbox.signals import defer_interrupt
-
-Z_95 = 1.959963984540054
-"""half width of the 95 % interval in standard deviations"""
-
-
-def wilson(hits: int, trials: int, z: float = Z_95) -> tuple[float, float]:
-    """Return the Wilson score interval of a probability, (0, 1) without trials.
-
-    Args:
-        hits: number of trials with the event.
-        trials: number of trials.
-        z: half width in standard deviations; default: 95 %.
-
-    Raises:
-        ValueError: `hits` is negative or exceeds `trials`.
-    """
-    if not 0 <= hits <= trials:
-        raise ValueError(f"{hits} of {trials} is not a count of trials")
-    if trials == 0:
-        return 0.0, 1.0
-    fraction, square = hits / trials, z * z / trials
-    middle = (fraction + 0.5 * square) / (1.0 + square)
-    half = math.sqrt(fraction * (1.0 - fraction) * square + 0.25 * square * square) / (1.0 + square)
-    low = 0.0 if hits == 0 else middle - half  # rounding would leave 1e-19
-    return low, 1.0 if hits == trials else middle + half
-
 
 DEFAULT_COUNT = 10_000
 """Default number of shots: the standard error of a probability of one half is 0.5 %, its 95 % interval ±1 %."""
 
 SHOTS_PER_CHECK = 512
 """Shots of a thread between two checks for Ctrl-C: 0.2 s for break shots."""
-
-
-@dataclass(frozen=True)
-class Proportion:
-    """Frequency of an event in a number of shots."""
-
-    hits: int
-    """number of shots with the event"""
-    trials: int
-    """number of shots"""
-
-    json_properties: ClassVar = ("probability", "low", "high")
-
-    @property
-    def probability(self) -> float:
-        """Estimate of the probability, hits / trials; nan without trials."""
-        return self.hits / self.trials if self.trials else math.nan
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % confidence interval of the probability (Wilson 1927)."""
-        return wilson(self.hits, self.trials)
-
-    @property
-    def low(self) -> float:
-        """Lower end of the 95 % confidence interval."""
-        return self.interval[0]
-
-    @property
-    def high(self) -> float:
-        """Upper end of the 95 % confidence interval."""
-        return self.interval[1]
-
-    def __str__(self) -> str:
-        """Return the probability with its confidence interval, in per cent."""
-        if not self.trials:
-            return "unknown"
-        low, high = self.interval
-        return f"{100.0 * self.probability:.1f} % (95 % interval {100.0 * low:.1f} to {100.0 * high:.1f} %)"
 
 
 @dataclass(frozen=True)
@@ -111,6 +43,18 @@ class RestStatistics:
     """m, standard deviation of x and y"""
 
 
+@dataclass(frozen=True)
+class BallOdds:
+    """Odds of one ball."""
+
+    potted: Proportion
+    """frequency of falling into any pocket"""
+    pockets: Mapping[str, Proportion]
+    """by the names of the pockets into which it fell"""
+    rest: RestStatistics | None
+    """final position; None if it never remained on the table"""
+
+
 @dataclass(frozen=True, eq=False)
 class Odds(HtmlRepr):
     """Results of M strokes with random errors at a table of N balls.
@@ -118,22 +62,26 @@ class Odds(HtmlRepr):
     A miscue is not played; it counts as a stroke that pots nothing.
     """
 
-    shot: ShotSetup
+    shot: ShotSetup = field(metadata=in_json(omit=True))
     """the shot"""
     spread: Spread
     """standard deviations of the errors"""
     seed: int
     """seed of the random errors"""
-    nominal: ShotResult
+    nominal: ShotResult = field(metadata=in_json(omit=True))
     """result of the intended stroke"""
-    errors: FloatArray
+    errors: FloatArray = field(metadata=in_json(omit=True))
     """(M, 4) errors of the strokes: aim in rad, speed as a fraction, side and height as fractions of the radius"""
-    batch: ShotBatch
+    batch: ShotBatch = field(metadata=in_json(omit=True))
     """results of the M − `miscues` played shots"""
     miscues: int
     """number of miscues"""
     interrupted: bool = False
     """whether Ctrl-C was pressed before all shots were played"""
+
+    json_head: ClassVar = ("count", "seed", "spread", "interrupted", "miscues")
+    json_properties: ClassVar = ("unfinished", "scratch", "any_pot", "balls")
+    json_name: ClassVar = "OddsDocument"
 
     def __repr__(self) -> str:
         """Return the shot, the number of strokes, and the odds of a pot and of a scratch."""
@@ -199,49 +147,15 @@ class Odds(HtmlRepr):
         (x, y), (dx, dy) = stayed.mean(axis=0).tolist(), stayed.std(axis=0).tolist()
         return RestStatistics(len(stayed), (x, y), (dx, dy))
 
-    def document(self) -> "OddsDocument":
-        """Return the odds as they appear in JSON documents, without the single shots."""
-        balls = {}
+    @property
+    def balls(self) -> Mapping[str, BallOdds]:
+        """Odds of each ball by its name."""
+        odds_of = {}
         for ball in self.shot.table.names:
             into = {pocket: self.chance(ball, pocket) for pocket in self.shot.pockets}
             pockets = {pocket: chance for pocket, chance in into.items() if chance.hits}
-            balls[ball] = BallOdds(self.chance(ball), pockets, self.rest(ball))
-        return OddsDocument(
-            count=self.count,
-            seed=self.seed,
-            spread=self.spread,
-            interrupted=self.interrupted,
-            miscues=self.miscues,
-            unfinished=self.unfinished,
-            scratch=self.scratch,
-            any_pot=self.any_pot,
-            balls=balls,
-        )
-
-
-@dataclass(frozen=True)
-class BallOdds:
-    """JSON document of the odds of one ball."""
-
-    potted: Proportion
-    pockets: Mapping[str, Proportion]
-    """by the names of the pockets into which it fell"""
-    rest: RestStatistics | None
-
-
-@dataclass(frozen=True)
-class OddsDocument:
-    """JSON document of the odds of a shot."""
-
-    count: int
-    seed: int
-    spread: Spread
-    interrupted: bool
-    miscues: int
-    unfinished: int
-    scratch: Proportion
-    any_pot: Proportion
-    balls: Mapping[str, BallOdds]
+            odds_of[ball] = BallOdds(self.chance(ball), pockets, self.rest(ball))
+        return odds_of
 
 
 def odds(

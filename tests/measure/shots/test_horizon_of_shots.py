@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.games.billiards.shots.predictability import By, ShotSeparation, horizon
-from sandbox.games.billiards.shots.shot import Spread, shot_setup
-from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
+from sandbox.measure.shots.predictability import By, ShotSeparation, horizon
+from sandbox.measure.shots.shot import Spread, shot_setup
+from tests.measure.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 

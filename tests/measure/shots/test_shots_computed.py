@@ -8,14 +8,15 @@ import pytest
 from scipy.optimize import brentq
 
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.shots.aim_windows import END_ACCURACY, windows
-from sandbox.games.billiards.shots.monte_carlo import odds, wilson
-from sandbox.games.billiards.shots.sensitivity import Slope, sensitivity
-from sandbox.games.billiards.shots.shot import NoSuchShotError, Spread, Variable, shot_setup
 from sandbox.jsonable import to_json
+from sandbox.measure.proportion import wilson_interval
+from sandbox.measure.shots.aim_windows import END_ACCURACY, windows
+from sandbox.measure.shots.monte_carlo import odds
+from sandbox.measure.shots.sensitivity import Slope, sensitivity
+from sandbox.measure.shots.shot import NoSuchShotError, Spread, Variable, shot_setup
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke, struck
-from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
+from tests.measure.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
 pytestmark = pytest.mark.fail_slow(60)  # long runs and sweeps
 
@@ -31,7 +32,7 @@ def test_probability_is_that_of_the_window_under_a_normal_error(aim: float) -> N
     known = error.cdf(window.high) - error.cdf(window.low)
     found = odds(scene, spread=Spread(aim=sigma, speed=0.0), count=1600)
     chance = found.chance("object", "hole")
-    low, high = wilson(chance.hits, chance.trials, SIGMAS)
+    low, high = wilson_interval(chance.hits, chance.trials, SIGMAS)
     assert low < known < high
     assert found.chance("object").hits == chance.hits
     assert found.miscues == found.unfinished == 0
@@ -65,7 +66,7 @@ def test_odds_are_bit_identical_on_any_number_of_threads_and_extend_smaller_ense
     one, five = (odds(scene, spread=every, count=301, threads=n) for n in (1, 5))
     assert one.batch.position.tobytes() == five.batch.position.tobytes()
     assert one.batch.pocket.tobytes() == five.batch.pocket.tobytes()
-    assert to_json(one.document()) == to_json(five.document())
+    assert to_json(one) == to_json(five)
     more = odds(scene, spread=every, count=400)
     assert more.errors[:301].tobytes() == one.errors.tobytes()
     other = odds(scene, spread=every, count=301, seed=8)
@@ -92,7 +93,7 @@ def test_miscues_are_counted_as_trials_without_a_pot() -> None:
 
 
 def test_document_has_every_field() -> None:
-    found = to_json(odds(straight_pot(0.5, 1.0), count=50).document())
+    found = to_json(odds(straight_pot(0.5, 1.0), count=50))
     figures = {"count", "seed", "spread", "miscues", "unfinished", "interrupted"}
     assert set(found) == {*figures, "scratch", "any_pot", "balls"}
     into = found["balls"]["object"]["pockets"]["hole"]
@@ -160,7 +161,7 @@ def test_no_window_where_no_aim_pots_the_ball() -> None:
     found = windows(scene_with(ball("object", 0.5), pocket("hole", -0.5, 0.5), shot()), "object", "hole", shots=101)
     assert found.found == ()
     assert found.nearest is None
-    assert found.document().within is False
+    assert found.within is False
 
 
 def test_windows_are_the_same_on_any_number_of_threads() -> None:

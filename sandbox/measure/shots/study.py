@@ -1,65 +1,23 @@
 """Study of one shot: odds, sensitivity, aim windows and predictability horizon, as far as they are asked for."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 from sandbox.echo import short_repr
-from sandbox.games.billiards.shots.aim_windows import Windows, WindowsDocument, windows
-from sandbox.games.billiards.shots.monte_carlo import DEFAULT_COUNT, Odds, OddsDocument, odds
-from sandbox.games.billiards.shots.predictability import (
+from sandbox.jsonable import in_json
+from sandbox.measure.shots.aim_windows import Windows, windows
+from sandbox.measure.shots.monte_carlo import DEFAULT_COUNT, Odds, odds
+from sandbox.measure.shots.predictability import (
     PERTURBATION,
     TOLERANCE,
     By,
     Horizon,
-    HorizonDocument,
     horizon,
 )
-from sandbox.games.billiards.shots.sensitivity import Slope, SlopeDocument, sensitivity
-from sandbox.games.billiards.shots.shot import NoSuchShotError, ShotDocument, ShotSetup, Spread
-from sandbox.jsonable import to_json
+from sandbox.measure.shots.sensitivity import Slope, sensitivity
+from sandbox.measure.shots.shot import NoSuchShotError, ShotSetup, Spread
 from sandbox.progress import ProgressCallback
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class ShotStudy:
-    """Results of a study; those that were not asked for are None or empty."""
-
-    shot: ShotSetup
-    """the shot"""
-    odds: Odds
-    """success odds"""
-    slopes: tuple[Slope, ...] | None
-    """sensitivity of the final positions"""
-    windows: tuple[Windows, ...]
-    """aim windows of each ball and pocket"""
-    horizon: Horizon | None
-    """predictability horizon"""
-    interrupted: bool = False
-    """whether Ctrl-C was pressed before the study was complete"""
-
-    @property
-    def answered(self) -> bool:
-        """Whether every pot has a window, and every shot came to rest."""
-        return all(each.found for each in self.windows) and not self.odds.unfinished
-
-    def document(self) -> dict[str, Any]:
-        """Return the study as one JSON object."""
-        nominal = self.odds.nominal
-        positions = zip(nominal.names, nominal.position.tolist(), strict=True)
-        final = {name: FinalState((x, y), nominal.pocketed.get(name)) for name, (x, y) in positions}
-        results: dict[str, Any] = to_json(
-            StudyDocument(
-                title=self.shot.table.scene.title,
-                shot=self.shot.document(),
-                nominal=NominalShot(nominal.duration, final),
-                odds=self.odds.document(),
-                sensitivity=None if self.slopes is None else [slope.document() for slope in self.slopes],
-                windows=[each.document() for each in self.windows],
-                horizon=None if self.horizon is None else self.horizon.document(),
-            )
-        )
-        return results
 
 
 @dataclass(frozen=True)
@@ -82,17 +40,42 @@ class NominalShot:
     """by the names of the balls"""
 
 
-@dataclass(frozen=True)
-class StudyDocument:
-    """JSON document of a study; the fields are those of `ShotStudy`."""
+@dataclass(frozen=True, eq=False, slots=True)
+class ShotStudy:
+    """Results of a study; those that were not asked for are None or empty."""
 
-    title: str
-    shot: ShotDocument
-    nominal: NominalShot
-    odds: OddsDocument
-    sensitivity: Sequence[SlopeDocument] | None
-    windows: Sequence[WindowsDocument]
-    horizon: HorizonDocument | None
+    shot: ShotSetup
+    """the shot"""
+    odds: Odds
+    """success odds"""
+    slopes: tuple[Slope, ...] | None = field(metadata=in_json(key="sensitivity"))
+    """sensitivity of the final positions"""
+    windows: tuple[Windows, ...]
+    """aim windows of each ball and pocket"""
+    horizon: Horizon | None
+    """predictability horizon"""
+    interrupted: bool = field(default=False, metadata=in_json(omit=True))
+    """whether Ctrl-C was pressed before the study was complete"""
+
+    json_head: ClassVar = ("title", "shot", "nominal")
+
+    @property
+    def answered(self) -> bool:
+        """Whether every pot has a window, and every shot came to rest."""
+        return all(each.found for each in self.windows) and not self.odds.unfinished
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.shot.table.scene.title
+
+    @property
+    def nominal(self) -> NominalShot:
+        """Result of the intended stroke."""
+        nominal = self.odds.nominal
+        positions = zip(nominal.names, nominal.position.tolist(), strict=True)
+        final = {name: FinalState((x, y), nominal.pocketed.get(name)) for name, (x, y) in positions}
+        return NominalShot(nominal.duration, final)
 
 
 def study_shot(

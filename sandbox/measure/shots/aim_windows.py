@@ -1,14 +1,15 @@
 """Aim windows: intervals of the aim for which a ball falls into a pocket."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.games.billiards.shots.shot import ShotSetup, shot_setup
+from sandbox.jsonable import in_json
+from sandbox.measure.shots.shot import ShotSetup, shot_setup
 from sandbox.scene.compile.scene import Scene
 
 DEFAULT_REACH = 0.1
@@ -67,33 +68,22 @@ class Windows:
     """rad, range of the search on each side"""
     spacing: float
     """rad between shots; narrower windows, and narrower gaps in a window, may be missed"""
-    found: tuple[Window, ...]
+    found: tuple[Window, ...] = field(metadata=in_json(key="windows"))
     """windows in ascending order"""
+
+    json_head: ClassVar = ("ball", "pocket", "aim", "within")
+    json_name: ClassVar = "WindowsDocument"
 
     @property
     def nearest(self) -> Window | None:
         """Window that contains the intended aim, or the nearest one; None if there is none."""
         return min(self.found, key=lambda one: one.off(self.aim), default=None)
 
-    def document(self) -> "WindowsDocument":
-        """Return the windows as they appear in JSON documents."""
+    @property
+    def within(self) -> bool:
+        """Whether the intended aim is in a window."""
         nearest = self.nearest
-        within = nearest is not None and self.aim in nearest
-        return WindowsDocument(self.ball, self.pocket, self.aim, within, self.reach, self.spacing, self.found)
-
-
-@dataclass(frozen=True)
-class WindowsDocument:
-    """JSON document of the windows of a ball and a pocket; the fields are those of `Windows`."""
-
-    ball: str
-    pocket: str
-    aim: float
-    within: bool
-    """whether the intended aim is in a window"""
-    reach: float
-    spacing: float
-    windows: Sequence[Window]
+        return nearest is not None and self.aim in nearest
 
 
 def windows(

@@ -9,21 +9,21 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.exact.common.requirements import overlap_of
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
-from sandbox.games.billiards.shots.shot import (
+from sandbox.jsonable import in_json
+from sandbox.measure.shots.shot import (
     ShotSetup,
     Spread,
     perturb_stroke,
     shot_setup,
     without_miscues,
 )
-from sandbox.jsonable import in_json
 from sandbox.scene.compile.scene import Scene
 
 SAMPLE_TIMES = 4000
@@ -149,11 +149,11 @@ class Horizon:
     """perturbed quantity: `aim`, or `place` for the position of the struck ball"""
     tolerance: float
     """m, tolerance of the final positions"""
-    radius: float
+    radius: float = field(metadata=in_json(omit=True))
     """m, radius of the struck ball, which is the second tolerance"""
     duration: float
     """s, duration of the intended shot"""
-    separation: Separation
+    separation: Separation = field(metadata=in_json(inline=True))
     """separation beyond the tolerance"""
     by_a_radius: Separation
     """separation beyond a radius"""
@@ -162,6 +162,9 @@ class Horizon:
     without a spread"""
     ladder: tuple[Separation, ...]
     """separation beyond the tolerance, from larger perturbations of the aim to smaller ones"""
+
+    json_head: ClassVar = ("by", "tolerance", "duration", "separation", "by_a_radius", "player", "digits_per_second")
+    json_name: ClassVar = "HorizonDocument"
 
     @property
     def digits_per_second(self) -> float | None:
@@ -177,33 +180,6 @@ class Horizon:
         # Digits are exact and times scatter, so that times are fitted over digits and the slope is inverted.
         slope = float(times @ digits) / float(digits @ digits)
         return 1.0 / slope if slope > 0.0 else None
-
-    def document(self) -> "HorizonDocument":
-        """Return the horizon as it appears in JSON documents."""
-        return HorizonDocument(
-            by=self.by,
-            tolerance=self.tolerance,
-            duration=self.duration,
-            separation=self.separation,
-            by_a_radius=self.by_a_radius,
-            player=self.player,
-            digits_per_second=self.digits_per_second,
-            ladder=self.ladder,
-        )
-
-
-@dataclass(frozen=True)
-class HorizonDocument:
-    """JSON document of a predictability horizon; the fields are those of `Horizon`."""
-
-    by: By
-    tolerance: float
-    duration: float
-    separation: Separation = field(metadata=in_json(inline=True))
-    by_a_radius: Separation
-    player: Separation | None
-    digits_per_second: float | None
-    ladder: Sequence[Separation]
 
 
 def horizon(

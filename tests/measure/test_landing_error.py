@@ -8,9 +8,9 @@ import pytest
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.games.artillery import landing_error as miss
 from sandbox.games.artillery.ballistics import ShellImpact
-from sandbox.games.artillery.landing_error import landing_error_table
+from sandbox.measure import landing_error as miss
+from sandbox.measure.landing_error import landing_error_table
 from sandbox.scene.description.world import Settings, World
 from tests.games.artillery.grounds import G, world
 
@@ -29,11 +29,11 @@ def test_euler_lands_one_step_late_or_early_in_vacuum() -> None:
         # The cubic through two frames uses Euler's velocities, off by g h/2: an error of at most 4/27 of h g h/2.
         euler = sign[row.integrator] != 0.0
         if row.engine == "box2d":
-            assert row.late == pytest.approx(-row.dt, abs=1e-3)  # semi-implicit Euler; 32-bit numbers
+            assert row.time_error == pytest.approx(-row.dt, abs=1e-3)  # semi-implicit Euler; 32-bit numbers
             continue
         tolerance = 2.0 * 4.0 / 27.0 * 0.5 * G * row.dt**2 / vx if euler else 1e-11
-        assert row.late == pytest.approx(sign[row.integrator] * row.dt, abs=tolerance)
-        assert row.off == pytest.approx(sign[row.integrator] * row.dt * vx, abs=vx * tolerance)
+        assert row.time_error == pytest.approx(sign[row.integrator] * row.dt, abs=tolerance)
+        assert row.range_error == pytest.approx(sign[row.integrator] * row.dt * vx, abs=vx * tolerance)
     assert found.range == pytest.approx(2500.0 / G, abs=1e-9)
     assert not found.refused
 
@@ -44,7 +44,7 @@ def test_landing_errors_converge_with_the_order_of_each_integrator(drags: tuple[
     air = world(*drags, -8.0).model_copy(update={"damping": damping})
     found = landing_error_table(air, 50.0, math.radians(45.0), dts)
     for name, integrator in INTEGRATORS.items():
-        errors = [abs(row.off) for row in found.rows if (row.engine, row.integrator) == ("reference", name)]
+        errors = [abs(row.range_error) for row in found.rows if (row.engine, row.integrator) == ("reference", name)]
         slope = np.polyfit(np.log(dts), np.log(errors), 1)[0]
         # The landing point within the last step varies, and so does the contribution of the cubic to the error.
         assert slope == pytest.approx(integrator.order, abs=0.35)

@@ -1,8 +1,8 @@
 """A shot to be analysed, and the execution noise of a player."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Literal
+from dataclasses import asdict, dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.echo import short_repr
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.shots import ShotBatch, Table
+from sandbox.jsonable import in_json
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import Stroke, miscues
@@ -90,14 +91,17 @@ class NoSuchShotError(ValueError):
 class ShotSetup:
     """Intended stroke at a ball of a table."""
 
-    table: Table
+    table: Table = field(metadata=in_json(omit=True))
     """the table before the stroke"""
     ball: str
     """name of the struck ball"""
-    stroke: Stroke
+    stroke: Stroke = field(metadata=in_json(inline=True))
     """intended stroke"""
     name: str
     """name of the shot"""
+
+    json_head: ClassVar = ("name", "ball")
+    json_name: ClassVar = "ShotDocument"
 
     def __repr__(self) -> str:
         """Return scene, shot, ball and stroke."""
@@ -142,32 +146,6 @@ class ShotSetup:
     def simulate_batch(self, strokes: Sequence[Stroke], threads: int = 1) -> ShotBatch:
         """Play many independent strokes."""
         return self.table.fan(strokes, self.ball, threads=threads)
-
-    def document(self) -> "ShotDocument":
-        """Return the shot as it appears in JSON documents."""
-        stroke = self.stroke
-        return ShotDocument(
-            name=self.name,
-            ball=self.ball,
-            aim=stroke.aim,
-            speed=stroke.speed,
-            side=stroke.side,
-            height=stroke.height,
-            cue_mass=stroke.cue_mass,
-        )
-
-
-@dataclass(frozen=True)
-class ShotDocument:
-    """JSON document of a shot: its name, the struck ball and the stroke."""
-
-    name: str
-    ball: str
-    aim: float
-    speed: float
-    side: float
-    height: float
-    cue_mass: float | None
 
 
 def shot_setup(scene: Scene | ShotSetup, shot: str | None = None) -> ShotSetup:
