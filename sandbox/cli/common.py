@@ -49,11 +49,6 @@ def engine_advice(scene: Scene, is_chosen: bool = False) -> str:
     return f"; {'use' if is_chosen else 'add'} --engine {names[0]}" if names else ""
 
 
-def plural(count: int, noun: str) -> str:
-    """Return a count with its noun: `1 foul`, `2 fouls`."""
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def parse_engines(text: str | None, faults: list[Fault]) -> list[str] | None:
     """Return the engines named by `--engine`, None without it; add unknown names to the faults."""
     names = None if text is None else parse_names(text)

@@ -15,7 +15,6 @@ from sandbox.cli.common import (
     make_folder,
     only_engine,
     parse_engines,
-    plural,
     require_folder,
     write_json,
 )
@@ -45,6 +44,7 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
+from sandbox.formatting import format_plural
 from sandbox.measure.columns import Column, shown
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
 from sandbox.measure.compare.columns import COLUMNS, ONE_SIDED
@@ -276,7 +276,8 @@ def compare_command(options: _Options) -> int:
     if not options.is_silent:
         print_comparison(options.scene, comparison, options.why, not is_engine_chosen, options.verbose)
     if comparison.interrupted:
-        click.echo(f"interrupted: {plural(len(comparison.rows), 'run')} complete; the results are kept", err=True)
+        complete = format_plural(len(comparison.rows), "run")
+        click.echo(f"interrupted: {complete} complete; the results are kept", err=True)
         status = 130
     elif request.smallest is not None:
         status = _minimise(comparison, request, options, document) or status

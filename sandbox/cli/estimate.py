@@ -14,9 +14,9 @@ from sandbox.batch.executors import InProcessExecutor, RunTask
 from sandbox.batch.job import CompletedRun, RunOptions
 from sandbox.batch.plan import Plan, PlannedRun
 from sandbox.batch.store import Store
-from sandbox.cli.common import plural
 from sandbox.cli.progress import duration_text
 from sandbox.cli.streams import print_json
+from sandbox.formatting import format_plural
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.run.bounded_run import clock_without_compilation
 
@@ -114,11 +114,11 @@ def print_estimate(plan: Plan, count: int, options: RunOptions, store: Store | N
 
 
 def _print(document: EstimateDocument, plan: Plan, axes: Sequence[int], workers: int, out: Path | None) -> None:
-    factors = [plural(document.scenes, "scene")]
+    factors = [format_plural(document.scenes, "scene")]
     factors += [f"{length:,} × {', '.join(axis.keys)}" for axis, length in zip(plan.axes, axes, strict=True)]
-    factors += [plural(document.seeds, "seed")] if document.seeds > 1 else []
-    factors += [plural(document.engines, "engine")] if document.engines > 1 else []
-    click.echo(f"{plural(document.runs, 'run')}: {'; '.join(factors)}")
+    factors += [format_plural(document.seeds, "seed")] if document.seeds > 1 else []
+    factors += [format_plural(document.engines, "engine")] if document.engines > 1 else []
+    click.echo(f"{format_plural(document.runs, 'run')}: {'; '.join(factors)}")
     if document.stored:
         click.echo(f"{document.stored:,} of them are stored in {out} and will not be repeated")
     if document.first is not None:
@@ -126,9 +126,9 @@ def _print(document: EstimateDocument, plan: Plan, axes: Sequence[int], workers:
     if document.seconds is None or document.seconds_per_run is None or document.bytes is None:
         click.echo("no estimate: none of the runs that were tried could be made in time")
         return
-    made = plural(document.measured, "run")
+    made = format_plural(document.measured, "run")
     click.echo(
-        f"about {duration_text(document.seconds)} on {plural(workers, 'worker')}, "
+        f"about {duration_text(document.seconds)} on {format_plural(workers, 'worker')}, "
         f"{duration_text(document.seconds_per_run)} a run; measured on {made}, not stored"
     )
     if out is not None:

@@ -11,13 +11,14 @@ import numpy as np
 
 from sandbox.atomic_write import atomic_write
 from sandbox.batch.find_run import find_run, read_run
-from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows, plural
+from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows
 from sandbox.cli.export_options import TABLES, Options, check_options, check_times
 from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.progress import ProgressBars, progress_bars
 from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.echo import short_repr
+from sandbox.formatting import format_plural
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.recording_remarks import remarks_on
@@ -119,7 +120,7 @@ def _print_files(
         print_json({"run": run, "files": files} | more | ({"remarks": remarks} if remarks else {}))
     elif not quiet:
         for file in files:
-            counts = [plural(file[f"{noun}s"], noun) for noun in ("row", "frame", "line") if f"{noun}s" in file]
+            counts = [format_plural(file[f"{noun}s"], noun) for noun in ("row", "frame", "line") if f"{noun}s" in file]
             click.echo(f"written: {file['path']} ({counts[0]})")
 
 

@@ -15,12 +15,11 @@ from sandbox.cli.common import (
     more_unknown,
     parse_engines,
     parse_names,
-    plural,
     require_folder,
     write_json,
 )
 from sandbox.cli.options import (
-    Finite,
+    FiniteRange,
     OutputOptions,
     engines_option,
     json_option,
@@ -34,6 +33,7 @@ from sandbox.cli.progress import ProgressBar, progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_console, new_table, print_line, print_table
 from sandbox.echo import short_repr
+from sandbox.formatting import format_plural
 from sandbox.jsonable import to_json
 from sandbox.measure.extremes import Extremes, ExtremesPlan, Sample, extremes
 from sandbox.measure.extremes.baseline import BoundaryChange, StoredError, changes, read
@@ -125,7 +125,7 @@ def _summary(result: Extremes) -> Iterator[str]:
             count = Counter(cell.verdict for cell in cells)
             verdicts = ", ".join(f"{count[word]:,} {word}" for word in VERDICTS if count[word])
             yield f"{group}: {len(cells):,} cells: {verdicts}"
-    yield f"{result.seconds:.0f} s on {plural(result.plan.workers, 'worker')}"
+    yield f"{result.seconds:.0f} s on {format_plural(result.plan.workers, 'worker')}"
 
 
 def _reached(limit: Boundary) -> str:
@@ -153,7 +153,7 @@ MIN_MEMORY = 1024
 @click.option("--pairs/--no-pairs", default=True, help="also vary two axes at once")
 @click.option(
     "--timeout",
-    type=Finite(0.1, 86_400.0),
+    type=FiniteRange(0.1, 86_400.0),
     default=SAMPLE_SECONDS,
     metavar="S",
     help="time limit of each cell, s",

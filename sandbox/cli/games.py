@@ -15,17 +15,26 @@ from sandbox.cli.common import (
     engine_advice,
     exit_with_errors,
     make_folder,
-    plural,
     require_folder,
     scene_path,
 )
-from sandbox.cli.options import OutputOptions, json_option, out_option, quiet_option, set_option
+from sandbox.cli.options import (
+    POSITIVE,
+    FiniteRange,
+    OutputOptions,
+    json_option,
+    out_option,
+    quiet_option,
+    set_option,
+    takes,
+)
 from sandbox.cli.progress import status_line
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, new_table, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
+from sandbox.formatting import format_plural
 from sandbox.games.billiards.bot import parse_bots
 from sandbox.games.billiards.headless import MAX_TURNS, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
@@ -196,7 +205,7 @@ class MatchResult:
 )
 @click.option(
     "--time-limit",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=POSITIVE,
     metavar="S",
     help="abandon a frame after S seconds, so results depend on the machine; default: no limit",
 )
@@ -206,13 +215,13 @@ class MatchResult:
 @out_option("store each frame as a session for `sandbox replay`")
 @json_option
 @quiet_option("print the final result only")
-def match_command(**given: Any) -> int:
+@takes(_Options)
+def match_command(options: _Options) -> int:
     """Play frames of billiards between bots, and print the score.
 
     SCENE is a billiard table: a file or the name of a shipped scene. Players break in turn. Exit status 1: a frame was
     abandoned because of --turns or --time-limit, or because a shot did not come to rest.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     scene = _table(options, faults)
     if faults or scene is None:
@@ -300,7 +309,7 @@ def _turn_progress(
     def after(_: FrameTurn, match: Match) -> None:
         nonlocal done
         done += 1
-        progress(Progress(f"frame {number:,} of {frames:,}: {plural(done, 'turn')}, {_scores(match, seats)}"))
+        progress(Progress(f"frame {number:,} of {frames:,}: {format_plural(done, 'turn')}, {_scores(match, seats)}"))
 
     return after
 
@@ -318,20 +327,9 @@ def _frame_line(number: int, frame: FrameRecord, seats: list[int], names: list[s
         player = seats[state.winner]
         result = f"player {player + 1} ({names[player]}) wins"
     scores = _scores(frame.match, seats)
-    shots = plural(len(frame.shots), "shot")
-    fouls = plural(sum(bool(turn.fouls) for turn in frame.turns), "foul")
+    shots = format_plural(len(frame.shots), "shot")
+    fouls = format_plural(sum(bool(turn.fouls) for turn in frame.turns), "foul")
     return f"frame {number}: {result}, {scores}; {shots}, {fouls}, {frame.session.duration:.0f} s"
-
-
-class FiniteRange(click.FloatRange):
-    """Range of numbers that does not contain nan."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the number; fail for nan."""
-        number = super().convert(value, param, ctx)
-        if math.isnan(number):
-            self.fail(f"{value} is not in the range {self._describe_range()}.", param, ctx)
-        return number
 
 
 STEP = FiniteRange(min=1e-5, max=1.0)

@@ -11,10 +11,11 @@ import click
 from click.core import ParameterSource
 
 from sandbox.atomic_write import atomic_write
-from sandbox.cli.common import exit_with_errors, plural, reasons_not_writable
+from sandbox.cli.common import exit_with_errors, reasons_not_writable
 from sandbox.cli.options import json_option, quiet_option
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, short_repr, shorten
+from sandbox.formatting import format_plural
 from sandbox.jsonable import to_json
 from sandbox.levels.builder import ORIGINS, ImportedLevel, LevelOptions, Origin
 from sandbox.scene.errors import Fault, SceneError
@@ -162,7 +163,7 @@ def _summary(imported: ImportedLevel) -> str:
     """Return the number of elements by table, and of warnings."""
     parts = [f"{count:,} [[{table}]]" for table, count in imported.counts.items()]
     if imported.warnings:
-        parts.append(plural(len(imported.warnings), "warning"))
+        parts.append(format_plural(len(imported.warnings), "warning"))
     return ", ".join(parts)
 
 

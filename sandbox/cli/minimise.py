@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from sandbox.atomic_write import atomic_write
 from sandbox.cli.common import reasons_not_writable
 from sandbox.echo import MAX_NAMED, shorten
+from sandbox.formatting import format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.reduce import DivergenceTest, ReducedScene, minimise
 from sandbox.measure.run.bounded_run import RunTimeoutError
@@ -139,12 +140,8 @@ def _document(found: ReducedScene, path: Path) -> dict[str, Any]:
 
 def _counted(found: ReducedScene) -> str:
     (before, after), (fixed_before, fixed_after) = found.bodies, found.fixed
-    fixed = f"{_several(fixed_before, 'fixed object', 'fixed objects')} to {fixed_after:,}"
-    return f"minimised: {_several(before, 'body', 'bodies')} to {after:,}, {fixed}"
-
-
-def _several(number: int, one: str, more: str) -> str:
-    return f"{number:,} {one if number == 1 else more}"
+    fixed = f"{format_plural(fixed_before, 'fixed object')} to {fixed_after:,}"
+    return f"minimised: {format_plural(before, 'body', 'bodies')} to {after:,}, {fixed}"
 
 
 def _sentence(found: ReducedScene, test: DivergenceTest) -> str:

@@ -23,13 +23,13 @@ class OutputOptions:
         return self.quiet or self.as_json
 
 
-Options = TypeVar("Options")
+Taken = TypeVar("Taken")
 
 
-def takes(options: type[Options]) -> Callable[[Callable[[Options], int]], Callable[..., int]]:
+def takes(options: type[Taken]) -> Callable[[Callable[[Taken], int]], Callable[..., int]]:
     """Return a decorator of a command: it gets its parameters as one value of a dataclass with a field for each."""
 
-    def decorate(command: Callable[[Options], int]) -> Callable[..., int]:
+    def decorate(command: Callable[[Taken], int]) -> Callable[..., int]:
         @wraps(command)
         def call(**given: Any) -> int:
             return command(options(**given))
@@ -39,7 +39,7 @@ def takes(options: type[Options]) -> Callable[[Callable[[Options], int]], Callab
     return decorate
 
 
-class Finite(click.FloatRange):
+class FiniteRange(click.FloatRange):
     """Range of numbers that contains neither nan nor infinity."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -50,8 +50,8 @@ class Finite(click.FloatRange):
         return number
 
 
-POSITIVE = Finite(min=0.0, min_open=True)
-NOT_NEGATIVE = Finite(min=0.0)
+POSITIVE = FiniteRange(min=0.0, min_open=True)
+NOT_NEGATIVE = FiniteRange(min=0.0)
 
 
 CommandFunction = TypeVar("CommandFunction", bound=Callable[..., Any])

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sandbox.cli.common import exit_with_errors, plural, reasons_not_writable
+from sandbox.cli.common import exit_with_errors, reasons_not_writable
 from sandbox.cli.options import json_option, quiet_option
 from sandbox.cli.progress import progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
+from sandbox.formatting import format_plural
 from sandbox.jsonable import to_json
 from sandbox.recording import Recording, ReplayCheck
 from sandbox.recording_remarks import remarks_on, replay_sentence
@@ -141,10 +142,10 @@ def record_command(
         print_json(to_json(document))
     elif not quiet:
         bodies = f"{document.bodies:,} {'body' if document.bodies == 1 else 'bodies'}"
-        steps_made = f"{plural(document.steps, 'step')} of {1000.0 * recording.settings.dt:.4g} ms"
+        steps_made = f"{format_plural(document.steps, 'step')} of {1000.0 * recording.settings.dt:.4g} ms"
         if not captured.has_constant_step:
             steps_made += " (median)"
-        summary = f"{bodies}, {steps_made}, {plural(document.actions, 'action')}"
+        summary = f"{bodies}, {steps_made}, {format_plural(document.actions, 'action')}"
         click.echo(f"written: {shorten(str(path), MAX_NAMED)} ({summary})")
         if check is not None and check.is_equal:
             click.echo(replay_sentence(recording.scene, check))

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import click
 
-from sandbox.cli.common import plural, scene_path, scene_paths
+from sandbox.cli.common import scene_path, scene_paths
+from sandbox.formatting import format_plural
 from sandbox.measure.run.sessions import read_session, recorded_scene
 from sandbox.recording import Recording
 from sandbox.recording_remarks import remarks_on
@@ -58,7 +59,8 @@ def _without_actions(recording: Recording) -> tuple[str, ...]:
     count = len(recording.actions)
     if not count:
         return ()
-    return (f"the scene of the recording is taken, without its {plural(count, 'action')}; `sandbox run` applies them",)
+    actions = format_plural(count, "action")
+    return (f"the scene of the recording is taken, without its {actions}; `sandbox run` applies them",)
 
 
 def report_remarks(name: str, remarks: Sequence[str]) -> None:

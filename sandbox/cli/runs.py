@@ -21,10 +21,11 @@ from sandbox.batch.query import (
     open_store,
 )
 from sandbox.batch.store import StoreError
-from sandbox.cli.common import collect_errors, exit_with_errors, parse_names, plural, require_plot_file
+from sandbox.cli.common import collect_errors, exit_with_errors, parse_names, require_plot_file
 from sandbox.cli.options import OutputOptions, json_option, quiet_option, takes
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import new_table, print_line, print_table
+from sandbox.formatting import format_plural
 from sandbox.jsonable import in_json, to_json
 from sandbox.scene.errors import Fault
 
@@ -281,7 +282,7 @@ def _print_list(table: Columns, count: int, statuses: Mapping[str, int]) -> None
         print_table(printed)
     counts = ", ".join(f"{number:,} {status}" for status, number in statuses.items())
     part = f"; the last {shown:,} are listed (--limit 0 lists all)" if shown < count else ""
-    print_line(f"{plural(count, 'run')}: {counts}{part}" if count else "no runs")
+    print_line(f"{format_plural(count, 'run')}: {counts}{part}" if count else "no runs")
 
 
 def _cell(value: Any) -> str:
@@ -390,7 +391,7 @@ def _draw_lines(runs: StoredRuns, key: str, quantity: str, where: str | None, ta
     if not series:
         return f"no run has a value of {key}"
     count = sum(group.quantities[quantity].count for group in groups)
-    band = f"median and 10 % to 90 % of {plural(count, 'run')}"
+    band = f"median and 10 % to 90 % of {format_plural(count, 'run')}"
     names = [] if is_numeric else [_cell(value) for value in values]
     plot_lines(series, _with_unit(key), _with_unit(quantity), target, band=band, categories=names)
     return None

@@ -16,7 +16,16 @@ from sandbox.cli.common import (
     scene_path,
     write_json,
 )
-from sandbox.cli.options import OutputOptions, json_option, out_option, quiet_option, set_option, verbose_option
+from sandbox.cli.options import (
+    FiniteRange,
+    OutputOptions,
+    json_option,
+    out_option,
+    quiet_option,
+    set_option,
+    takes,
+    verbose_option,
+)
 from sandbox.cli.progress import status_line
 from sandbox.cli.shots_table import print_study
 from sandbox.cli.streams import print_json
@@ -31,8 +40,8 @@ from sandbox.scene.errors import Fault
 from sandbox.scene.files.load import load
 
 DEFAULT = Spread()
-FRACTION = click.FloatRange(min=0.0, max=1.0)
-POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
+FRACTION = FiniteRange(min=0.0, max=1.0)
+LENGTH = FiniteRange(min=0.0, min_open=True, max=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +145,7 @@ class _Request:
 @click.option("--horizon", "foretold", is_flag=True, help="time after which the shot cannot be predicted")
 @click.option(
     "--nudge",
-    type=POSITIVE,
+    type=LENGTH,
     default=PERTURBATION,
     metavar="X",
     help="perturbation for --horizon, rad or m; default: 1e-9",
@@ -149,7 +158,7 @@ class _Request:
 )
 @click.option(
     "--tolerance",
-    type=POSITIVE,
+    type=LENGTH,
     default=TOLERANCE,
     metavar="M",
     help="position difference that ends the horizon, m; default: 0.001",
@@ -158,12 +167,12 @@ class _Request:
 @verbose_option
 @json_option
 @quiet_option()
-def shots_command(**given: Any) -> int:
+@takes(_Options)
+def shots_command(options: _Options) -> int:
     """Play a shot many times with random errors of the player, and print the odds of each outcome.
 
     SCENE is a file or the name of a shipped scene, with a [surface] and a [[shot]]. Errors are normally distributed.
     """
-    options = _Options(**given)
     faults: list[Fault] = []
     request = _checked(options, faults)
     if options.out is not None and request.shot is not None and not faults:

@@ -109,8 +109,8 @@ shots 9-ball --window '12:upper left pocket' → --window: no ball is named '12'
 shots 9-ball --window cue:near → --window: no pocket is named 'near'
 shots 9-ball --window cue → --window: 'cue' is not BALL:POCKET
 shots 9-ball --shot draw → no shot is named 'draw'
-shots 9-ball --aim-error nan → aim = nan
-shots 9-ball --nudge nan → --nudge:
+shots 9-ball --aim-error nan → is not finite
+shots 9-ball --nudge nan → is not finite
 shots 9-ball --out drop.toml → --out: drop.toml: is not a folder
 extremes --axes dt --quick --set solver.itterations=3 → itterations
 extremes --axes dt --quick --set solver.dt → --set

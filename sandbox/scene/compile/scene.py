@@ -4,6 +4,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
 from sandbox.echo import short_repr
+from sandbox.formatting import format_plural
 from sandbox.html_repr import HtmlRepr
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.game_tables import unexpanded
@@ -59,12 +60,10 @@ class Scene(SceneDescription, HtmlRepr):
     def __repr__(self) -> str:
         """Return the title, the counts of elements and the key figures, as `str` does."""
         elements = {"plane": self.planes, "wall": self.walls, "post": self.posts, "pocket": self.pockets}
-        counts = [_counted(len(self.bodies), "body", "bodies")]
-        counts += [
-            _counted(len(each), kind, f"{kind}s") for kind, each in {**elements, "zone": self.zones}.items() if each
-        ]
+        counts = [format_plural(len(self.bodies), "body", "bodies")]
+        counts += [format_plural(len(each), kind) for kind, each in {**elements, "zone": self.zones}.items() if each]
         if len(self.joint_arrays):
-            counts.append(_counted(len(self.joint_arrays), "joint", "joints"))
+            counts.append(format_plural(len(self.joint_arrays), "joint", "joints"))
         x, y = self.world.gravity
         figures = f"gravity ({x:g}, {y:g}) m/s², duration {self.world.duration:g} s, dt {self.solver.dt:g} s"
         return f"<Scene {short_repr(self.title)}: {', '.join(counts)}\n  {figures}>"
@@ -118,7 +117,3 @@ def _strike(bodies: "Bodies", index: int, stroke: Stroke) -> None:
     velocity, spin = struck(stroke, float(bodies.mass[index]), float(bodies.radius[index]))
     bodies.velocity[index] = velocity
     bodies.roll[index], bodies.angular_velocity[index] = spin[:2], spin[2]
-
-
-def _counted(count: int, noun: str, nouns: str) -> str:
-    return f"{count:,} {noun if count == 1 else nouns}"
