@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import pygame
 
-from sandbox.window.editor.tool_icons import tool_icon
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_hint, draw_text
+from sandbox.window.ui.icons import icon
 
 BUTTON = 32
 """px at UI scale 1, side of a button"""
@@ -138,7 +138,7 @@ class Toolbar:
             fill = SKY if is_chosen else LINE if tool is self._hovered else PANEL_RAISED
             pygame.draw.rect(surface, fill, rect, border_radius=round(5 * ui_scale))
             colour = BACKGROUND if is_chosen else INK
-            image = tool_icon(tool.name, round(0.66 * rect.width), colour)
+            image = icon(tool.name, round(0.66 * rect.width), colour)
             surface.blit(image, image.get_rect(center=rect.center))
             if len(tool.key) == 1:
                 corner = rect.right - 3 * ui_scale, rect.bottom - 1 * ui_scale

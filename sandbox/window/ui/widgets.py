@@ -135,7 +135,7 @@ class Checkbox(Widget):
 
 
 class PushButton(Widget):
-    """Button with an icon, or with its name if there is no such icon."""
+    """Button with an icon, by whose name it is called."""
 
     def __init__(self, surface: pygame.Surface, name: str, hint: str = "") -> None:
         super().__init__(surface)
@@ -158,11 +158,7 @@ class PushButton(Widget):
         pygame.draw.rect(self.surface, colour, rect, border_radius=round(5 * self.ui_scale))
         side = round(0.62 * min(rect.size))
         image = icon(self.name, side, WARNING if self.name in ("record", "stop") else INK)
-        if image is not None:
-            self.surface.blit(image, image.get_rect(center=rect.center))
-        else:
-            size = WIDGET_TEXT_SIZE * self.ui_scale
-            draw_text(self.surface, ellipsis(self.name, size, rect.width - size), rect.center, size, INK, "center")
+        self.surface.blit(image, image.get_rect(center=rect.center))
 
 
 class ParameterWidget(Widget):
