@@ -27,7 +27,7 @@ from sandbox.window.ui.energy_plot import EnergyGraph
 from sandbox.window.ui.help import HelpOverlay
 from sandbox.window.ui.high_score_dialog import HighScoreDialog
 from sandbox.window.ui.hud import MAX_SHOWN_MESSAGES, hud_width
-from sandbox.window.ui.panel import SidePanel
+from sandbox.window.ui.panel import BUTTONS, SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
 from sandbox.window.ui.score_panel import ScoreLayout, draw_score, layout_score
 from sandbox.window.ui.status import hud_status, settings_text
@@ -465,18 +465,8 @@ class Gui:
         if live is not None:
             toggles |= {"ghost": live.diagnostics.has_ghost, "trust": live.diagnostics.divergence is not None}
         toggles |= {"sound": self._sounds.enabled, "antialias": self.antialias}
-        buttons = (
-            "play" if app_state.paused else "pause",
-            "back",
-            "step",
-            "restart",
-            "camera",
-            "stop" if recording else "record",
-            "save",
-            "edit",
-            "picker",
-            "help",
-        )
+        hidden = {"pause" if app_state.paused else "play", "record" if recording else "stop"}
+        buttons = tuple(name for name in BUTTONS if name not in hidden)
         session = (
             ()
             if live is None

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import pygame
 
-from sandbox.window.input.keymap import BINDINGS, Command
+from sandbox.window.input.keymap import Command
 from sandbox.window.playback.parameters import Parameter, ParameterValue
 from sandbox.window.render.palette import FAINT, LINE, PANEL, PANEL_RAISED
 from sandbox.window.render.text import draw_hint, draw_text
@@ -21,6 +21,36 @@ from sandbox.window.ui.widgets import (
     Widget,
     WidgetEvent,
 )
+
+
+class PanelButton(NamedTuple):
+    """Button of the panel."""
+
+    command: Command
+    about: str
+    """tooltip, without the key"""
+
+    @property
+    def hint(self) -> str:
+        """Tooltip of the button."""
+        return f"{self.about} ({self.command.label})"
+
+
+BUTTONS = {
+    "play": PanelButton(Command.PAUSE, "Resume"),
+    "pause": PanelButton(Command.PAUSE, "Pause"),
+    "back": PanelButton(Command.BACK, "Step back"),
+    "step": PanelButton(Command.STEP, "Step forward"),
+    "restart": PanelButton(Command.RESTART, "Restart"),
+    "camera": PanelButton(Command.SCREENSHOT, "Screenshot"),
+    "record": PanelButton(Command.RECORD, "Record"),
+    "stop": PanelButton(Command.RECORD, "Stop recording"),
+    "save": PanelButton(Command.SAVE, "Save the session"),
+    "edit": PanelButton(Command.EDIT, "Edit the scene"),
+    "picker": PanelButton(Command.PICKER, "Open a scene"),
+    "help": PanelButton(Command.HELP, "Help"),
+}
+"""Buttons by their icons, in the order of the panel, which shows either `play` or `pause`, and `record` or `stop`."""
 
 
 class PanelHeading(NamedTuple):
@@ -116,20 +146,6 @@ FOLD_WIDTH_FRACTION = 0.45
 SCROLL_STEP = 48
 """px at UI scale 1 per notch of the wheel"""
 
-_BUTTONS = {
-    "play": ("Resume", Command.PAUSE),
-    "pause": ("Pause", Command.PAUSE),
-    "step": ("Step forward", Command.STEP),
-    "back": ("Step back", Command.BACK),
-    "restart": ("Restart", Command.RESTART),
-    "camera": ("Screenshot", Command.SCREENSHOT),
-    "record": ("Record", Command.RECORD),
-    "stop": ("Stop recording", Command.RECORD),
-    "save": ("Save the session", Command.SAVE),
-    "help": ("Help", Command.HELP),
-    "picker": ("Open a scene", Command.PICKER),
-    "edit": ("Edit the scene", Command.EDIT),
-}
 _LABELS = {"trust": "horizon", "antialias": "antialiasing"}
 """labels that differ from the name"""
 _MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
@@ -143,7 +159,7 @@ class SidePanel:
         self.on_change: Callable[[str, ParameterValue, bool], None] = _ignore
         """(key, value, final); values of integer parameters are floats too"""
         self.on_toggle: Callable[[str, bool], None] = _ignore
-        self.on_button: Callable[[str], None] = _ignore
+        self.on_button: Callable[[Command], None] = _ignore
         self.size, self.ui_scale = size, ui_scale
         self._visible: bool | None = None  # set by the user; None: shown unless the window is small
         self._parameter_widgets: dict[str, ParameterWidget] = {}
@@ -218,14 +234,14 @@ class SidePanel:
         for k, name in enumerate(buttons):
             if k == len(self._buttons):
                 self._buttons.append(PushButton(self._sheet, name))
-            self._buttons[k].name, self._buttons[k].hint = name, _button_hint(name)
+            self._buttons[k].name, self._buttons[k].hint = name, BUTTONS[name].hint
         if changed or before != [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]:
             self._layout_widgets()
 
     def _checkbox(self, name: str, on: bool) -> Checkbox:
         checkbox = self._checkboxes.get(name)
         if checkbox is None:
-            key = next((binding.label for binding in BINDINGS if binding.command == name), "")
+            key = next((command.label for command in Command if command == name), "")
             checkbox = Checkbox(self._sheet, name, on, _LABELS.get(name, ""), key)
         checkbox.on = on
         return checkbox
@@ -331,7 +347,7 @@ class SidePanel:
             widget.events.clear()
         for used in events:
             if used.kind == "button":
-                self.on_button(used.name)
+                self.on_button(BUTTONS[used.name].command)
             elif isinstance(used.value, bool):
                 self.on_toggle(used.name, used.value)
             else:
@@ -384,9 +400,3 @@ class SidePanel:
 
 def _ignore(*_: object) -> None:
     """No-op, the default of the callbacks."""
-
-
-def _button_hint(name: str) -> str:
-    about, command = _BUTTONS.get(name, ("", None))
-    key = next((binding.label for binding in BINDINGS if binding.command == command), "")
-    return f"{about} ({key})" if key else about
