@@ -29,7 +29,7 @@ from sandbox.window.render.palette import (
     RgbColour,
     mix_colours,
 )
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.render.text import TextPlate, draw_box, draw_lines, draw_text, ellipsis, text_size, wrap_text
 from sandbox.window.ui.hud import draw_mark
 
 TEXT_SIZE = 12.5
@@ -386,16 +386,10 @@ class CheckMarks:
         name = target.removeprefix(CHIP)
         lacks = self._engines[name]
         text = f"{name} cannot run this scene: {'; '.join(lacks)}" if lacks else f"{name} can run this scene"
-        lines = wrap_text(text, size, min(280 * size / TEXT_SIZE, area.width - 1.5 * size), 6)
-        step = round(1.4 * size)
-        width = max(text_size(line, size)[0] for line in lines) + round(1.4 * size)
-        rect = pygame.Rect(0, 0, width, len(lines) * step + round(0.8 * size))
-        rect.midbottom = self._pointer[0], self.rects_of(target)[0].top - round(0.4 * size)
-        rect.clamp_ip(area)
-        draw_box(surface, rect, 0.4 * size, opacity=250)
-        for k, line in enumerate(lines):
-            at = rect.left + 0.7 * size, rect.top + 0.4 * size + (k + 0.5) * step
-            draw_text(surface, line, at, size, INK, "midleft")
+        plate = TextPlate(text, size, min(280 * size / TEXT_SIZE, area.width - 1.5 * size), 6)
+        plate.rect.midbottom = self._pointer[0], self.rects_of(target)[0].top - round(0.4 * size)
+        plate.rect.clamp_ip(area)
+        plate.draw(surface, 0.4 * size, 250)
 
     def _draw_card(self, surface: pygame.Surface, area: pygame.Rect, size: float) -> None:
         """Draw the message of the shown mark, with its remedies."""
@@ -418,8 +412,7 @@ class CheckMarks:
         left, y = self.card.left + pad, self.card.top + pad
         draw_mark(surface, "triangle", (left + 0.5 * size, y + 0.5 * step), 0.45 * size, _colour(mark))
         draw_text(surface, title, (left + 1.4 * size, y + 0.5 * step), size, INK, "midleft", bold=True)
-        for k, line in enumerate(lines):
-            draw_text(surface, line, (left, y + (k + 1.5) * step), size, INK, "midleft")
+        draw_lines(surface, lines, (left, y + step), step, size)
         y += step * (1 + len(lines)) + round(0.4 * size)
         for row in buttons:
             x = left

@@ -10,7 +10,7 @@ from sandbox.formatting import format_percent, format_si, format_time
 from sandbox.window.playback.snapshot import HudStatus
 from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, RgbColour
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.render.text import draw_box, draw_lines, draw_text, ellipsis, lines_width, text_size, wrap_text
 
 MAX_SPEED_ERROR = 0.10
 """relative difference between real and requested speed above which both are shown"""
@@ -268,19 +268,14 @@ def draw_notice(
     small = 0.62 * size
     details = wrap_text(detail, small, area.width - 2 * size, 4) if detail else ()
     line_height, small_height = round(1.4 * size), round(1.5 * small)
-    width = max(
-        *(text_size(each, size, bold=True)[0] for each in lines), *(text_size(each, small)[0] for each in details), 0
-    )
+    width = max(lines_width(lines, size, bold=True), lines_width(details, small))
     height = len(lines) * line_height + len(details) * small_height + round(size)
     rect = pygame.Rect(0, 0, width + 2 * round(size), height)
     rect.center = area.center
     draw_box(surface, rect, 0.5 * size, opacity=244, edge=edge)
-    for k, each in enumerate(details):
-        y = rect.top + 0.5 * size + len(lines) * line_height + (k + 0.5) * small_height
-        draw_text(surface, each, (rect.centerx, y), small, FAINT, "center")
-    for k, each in enumerate(lines):
-        position = rect.centerx, rect.top + 0.5 * size + (k + 0.5) * line_height
-        draw_text(surface, each, position, size, INK, "center", bold=True)
+    x, y = rect.centerx, rect.top + 0.5 * size
+    draw_lines(surface, details, (x, y + len(lines) * line_height), small_height, small, FAINT, "center")
+    draw_lines(surface, lines, (x, y), line_height, size, INK, "center", bold=True)
 
 
 def _draw_rate(
@@ -361,7 +356,7 @@ def draw_messages(
                 slot.width = min(slot.width, each.left - pad - area.left)
         room = slot.width - 2 * pad - mark_room
         lines = wrap_text(text, size, room, 2)
-        width = max((text_size(part, size)[0] for part in lines), default=0)
+        width = lines_width(lines, size)
         rect = pygame.Rect(area.left, 0, width + 2 * pad + mark_room, len(lines) * line_height + 2 * pad)
         rect.bottom = bottom
         while (hit := rect.collidelist(list(taken))) >= 0 and rect.top >= area.top:
@@ -370,15 +365,7 @@ def draw_messages(
             return drawn
         draw_box(surface, rect, 0.5 * size)
         draw_mark(surface, mark, (rect.left + pad + 0.5 * size, rect.top + pad + line_height / 2), 0.42 * size, colour)
-        for k, part in enumerate(lines):
-            draw_text(
-                surface,
-                part,
-                (rect.right - pad - width, rect.top + pad + (k + 0.5) * line_height),
-                size,
-                INK,
-                "midleft",
-            )
+        draw_lines(surface, lines, (rect.right - pad - width, rect.top + pad), line_height, size)
         bottom = rect.top - round(0.4 * size)
         drawn.append(rect)
     return drawn
