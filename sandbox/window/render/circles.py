@@ -11,7 +11,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
 from sandbox.window.render.particles import packed_pixels
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf_disc, sdf_surface, shade_sdf
 
 LARGEST = 96.0
 """px, largest radius that is drawn as a sprite; larger discs are painted directly, clipped to the surface"""
@@ -131,15 +131,10 @@ def _paint(
     surface: pygame.Surface, x: float, y: float, radius: float, colour: RgbColour, style: CircleStyle, plain: bool
 ) -> None:
     """Draw a disc that is too large for a sprite."""
-    area = surface.get_clip()
     if plain and radius < SDL_COORDINATE_LIMIT:
         pygame.draw.circle(surface, colour, (round(x), round(y)), round(radius), 2 if style.hollow else 0)
         return
-    low = max(x - radius - 1.0, -1.0), max(y - radius - 1.0, -1.0)
-    high = min(x + radius + 2.0, area.right + 1.0), min(y + radius + 2.0, area.bottom + 1.0)
-    if low[0] < high[0] and low[1] < high[1]:
-        rect = pygame.Rect(int(low[0]), int(low[1]), math.ceil(high[0] - low[0]), math.ceil(high[1] - low[1]))
-        draw_sdf(surface, disc_distance(x, y, radius), _shape_style(radius, colour, style), rect)
+    draw_sdf_disc(surface, (x, y), radius, _shape_style(radius, colour, style))
 
 
 def darken(colour: RgbColour) -> RgbColour:

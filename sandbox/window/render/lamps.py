@@ -14,7 +14,7 @@ from sandbox.scene.description.play import PlayPart
 from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.lines import clip_segment
 from sandbox.window.render.palette import BACKGROUND, RgbColour, hex_colour, mix_colours
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 
 AMBER: RgbColour = (255, 196, 84)
 WHITE: RgbColour = (255, 255, 255)
@@ -55,13 +55,7 @@ def draw_lamps(canvas: Canvas, scene: Scene) -> None:
 def draw_spot(canvas: Canvas, at: Point, radius: float, look: ShapeStyle) -> None:
     """Draw the visible part of a disc on the ground; position and radius in m."""
     ((x, y),), size = canvas.camera.to_screen(np.asarray([at])).tolist(), radius * canvas.camera.scale
-    if clip_segment((x, y), (x, y), canvas.surface.get_clip(), size + 4.0) is None:
-        return
-    reach = min(size, 1e6)
-    low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
-    (left, top), (right, bottom) = low, high
-    within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
-    draw_sdf(canvas.surface, disc_distance(x, y, size), look, within)
+    draw_sdf_disc(canvas.surface, (x, y), size, look)
 
 
 class LampRenderer:

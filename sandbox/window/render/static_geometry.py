@@ -45,6 +45,7 @@ from sandbox.window.render.sdf import (
     capsule_distance,
     disc_distance,
     draw_sdf,
+    draw_sdf_disc,
     line_distance,
 )
 
@@ -222,21 +223,15 @@ def _draw_post(canvas: Canvas, post: Post) -> None:
         return
     x, y = canvas.camera.to_screen(position)[0].tolist()
     edge = colour_of_fixed(post, NEUTRAL)
-    rect = _surrounding_rect((x, y), (x, y), radius, canvas.surface.get_clip())
     if not post.solid:
         faint = mix_colours(BACKGROUND, edge, ABSENT_FRACTION)
-        draw_sdf(
-            canvas.surface,
-            disc_distance(x, y, radius),
-            ShapeStyle(BACKGROUND, faint, 1.0 * ui_scale, antialias=antialias),
-            rect,
-        )
+        draw_sdf_disc(canvas.surface, (x, y), radius, ShapeStyle(BACKGROUND, faint, ui_scale, antialias=antialias))
         return
     style = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * ui_scale, radius), antialias=antialias)
-    draw_sdf(canvas.surface, disc_distance(x, y, radius), style, rect)
+    draw_sdf_disc(canvas.surface, (x, y), radius, style)
     if post.kick is not None and radius > MIN_RING_RADIUS * ui_scale:  # ring of a bumper
         ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * ui_scale, antialias=antialias)
-        draw_sdf(canvas.surface, disc_distance(x, y, 0.6 * radius), ring, rect)
+        draw_sdf_disc(canvas.surface, (x, y), 0.6 * radius, ring)
 
 
 OPACITY = 165
@@ -360,13 +355,8 @@ def _draw_circle(
     if not canvas.camera.in_sight(position, np.asarray([radius / canvas.camera.scale]))[0]:
         return
     x, y = canvas.camera.to_screen(position)[0].tolist()
-    area = canvas.surface.get_clip()
-    left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
-    right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
-    if left < right and top < bottom:
-        rect = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
-        look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=canvas.antialias)
-        draw_sdf(canvas.surface, disc_distance(x, y, radius), look, rect)
+    look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=canvas.antialias)
+    draw_sdf_disc(canvas.surface, (x, y), radius, look)
 
 
 FILLED, LINED = 0.13, 0.55
