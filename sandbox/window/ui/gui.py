@@ -70,7 +70,6 @@ class Gui:
         self._heard: object = None  # contacts that were last passed to the sounds
         self.bodies_out_of_view = False
         """whether all moving bodies are outside the view"""
-        self._faults = pygame.Rect(0, 0, 0, 0)  # box with the faults of the scene file
         self._plates: dict[str, pygame.Rect] = {}
 
     def on_scene_changed(self, same: bool) -> None:
@@ -241,8 +240,9 @@ class Gui:
 
     def _close_faults(self, event: pygame.event.Event, app_state: AppState) -> bool:
         escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
-        click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self._faults.collidepoint(event.pos)
-        if not app_state.faults or not (escape or click):
+        click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3
+        box = self._plates.get("faults")
+        if not app_state.faults or not (escape or (click and box is not None and box.collidepoint(event.pos))):
             return False
         app_state.faults = ()
         return True
@@ -282,40 +282,31 @@ class Gui:
         status: HudStatus,
         display: GameDisplay | None,
     ) -> None:
-        show = app_state.view
         if self.scene_browser is not None:
             self.scene_browser.draw(surface, self.ui_scale)
             return
-        plates: dict[str, pygame.Rect] = {}
+        show, plates, scale_bar, field = app_state.view, dict[str, pygame.Rect](), None, None
         if show is None:
             surface.fill(BACKGROUND)
         else:
             self._draw_scene(surface, camera, app_state, show, display, plates)
             self._play_sounds(app_state, show)
-        if show is not None:
             if not self.help.open:
                 self._draw_game(surface, app_state, show, display, plates)
-            self._draw_graph(surface, app_state, plates)
-        self._faults = hud.draw_hud(
-            surface,
-            replace(status, out_of_sight=self.describe_out_of_view(app_state)),
-            self.ui_scale,
-            right=self.panel.width,
-            bottom=self.bottom_margin,
-            taken=[rect for rect in plates.values() if rect.width and rect.height],
-            scale=None if show is None else scale_rect(camera, self.ui_scale, self._scale_foot(app_state)),
-            field=None if show is None or not has_field(show.scene) else field_rect(show.scene, camera),
-            plates=plates,
-        )
+            if "energy" in self.overlays:
+                self._draw_graph(surface, app_state, show, plates)
+            scale_bar = scale_rect(camera, self.ui_scale, self._scale_foot(app_state))
+            field = field_rect(show.scene, camera) if has_field(show.scene) else None
+        status = replace(status, out_of_sight=self.describe_out_of_view(app_state))
+        taken = [rect for rect in plates.values() if rect.width and rect.height]
+        plates |= hud.draw_hud(surface, status, self.area, self.ui_scale, taken, scale_bar, field)
         if show is not None:
             if self._high_scores.entry is not None and not self.help.open:
                 self._high_scores.draw(surface, self.area, self.ui_scale)
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
-                now = show.frame.time
-                self._timeline.draw(
-                    surface, rect, show.start_time, now, show.end_time, show.keyframe_times, self.ui_scale
-                )
+                times = show.start_time, show.frame.time, show.end_time
+                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale)
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
@@ -438,11 +429,14 @@ class Gui:
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
-    def _draw_graph(self, surface: pygame.Surface, app_state: AppState, plates: dict[str, pygame.Rect]) -> None:
+    def _draw_graph(
+        self,
+        surface: pygame.Surface,
+        app_state: AppState,
+        show: LiveView | RecordedView,
+        plates: dict[str, pygame.Rect],
+    ) -> None:
         """Draw the energy graph at the lower right, above other plates; smaller if there is little space."""
-        show = app_state.view
-        if show is None or "energy" not in self.overlays:
-            return
         self._graph.add(show.frame.time, *show.energy())
         area, margin = self.area, round(10 * self.ui_scale)
         taken = [*self.permanent_plates(app_state), *plates.values()]

@@ -158,47 +158,40 @@ def layout_rows(status: HudStatus, area: pygame.Rect, ui_scale: float, taken: Se
 def draw_hud(
     surface: pygame.Surface,
     status: HudStatus,
+    visible: pygame.Rect,
     ui_scale: float,
-    *,
-    right: int = 0,
-    bottom: int = 0,
     taken: Sequence[pygame.Rect] = (),
-    scale: pygame.Rect | None = None,
+    scale_bar: pygame.Rect | None = None,
     field: pygame.Rect | None = None,
-    plates: dict[str, pygame.Rect] | None = None,
-) -> pygame.Rect:
+) -> dict[str, pygame.Rect]:
     """Draw all plates of the head-up display; plates without space are dropped, the least important first.
 
     Args:
         surface: the window.
         status: the values to show.
+        visible: area of the window that nothing covers, px.
         ui_scale: 1 on a display of 1080 lines.
-        right: px covered at the right.
-        bottom: px covered at the bottom.
         taken: rectangles of other plates, which are kept free.
-        scale: of the scale bar at the lower left; messages are drawn beside it.
+        scale_bar: at the lower left; messages are drawn beside it.
         field: of a playing field, which messages leave free if there is enough space to its left.
-        plates: receives the rectangle of each plate.
 
     Returns:
-        The rectangle of the box with the faults of the scene file; empty without faults.
+        The rectangles of the plates, px, by name; empty ones of those that are not drawn.
     """
-    plates, nothing = {} if plates is None else plates, pygame.Rect(0, 0, 0, 0)
-    visible = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
     area, size = _scale_area(visible, ui_scale)
     if area.width < 2 * size or area.height < size:
-        return nothing
+        return {}
     rows = layout_rows(status, visible, ui_scale, taken)
     _draw_rows(surface, rows, size)
-    plates["state"] = rows.rect
-    plates["rate"] = _draw_rate(surface, status, area, [rows.rect, *taken], size)
+    plates = {"state": rows.rect, "rate": _draw_rate(surface, status, area, [rows.rect, *taken], size)}
     if status.faults:
         top = rows.rect.bottom + _pad(size)
         below = pygame.Rect(area.left, top, area.width, area.bottom - top)
-        return _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
+        plates["faults"] = _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
+        return plates
     plates["picked"] = _draw_picked(surface, status.picked, area, [rows.rect, plates["rate"], *taken], size)
     others = [rows.rect, plates["rate"], plates["picked"], *taken]
-    message_area = _message_area(area, scale, field, size)
+    message_area = _message_area(area, scale_bar, field, size)
     for k, rect in enumerate(draw_messages(surface, status.messages, message_area, others, size)):
         plates[f"message {k}"] = rect
     if status.question is not None:
@@ -208,7 +201,7 @@ def draw_hud(
         draw_notice(surface, "Press Space to start", on_field, 1.5 * size, SKY, status.start_keys)
     elif status.out_of_sight is not None:
         draw_notice(surface, status.out_of_sight, area, size, SKY)
-    return nothing
+    return plates
 
 
 def hud_width(longest: str, ui_scale: float) -> int:
@@ -324,13 +317,15 @@ def _draw_picked(
     return rect
 
 
-def _message_area(area: pygame.Rect, scale: pygame.Rect | None, field: pygame.Rect | None, size: float) -> pygame.Rect:
+def _message_area(
+    area: pygame.Rect, scale_bar: pygame.Rect | None, field: pygame.Rect | None, size: float
+) -> pygame.Rect:
     """Return the area for messages: beside the scale bar and left of the field, as far as both leave enough width."""
     left, right = area.left, area.right
     if field is not None and field.left - _pad(size) - left >= round(MIN_MESSAGE_WIDTH * size):
         right = min(right, field.left - _pad(size))
-    if scale is not None and right - scale.right - _pad(size) >= round(MIN_MESSAGE_WIDTH * size):
-        left = max(left, scale.right + _pad(size))
+    if scale_bar is not None and right - scale_bar.right - _pad(size) >= round(MIN_MESSAGE_WIDTH * size):
+        left = max(left, scale_bar.right + _pad(size))
     return pygame.Rect(left, area.top, right - left, area.height)
 
 
