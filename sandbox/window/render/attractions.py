@@ -13,11 +13,11 @@ from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, YELLOW, mix_colours
 
-RADIUS, RAY = 6.0, 5.0
+DISC_RADIUS, RAY_LENGTH = 6.0, 5.0
 """px at a UI scale of 1, of the disc, and length of a ray"""
-GAP = 2.5
+RAY_GAP = 2.5
 """px between the disc and its rays"""
-RAYS = 8
+RAY_COUNT = 8
 COLOUR = mix_colours(BACKGROUND, YELLOW, 0.8)
 
 
@@ -33,9 +33,9 @@ def draw_attractions(canvas: Canvas, scene: Scene) -> None:
 
 def _draw_sun(canvas: Canvas, centre: tuple[float, float], *, repels: bool) -> None:
     unit, (x, y) = canvas.ui_scale, centre
-    for k in range(RAYS):
-        across, up = math.cos(math.tau * k / RAYS), math.sin(math.tau * k / RAYS)
-        inner, outer = (RADIUS + GAP) * unit, (RADIUS + GAP + RAY) * unit
+    for k in range(RAY_COUNT):
+        across, up = math.cos(math.tau * k / RAY_COUNT), math.sin(math.tau * k / RAY_COUNT)
+        inner, outer = (DISC_RADIUS + RAY_GAP) * unit, (DISC_RADIUS + RAY_GAP + RAY_LENGTH) * unit
         ends = (x + inner * across, y + inner * up), (x + outer * across, y + outer * up)
         draw_line(canvas.surface, *ends, COLOUR, 1.6 * unit, canvas.antialias)
-    draw_disc(canvas.surface, centre, RADIUS * unit, COLOUR, hole=(RADIUS - 2.0) * unit if repels else 0.0)
+    draw_disc(canvas.surface, centre, DISC_RADIUS * unit, COLOUR, hole=(DISC_RADIUS - 2.0) * unit if repels else 0.0)

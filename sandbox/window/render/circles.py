@@ -13,11 +13,11 @@ from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
 from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf_disc, sdf_surface, shade_sdf
 
-LARGEST = 96.0
+MAX_SPRITE_RADIUS = 96.0
 """px, largest radius that is drawn as a sprite; larger discs are painted directly, clipped to the surface"""
 SPRITES_PER_PX = 128
 """Sprites per px of radius: radii are quantised to 1/128 px."""
-OFFSETS = 4
+SUBPIXEL_OFFSETS = 4
 """Sub-pixel positions of a sprite along each axis, so that slow balls move smoothly."""
 SPRITE_BUDGET = 8_000_000
 """px of cached sprites, 32 MB"""
@@ -61,7 +61,7 @@ class CircleRenderer:
             colours: (K, 3).
             style: of all discs; a hollow disc is only a rim, in the colour of the disc.
         """
-        small = radius <= LARGEST
+        small = radius <= MAX_SPRITE_RADIUS
         if small.all():
             self._blit(surface, centre, radius, colours, style)
             return
@@ -83,7 +83,7 @@ class CircleRenderer:
         self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
     ) -> None:
         size = np.maximum(np.rint(radius * SPRITES_PER_PX), 1.0).astype(np.int64)
-        steps = OFFSETS if style.antialias else 1
+        steps = SUBPIXEL_OFFSETS if style.antialias else 1
         subpixel = np.floor(centre * steps + 0.5).astype(np.int64)
         corner = subpixel // steps - (np.ceil(size / SPRITES_PER_PX).astype(np.int64) + 1)[:, None]
         keys = _keys(size, colours, subpixel % steps).tolist()
@@ -114,7 +114,7 @@ def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
     pixels = np.arange(2 * half + 1, dtype=np.float64) + 0.5
     # Coverage that falls off linearly over a pixel adds 1/12 px² to the squared radius, visible on tiny discs.
     drawn_radius = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
-    distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, drawn_radius)
+    distance = disc_distance(half + across / SUBPIXEL_OFFSETS, half + down / SUBPIXEL_OFFSETS, drawn_radius)
     return sdf_surface(
         shade_sdf(distance(pixels[:, None], pixels[None, :]), _shape_style(radius, (red, green, blue), style))
     )

@@ -234,9 +234,9 @@ def _draw_post(canvas: Canvas, post: Post) -> None:
         draw_sdf_disc(canvas.surface, (x, y), 0.6 * radius, ring)
 
 
-OPACITY = 165
+UPPER_LAYER_OPACITY = 165
 """of 255, opacity of layers above the ground"""
-MARGIN = 4
+LAYER_MARGIN = 4
 """px, margin around a cached layer"""
 
 
@@ -302,7 +302,7 @@ def _layer_sprite(canvas: Canvas, scene: Scene) -> Sprite | None:
     if not discs:
         return None
     pixels = np.asarray(canvas.camera.to_screen(np.asarray([position for position, _ in discs])))
-    reach = np.asarray([[size * canvas.camera.scale] for _, size in discs]) + MARGIN * canvas.ui_scale
+    reach = np.asarray([[size * canvas.camera.scale] for _, size in discs]) + LAYER_MARGIN * canvas.ui_scale
     low, high = (
         (pixels - reach).min(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
         (pixels + reach).max(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
@@ -321,7 +321,7 @@ def _layer_sprite(canvas: Canvas, scene: Scene) -> Sprite | None:
     picture = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     colours = black * (255.0 / np.maximum(cover, 1.0))[:, :, None]
     pygame.surfarray.pixels3d(picture)[:] = colours.clip(0, 255).astype(np.uint8)
-    pygame.surfarray.pixels_alpha(picture)[:] = (cover * (OPACITY / 255.0)).astype(np.uint8)
+    pygame.surfarray.pixels_alpha(picture)[:] = (cover * (UPPER_LAYER_OPACITY / 255.0)).astype(np.uint8)
     return picture, box.topleft
 
 
@@ -359,9 +359,9 @@ def _draw_circle(
     draw_sdf_disc(canvas.surface, (x, y), radius, look)
 
 
-FILLED, LINED = 0.13, 0.55
+ZONE_FILL_OPACITY, ZONE_LINE_OPACITY = 0.13, 0.55
 """opacity of the area and of the outline"""
-LINE = 1.5
+ZONE_LINE_WIDTH = 1.5
 """px, width of the outline"""
 
 
@@ -372,8 +372,13 @@ def draw_zones(canvas: Canvas, scene: Scene) -> None:
         distance, within = _distance(zone, canvas.camera)
         box = within.inflate(4, 4).clip(canvas.surface.get_clip())
         colour = colour_of_zone(zone)
-        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, FILLED, antialias), box)
-        draw_sdf(canvas.surface, distance, ShapeStyle(None, colour, LINE * canvas.ui_scale, LINED, antialias), box)
+        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, ZONE_FILL_OPACITY, antialias), box)
+        draw_sdf(
+            canvas.surface,
+            distance,
+            ShapeStyle(None, colour, ZONE_LINE_WIDTH * canvas.ui_scale, ZONE_LINE_OPACITY, antialias),
+            box,
+        )
 
 
 def colour_of_zone(zone: Zone) -> RgbColour:

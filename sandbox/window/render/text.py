@@ -14,7 +14,7 @@ from sandbox.window.render.palette import INK, LINE, PANEL, RgbColour
 
 MAX_TEXT_LENGTH = 400
 """Number of characters of a line that are rendered; limits the width of the surface."""
-SMALLEST, MAX_TEXT_SIZE = 4, 128
+MIN_FONT_SIZE, MAX_FONT_SIZE = 4, 128
 """px, range of font sizes"""
 
 
@@ -58,7 +58,7 @@ def text_size(text: str, size: float, bold: bool = False, mono: bool = False) ->
 
 
 def _integer_size(size: float) -> int:
-    return round(min(max(size, SMALLEST), MAX_TEXT_SIZE)) if math.isfinite(size) else SMALLEST
+    return round(min(max(size, MIN_FONT_SIZE), MAX_FONT_SIZE)) if math.isfinite(size) else MIN_FONT_SIZE
 
 
 def renderable(text: str) -> str:
@@ -102,8 +102,8 @@ def font_file(bold: bool, mono: bool) -> Path | None:
     return path if path.is_file() else None
 
 
-OPACITY = 214
-MAX_BOX = 16_384
+BOX_OPACITY = 214
+MAX_BOX_SIDE = 16_384
 """px, largest side of a box"""
 
 
@@ -112,11 +112,11 @@ def draw_box(
     rect: pygame.Rect,
     radius: float,
     colour: RgbColour = PANEL,
-    opacity: int = OPACITY,
+    opacity: int = BOX_OPACITY,
     edge: RgbColour | None = LINE,
 ) -> None:
     """Draw a rounded translucent box; nothing if its area is empty."""
-    if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX:
+    if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX_SIDE:
         return
     surface.blit(_plate(rect.size, round(radius), colour, opacity, edge), rect)
 
