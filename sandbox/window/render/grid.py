@@ -7,7 +7,7 @@ import pygame
 
 from sandbox.formatting import format_si
 from sandbox.window.camera import Camera
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
 from sandbox.window.render.text import draw_text
 

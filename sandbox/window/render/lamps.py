@@ -11,7 +11,7 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.play import PlayPart
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import clip_segment
 from sandbox.window.render.palette import BACKGROUND, RgbColour, hex_colour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc

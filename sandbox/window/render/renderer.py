@@ -16,10 +16,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.accents import AccentNumbers
-from sandbox.window.render.attractions import draw_attractions
-from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
-from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext
 from sandbox.window.render.game_view import GameViews, HasHud
 from sandbox.window.render.grid import draw_grid, draw_scale
 from sandbox.window.render.lamps import LampRenderer, draw_lamps
@@ -29,6 +27,7 @@ from sandbox.window.render.particles import MAX_POINT_SIZE, LifetimeColours, Pac
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.static_geometry import (
     LayerRenderer,
+    draw_attractions,
     draw_bounds,
     draw_markings,
     draw_static_bodies,

@@ -1,4 +1,4 @@
-"""Static geometry: planes, walls, posts, bounds, markings, zones and raised layers."""
+"""Static geometry: planes, walls, posts, bounds, markings, zones, raised layers and centres of attraction."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,8 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import (
     SDL_COORDINATE_LIMIT,
     Pixel,
@@ -34,6 +35,7 @@ from sandbox.window.render.palette import (
     SKY,
     SOLID,
     SURFACE,
+    YELLOW,
     RgbColour,
     colour_of_fixed,
     hex_colour,
@@ -439,3 +441,34 @@ def _box(corners: FloatArray, reach: float) -> pygame.Rect:
         (corners.max(axis=0) + reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
     )
     return pygame.Rect(*np.floor(low).astype(int).tolist(), *np.ceil(high - low + 1.0).astype(int).tolist())
+
+
+SUN_RADIUS, RAY_LENGTH = 6.0, 5.0
+"""px at a UI scale of 1, of the disc, and length of a ray"""
+RAY_GAP = 2.5
+"""px between the disc and its rays"""
+RAY_COUNT = 8
+SUN_COLOUR = mix_colours(BACKGROUND, YELLOW, 0.8)
+
+
+def draw_attractions(canvas: Canvas, scene: Scene) -> None:
+    """Draw the centre of each attraction towards a point: a sun with rays, or a hollow one if it repels.
+
+    An attraction towards a body has no symbol, as the body itself is visible.
+    """
+    for attraction in scene.attractions:
+        if isinstance(attraction.toward, str) or not attraction.strength:
+            continue
+        x, y = canvas.camera.to_screen(np.asarray(attraction.toward)).tolist()
+        if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT:
+            _draw_sun(canvas, (x, y), repels=attraction.strength < 0.0)
+
+
+def _draw_sun(canvas: Canvas, centre: tuple[float, float], *, repels: bool) -> None:
+    unit, (x, y) = canvas.ui_scale, centre
+    for k in range(RAY_COUNT):
+        across, up = math.cos(math.tau * k / RAY_COUNT), math.sin(math.tau * k / RAY_COUNT)
+        inner, outer = (SUN_RADIUS + RAY_GAP) * unit, (SUN_RADIUS + RAY_GAP + RAY_LENGTH) * unit
+        ends = (x + inner * across, y + inner * up), (x + outer * across, y + outer * up)
+        draw_line(canvas.surface, *ends, SUN_COLOUR, 1.6 * unit, canvas.antialias)
+    draw_disc(canvas.surface, centre, SUN_RADIUS * unit, SUN_COLOUR, hole=(SUN_RADIUS - 2.0) * unit if repels else 0.0)

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sandbox.window.camera import Camera
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.grid import MIN_LINE_SPACING, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
