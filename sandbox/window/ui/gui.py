@@ -3,6 +3,7 @@
 from dataclasses import replace
 from operator import is_
 from pathlib import Path
+from typing import NamedTuple
 
 import pygame
 
@@ -38,6 +39,14 @@ GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
 
 
+class GuiFrame(NamedTuple):
+    """Values that a picture shows."""
+
+    status: HudStatus
+    display: GameDisplay | None
+    """of the game, if any"""
+
+
 class Gui:
     """Scene view, surrounding widgets, and the set of enabled overlays."""
 
@@ -63,8 +72,7 @@ class Gui:
         self._parameters = SessionParameters()
         self._size = size
         self._announces_keys = False  # whether the keys of a new scene are still to be announced
-        self._display: GameDisplay | None = None  # of the game, and status, from `update` to the end of `draw`
-        self._status: HudStatus | None = None
+        self._frame: GuiFrame | None = None  # from `update` to the end of `draw`
         self._score: tuple[object, ScoreLayout] | None = None  # arguments of the last layout, and the layout
         self._panel_inputs: tuple[object, ...] = ()  # values shown by the panel at its last update
         self._heard: object = None  # contacts that were last passed to the sounds
@@ -135,7 +143,8 @@ class Gui:
         show, area = app_state.view, self.area
         if show is None:
             return []
-        status = self._status or hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None)
+        frame = self._frame
+        status = hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None) if frame is None else frame.status
         longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
         rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
@@ -156,7 +165,7 @@ class Gui:
         return float(self.bottom_margin + self.score_margins(app_state)[1])
 
     def _display_of(self, host: GameHost) -> GameDisplay:
-        return self._display or host.shown()
+        return host.shown() if self._frame is None or self._frame.display is None else self._frame.display
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
         """Return the layout of the score panel, cached for the last arguments."""
@@ -247,8 +256,8 @@ class Gui:
         app_state.faults = ()
         return True
 
-    def update(self, app_state: AppState, frame_rate: float, recording: str | None) -> None:
-        """Update the status and the high-score dialog for the next picture.
+    def update(self, app_state: AppState, frame_rate: float, recording: str | None) -> GuiFrame:
+        """Update the high-score dialog, and return the values that the next picture shows.
 
         Args:
             app_state: the application state.
@@ -256,23 +265,27 @@ class Gui:
             recording: length and format of the film being recorded, if any.
         """
         host, controls = app_state.host, app_state.controls
-        self._display = None if host is None else host.shown()
+        display = None if host is None else host.shown()
         if host is not None and not self.help.open and (controls is None or controls.is_own_score):
             for note in self._high_scores.update(host):
                 app_state.messages.add(note, "warning")
-        self._status = hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording)
+        self._frame = GuiFrame(hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording), display)
+        return self._frame
 
-    def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState) -> None:
-        """Draw the scene and all widgets, with the status of the last `update`.
+    def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState, frame: GuiFrame) -> None:
+        """Draw the scene and all widgets.
 
         Args:
             surface: the window.
             camera: its camera.
             app_state: the application state.
+            frame: result of `update`.
         """
-        assert self._status is not None, "update comes first"
-        self._draw(surface, camera, app_state, self._status, self._display)
-        self._status = self._display = None  # outdated by the next event
+        if self.scene_browser is not None:
+            self.scene_browser.draw(surface, self.ui_scale)
+        else:
+            self._draw(surface, camera, app_state, *frame)
+        self._frame = None  # outdated by the next event
 
     def _draw(
         self,
@@ -282,9 +295,6 @@ class Gui:
         status: HudStatus,
         display: GameDisplay | None,
     ) -> None:
-        if self.scene_browser is not None:
-            self.scene_browser.draw(surface, self.ui_scale)
-            return
         show, plates, scale_bar, field = app_state.view, dict[str, pygame.Rect](), None, None
         if show is None:
             surface.fill(BACKGROUND)
