@@ -30,7 +30,7 @@ from sandbox.window.render.palette import (
     RgbColour,
     mix_colours,
 )
-from sandbox.window.render.text import TextPlate, draw_box, draw_lines, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.render.text import TextPlate, draw_box, draw_text, draw_text_lines, ellipsis, text_size, wrap_text
 from sandbox.window.ui.hud import draw_mark
 
 TEXT_SIZE = 12.5
@@ -428,7 +428,7 @@ class CheckMarks:
         left, y = self.card.left + pad, self.card.top + pad
         draw_mark(surface, "triangle", (left + 0.5 * size, y + 0.5 * step), 0.45 * size, _colour(mark))
         draw_text(surface, title, (left + 1.4 * size, y + 0.5 * step), size, INK, "midleft", bold=True)
-        draw_lines(surface, lines, (left, y + step), step, size)
+        draw_text_lines(surface, lines, (left, y + step), step, size)
         y += step * (1 + len(lines)) + round(0.4 * size)
         for row in buttons:
             x = left

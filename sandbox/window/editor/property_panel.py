@@ -34,7 +34,7 @@ from sandbox.window.render.palette import (
     LINE,
     WARNING,
 )
-from sandbox.window.render.text import draw_lines, draw_text, ellipsis, lines_width, text_size, wrap_text
+from sandbox.window.render.text import draw_text, draw_text_lines, ellipsis, text_lines_width, text_size, wrap_text
 from sandbox.window.ui.scroll_column import ScrollColumn
 from sandbox.window.ui.text_edit import TextEdit, draw_text_edit
 
@@ -161,7 +161,7 @@ class PropertyPanel(ScrollColumn):
                 y += self._px(SECTION_GAP)
         self._items, self._height = tuple(items), y + self._px(6)
         labels = [item.row.spec.key for item in items if item.row is not None]
-        widest = lines_width(labels, LABEL_SIZE * self.ui_scale)
+        widest = text_lines_width(labels, LABEL_SIZE * self.ui_scale)
         self._label_width = min(max(widest + self._px(8), round(0.36 * width)), round(0.53 * width))
         self._scroll_to(self._scroll)
         self._update_hover()
@@ -478,7 +478,7 @@ class PropertyPanel(ScrollColumn):
         """Draw the note, and the visible headings and rows."""
         left = self._column[0]
         top = self._px(12) - self._scroll
-        draw_lines(sheet, self._note_lines, (left, top), self._note_step, NOTE_SIZE * self.ui_scale, FAINT)
+        draw_text_lines(sheet, self._note_lines, (left, top), self._note_step, NOTE_SIZE * self.ui_scale, FAINT)
         for item in self._visible_items():
             if item.row is None:
                 self._draw_heading(item)
@@ -525,7 +525,7 @@ class PropertyPanel(ScrollColumn):
         else:
             self._draw_value(item, row, box)
         top = box.bottom + self._px(3)
-        draw_lines(sheet, item.error, (left, top), self._error_step, ERROR_SIZE * self.ui_scale, WARNING)
+        draw_text_lines(sheet, item.error, (left, top), self._error_step, ERROR_SIZE * self.ui_scale, WARNING)
         if rejected is not None:
             pygame.draw.rect(sheet, WARNING, box, max(self._px(1), 1), border_radius=self._px(3))
 

@@ -186,12 +186,12 @@ def wrap_text(
     return tuple(lines)
 
 
-def lines_width(lines: Sequence[str], size: float, bold: bool = False, mono: bool = False) -> int:
+def text_lines_width(lines: Sequence[str], size: float, bold: bool = False, mono: bool = False) -> int:
     """Return the width of the longest of some lines, px; 0 without any."""
     return max((text_size(line, size, bold, mono)[0] for line in lines), default=0)
 
 
-def draw_lines(
+def draw_text_lines(
     surface: pygame.Surface,
     lines: Sequence[str],
     at: tuple[float, float],
@@ -213,14 +213,14 @@ class TextPlate:
         """Wrap a text to a width, px; `pad` is the space above and below it in text heights."""
         self._lines = wrap_text(text, size, max_width, max_lines)
         self._size, self._step, self._pad = size, round(1.4 * size), pad
-        width, height = lines_width(self._lines, size), len(self._lines) * self._step
+        width, height = text_lines_width(self._lines, size), len(self._lines) * self._step
         self.rect = pygame.Rect(0, 0, width + round(1.4 * size), height + round(2.0 * pad * size))
 
     def draw(self, surface: pygame.Surface, radius: float, opacity: int, edge: RgbColour = LINE) -> None:
         """Draw the plate with rounded corners."""
         draw_box(surface, self.rect, radius, opacity=opacity, edge=edge)
         at = self.rect.left + 0.7 * self._size, self.rect.top + self._pad * self._size
-        draw_lines(surface, self._lines, at, self._step, self._size)
+        draw_text_lines(surface, self._lines, at, self._step, self._size)
 
 
 def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], ui_scale: float) -> None:

@@ -7,7 +7,7 @@ import pygame
 
 from sandbox.window.input.keymap import Command
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, lines_width, text_size
+from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_lines_width, text_size
 
 TEXT_SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0)
 """px at UI scale 1: the largest size at which everything fits is used; at the smallest, the page can be scrolled"""
@@ -113,7 +113,7 @@ HelpColumn = list[HelpGroup]
 def _group_widths(group: HelpGroup, size: float) -> tuple[int, int]:
     """Return the widths of the keys and of the descriptions of a group, px."""
     keys, words = zip(*group.lines, strict=True)
-    return lines_width(keys, 0.92 * size, mono=True) + round(1.0 * size), lines_width(words, size)
+    return text_lines_width(keys, 0.92 * size, mono=True) + round(1.0 * size), text_lines_width(words, size)
 
 
 def _group_height(group: HelpGroup, size: float) -> float:

@@ -10,7 +10,15 @@ from sandbox.formatting import format_percent, format_si, format_time
 from sandbox.window.playback.snapshot import HudStatus
 from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, RgbColour
-from sandbox.window.render.text import draw_box, draw_lines, draw_text, ellipsis, lines_width, text_size, wrap_text
+from sandbox.window.render.text import (
+    draw_box,
+    draw_text,
+    draw_text_lines,
+    ellipsis,
+    text_lines_width,
+    text_size,
+    wrap_text,
+)
 
 MAX_SPEED_ERROR = 0.10
 """relative difference between real and requested speed above which both are shown"""
@@ -261,14 +269,14 @@ def draw_notice(
     small = 0.62 * size
     details = wrap_text(detail, small, area.width - 2 * size, 4) if detail else ()
     line_height, small_height = round(1.4 * size), round(1.5 * small)
-    width = max(lines_width(lines, size, bold=True), lines_width(details, small))
+    width = max(text_lines_width(lines, size, bold=True), text_lines_width(details, small))
     height = len(lines) * line_height + len(details) * small_height + round(size)
     rect = pygame.Rect(0, 0, width + 2 * round(size), height)
     rect.center = area.center
     draw_box(surface, rect, 0.5 * size, opacity=244, edge=edge)
     x, y = rect.centerx, rect.top + 0.5 * size
-    draw_lines(surface, details, (x, y + len(lines) * line_height), small_height, small, FAINT, "center")
-    draw_lines(surface, lines, (x, y), line_height, size, INK, "center", bold=True)
+    draw_text_lines(surface, details, (x, y + len(lines) * line_height), small_height, small, FAINT, "center")
+    draw_text_lines(surface, lines, (x, y), line_height, size, INK, "center", bold=True)
 
 
 def _draw_rate(
@@ -351,7 +359,7 @@ def draw_messages(
                 slot.width = min(slot.width, each.left - pad - area.left)
         room = slot.width - 2 * pad - mark_room
         lines = wrap_text(text, size, room, 2)
-        width = lines_width(lines, size)
+        width = text_lines_width(lines, size)
         rect = pygame.Rect(area.left, 0, width + 2 * pad + mark_room, len(lines) * line_height + 2 * pad)
         rect.bottom = bottom
         while (hit := rect.collidelist(list(taken))) >= 0 and rect.top >= area.top:
@@ -360,7 +368,7 @@ def draw_messages(
             return drawn
         draw_box(surface, rect, 0.5 * size)
         draw_mark(surface, mark, (rect.left + pad + 0.5 * size, rect.top + pad + line_height / 2), 0.42 * size, colour)
-        draw_lines(surface, lines, (rect.right - pad - width, rect.top + pad), line_height, size)
+        draw_text_lines(surface, lines, (rect.right - pad - width, rect.top + pad), line_height, size)
         bottom = rect.top - round(0.4 * size)
         drawn.append(rect)
     return drawn
