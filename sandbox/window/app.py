@@ -176,13 +176,13 @@ class App:
         """Draw the scene and the GUI."""
         context = self.context
         context.gui.has_gamepad = self._gamepads.is_connected
-        context.gui.update(self.app_state, self._clock.get_fps(), context.capture.status)
+        frame = context.gui.update(self.app_state, self._clock.get_fps(), context.capture.status)
         if self.editing is not None and context.gui.scene_browser is None:
             self._draw_editing(self.editing)
             return
         context.refit_if_covered()
         context.gui.bodies_out_of_view = context.is_out_of_view
-        context.gui.draw(context.surface, context.camera, self.app_state)
+        context.gui.draw(context.surface, context.camera, self.app_state, frame)
         context.gui.announce_keys(self.app_state)
 
     def _wait(self, done: Callable[[float], bool]) -> None:

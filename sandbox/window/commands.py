@@ -8,22 +8,6 @@ from sandbox.window.input.keymap import Command
 from sandbox.window.mouse import MouseController
 from sandbox.window.playback.parameters import ParameterValue
 
-BUTTONS = {
-    "play": Command.PAUSE,
-    "pause": Command.PAUSE,
-    "step": Command.STEP,
-    "back": Command.BACK,
-    "restart": Command.RESTART,
-    "camera": Command.SCREENSHOT,
-    "record": Command.RECORD,
-    "stop": Command.RECORD,
-    "save": Command.SAVE,
-    "picker": Command.PICKER,
-    "help": Command.HELP,
-    "edit": Command.EDIT,
-}
-"""Commands by the name of the panel button."""
-
 CONFIRMATIONS = {
     Command.RESTART: "press R again to restart",
     Command.PREVIOUS: "press [ again to open the other scene",
@@ -81,7 +65,7 @@ class CommandDispatcher:
             Command.FOLLOW: context.toggle_follow,
             Command.FULL_SCREEN: context.toggle_full_screen,
         }
-        gui.panel.on_button = lambda name: self.run(BUTTONS[name])
+        gui.panel.on_button = self.run
         gui.panel.on_toggle = lambda name, _: self.toggle(name)
         gui.panel.on_change = self._store_parameter
 
@@ -120,7 +104,7 @@ class CommandDispatcher:
         if name == "antialias":
             self._context.gui.antialias = not self._context.gui.antialias
         else:
-            self.run(Command(name))
+            self.run(Command[name.upper()])
 
     def flush(self) -> None:
         """Apply the latest values of sliders and of a drag: once per frame, whatever the number of motion events."""

@@ -10,9 +10,9 @@ from sandbox.window.render.palette import BACKGROUND, INK, SKY
 
 SIZE = (1280, 800)
 MIN_SIZE = (160, 120)
-SHARE = 0.9
+MAX_DESKTOP_FRACTION = 0.9
 """largest fraction of the desktop that a new window covers"""
-LINES = 1080
+REFERENCE_HEIGHT = 1080
 """height of a display with UI scale 1, px"""
 
 
@@ -77,13 +77,13 @@ def ui_scale() -> float:
         heights = [height for _, height in pygame.display.get_desktop_sizes()]
     except pygame.error:
         heights = []
-    return max(round(4.0 * min(heights, default=LINES) / LINES) / 4.0, 1.0)
+    return max(round(4.0 * min(heights, default=REFERENCE_HEIGHT) / REFERENCE_HEIGHT) / 4.0, 1.0)
 
 
 def _fitting() -> tuple[int, int]:
     desktops = pygame.display.get_desktop_sizes() or [SIZE]
     scale = ui_scale()
-    width, height = (max(round(side * SHARE), 1) for side in desktops[0])
+    width, height = (max(round(side * MAX_DESKTOP_FRACTION), 1) for side in desktops[0])
     return max(min(round(SIZE[0] * scale), width), MIN_SIZE[0]), max(min(round(SIZE[1] * scale), height), MIN_SIZE[1])
 
 

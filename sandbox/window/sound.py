@@ -17,26 +17,26 @@ from sandbox.trajectory import Contacts
 
 Samples = npt.NDArray[np.int16]
 
-RATE = 44_100
+SAMPLE_RATE = 44_100
 """samples/s"""
-LOWEST, HIGHEST = 80.0, 2000.0
+MIN_PITCH, MAX_PITCH = 80.0, 2000.0
 """Hz, range of the fundamental: small loudspeakers are weak below it, and higher tones are shrill"""
-STEPS = 28
+PITCH_COUNT = 28
 """Number of pitches in the range, a whole tone apart, so that a few dozen sounds serve all bodies."""
 PARTIALS = ((1.0, 1.0), (2.756, 0.35), (5.404, 0.12))
 """Frequency ratio to the fundamental, and amplitude: those of a free bar, which sound like wood or stone.
 
 Source: L. D. Landau, E. M. Lifshitz, Theory of Elasticity, § 25: the roots of cos κl · cosh κl = 1.
 """
-CYCLES = 22.0
+DECAY_CYCLES = 22.0
 """Decay time to 1/e in cycles of the fundamental; higher pitches decay faster."""
-SLOWEST = 0.09
+MAX_DECAY_TIME = 0.09
 """s, largest decay time to 1/e"""
-CLICK, CLICK_SECONDS = 0.25, 0.0015
+CLICK_AMPLITUDE, CLICK_DECAY_TIME = 0.25, 0.0015
 """amplitude of the noise at the start, and its decay time to 1/e, s"""
-SECONDS = 0.5
+SOUND_DURATION = 0.5
 """s, duration of a sound, at the end of which it has fallen by 50 dB"""
-PEAK = 0.6
+PEAK_FRACTION = 0.6
 """fraction of full scale, with headroom for mixing"""
 
 
@@ -45,25 +45,25 @@ def impact_pitch(radius: float) -> float:
 
     The pitch of a real body is inversely proportional to its radius, which would exceed the audible range.
     """
-    octaves = math.log2(HIGHEST / LOWEST)
-    wanted = math.log2(220.0 / LOWEST) - 0.5 * math.log2(radius / 0.5)  # a radius of 0.5 m sounds at 220 Hz (A3)
-    step = round(min(max(wanted / octaves, 0.0), 1.0) * (STEPS - 1))
-    return float(LOWEST * 2.0 ** (octaves * step / (STEPS - 1)))
+    octaves = math.log2(MAX_PITCH / MIN_PITCH)
+    wanted = math.log2(220.0 / MIN_PITCH) - 0.5 * math.log2(radius / 0.5)  # a radius of 0.5 m sounds at 220 Hz (A3)
+    step = round(min(max(wanted / octaves, 0.0), 1.0) * (PITCH_COUNT - 1))
+    return float(MIN_PITCH * 2.0 ** (octaves * step / (PITCH_COUNT - 1)))
 
 
 def impact_sound(pitch: float) -> Samples:
-    """Return the sound of an impact at a pitch in Hz, mono at `RATE`."""
-    time = np.arange(int(SECONDS * RATE)) / RATE
-    decay = min(CYCLES / pitch, SLOWEST)
+    """Return the sound of an impact at a pitch in Hz, mono at `SAMPLE_RATE`."""
+    time = np.arange(int(SOUND_DURATION * SAMPLE_RATE)) / SAMPLE_RATE
+    decay = min(DECAY_CYCLES / pitch, MAX_DECAY_TIME)
     sound = np.zeros(len(time))
     for ratio, amplitude in PARTIALS:
-        if ratio * pitch < RATE / 2:
+        if ratio * pitch < SAMPLE_RATE / 2:
             # Higher partials decay faster, as in any damped material.
             sound += amplitude * np.exp(-time * ratio / decay) * np.sin(2.0 * math.pi * ratio * pitch * time)
     noise = np.random.default_rng(round(pitch)).uniform(-1.0, 1.0, len(time))
-    sound += CLICK * noise * np.exp(-time / CLICK_SECONDS)
+    sound += CLICK_AMPLITUDE * noise * np.exp(-time / CLICK_DECAY_TIME)
     sound *= _faded(len(time))
-    return np.asarray(np.round(sound * (PEAK * 32767.0 / np.abs(sound).max())), np.int16)
+    return np.asarray(np.round(sound * (PEAK_FRACTION * 32767.0 / np.abs(sound).max())), np.int16)
 
 
 def _faded(count: int) -> FloatArray:
@@ -75,19 +75,19 @@ def _faded(count: int) -> FloatArray:
     return envelope
 
 
-NOTE = 0.09
+NOTE_INTERVAL = 0.09
 """s between notes"""
-HOME = 440.0
+BASE_PITCH = 440.0
 """Hz, first note of the scale"""
 SCALE = (0, 2, 4, 7, 9)
-"""semitones above `HOME`: a pentatonic scale, in which any two notes are consonant"""
+"""semitones above `BASE_PITCH`: a pentatonic scale, in which any two notes are consonant"""
 CUE_NOTES: dict[str, tuple[int, ...]] = {
     "win": (0, 4, 7, 12),
     "lose": (0, -3, -7, -12),
     "empty": (-5, -5),
     "touch": (-12,),
 }
-"""Semitones relative to `HOME` for cues shared by many games; other cues get notes derived from their name."""
+"""Semitones relative to `BASE_PITCH` for cues shared by many games; other cues get notes derived from their name."""
 
 
 def cue_notes(cue: str) -> tuple[int, ...]:
@@ -104,10 +104,10 @@ def cue_notes(cue: str) -> tuple[int, ...]:
 
 @lru_cache(maxsize=64)
 def cue_sound(cue: str) -> Samples:
-    """Return the sound of a cue, mono at `RATE`."""
+    """Return the sound of a cue, mono at `SAMPLE_RATE`."""
     notes = cue_notes(cue)
-    step = int(NOTE * RATE)
-    sounds = [impact_sound(round(HOME * 2.0 ** (note / 12.0), 3)) for note in notes]
+    step = int(NOTE_INTERVAL * SAMPLE_RATE)
+    sounds = [impact_sound(round(BASE_PITCH * 2.0 ** (note / 12.0), 3)) for note in notes]
     mixed = np.zeros(step * (len(notes) - 1) + len(sounds[0]))
     for k, sound in enumerate(sounds):
         mixed[k * step : k * step + len(sound)] += sound
@@ -115,23 +115,23 @@ def cue_sound(cue: str) -> Samples:
     return np.asarray(np.round(mixed * (min(0.8 * 32767.0 / peak, 1.0))), np.int16)
 
 
-VOICES = 16
+MAX_VOICES = 16
 """number of simultaneous sounds"""
-A_CALL = 5
+MAX_SOUNDS_PER_CALL = 5
 """largest number of sounds started by one call; more would be noise"""
-CANDIDATES = 64
+MAX_CANDIDATES = 64
 """Number of the loudest contacts that are compared with those of the previous call."""
 GRAVITY = 9.81
 """m/s², reference acceleration of impact strength, also in scenes without gravity"""
-SILENT, LOUDEST = 0.1, 4.0
+MIN_STRENGTH, MAX_STRENGTH = 0.1, 4.0
 """Impact strength below which no sound is played, and from which on the volume is constant.
 
 Impact strength is impulse / (m·√(2·g·r)): 1 for a body that falls by its own radius. A body at rest transmits m·g·dt
 per step, a strength of 0.05 for r = 0.5 m at dt = 1/60 s.
 """
-CUE = 0.7
+CUE_VOLUME = 0.7
 """volume of cues, at which impacts stay audible"""
-BUFFER = 512
+BUFFER_SIZE = 512
 """samples of latency, 12 ms"""
 
 
@@ -154,9 +154,9 @@ class Sounds:
             return True
         try:
             if pygame.mixer.get_init() is None:
-                pygame.mixer.init(RATE, -16, 2, BUFFER, allowedchanges=0)
+                pygame.mixer.init(SAMPLE_RATE, -16, 2, BUFFER_SIZE, allowedchanges=0)
                 self._opened = True
-            pygame.mixer.set_num_channels(max(VOICES, pygame.mixer.get_num_channels()))
+            pygame.mixer.set_num_channels(max(MAX_VOICES, pygame.mixer.get_num_channels()))
         # pygame without its mixer module provides a stub that raises NotImplementedError.
         except (pygame.error, NotImplementedError, OSError) as error:
             self.available, self.why = False, f"no sound: {error}"
@@ -188,13 +188,13 @@ class Sounds:
         if not len(contacts):
             return 0
         strength, radius = loudness(contacts, bodies)
-        loud = np.flatnonzero(strength > SILENT)
-        if len(loud) > CANDIDATES:
-            loud = loud[np.argpartition(-strength[loud], CANDIDATES)[:CANDIDATES]]
+        loud = np.flatnonzero(strength > MIN_STRENGTH)
+        if len(loud) > MAX_CANDIDATES:
+            loud = loud[np.argpartition(-strength[loud], MAX_CANDIDATES)[:MAX_CANDIDATES]]
         loud = loud[np.argsort(-strength[loud], kind="stable")]
         played: set[float] = set()
         for row in loud.tolist():
-            if len(played) == A_CALL:
+            if len(played) == MAX_SOUNDS_PER_CALL:
                 break
             if _is_among(contacts, row, before):
                 continue
@@ -217,16 +217,16 @@ class Sounds:
         if channel is None:
             return False
         channel.play(self._sound(name))
-        channel.set_volume(CUE)
+        channel.set_volume(CUE_VOLUME)
         return True
 
     def _sound(self, what: float | str) -> pygame.mixer.Sound:
         """Return the sound of a pitch, Hz, or of a cue by name, cached."""
         if what not in self._sounds:
-            rate, _, channels = pygame.mixer.get_init() or (RATE, -16, 2)
+            rate, _, channels = pygame.mixer.get_init() or (SAMPLE_RATE, -16, 2)
             samples = cue_sound(what) if isinstance(what, str) else impact_sound(what)
-            if rate != RATE:  # the mixer was opened at another rate
-                places = np.arange(0, len(samples), RATE / rate)
+            if rate != SAMPLE_RATE:  # the mixer was opened at another rate
+                places = np.arange(0, len(samples), SAMPLE_RATE / rate)
                 samples = np.interp(places, np.arange(len(samples)), samples).astype(np.int16)
             self._sounds[what] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())
         return self._sounds[what]
@@ -249,7 +249,7 @@ def loudness(contacts: Contacts, bodies: Bodies) -> tuple[FloatArray, FloatArray
 
 def volume(strength: float) -> float:
     """Return the volume, 0 to 1, of an impact strength: a square root, as loudness is perceived on a ratio scale."""
-    return math.sqrt(min(strength / LOUDEST, 1.0))
+    return math.sqrt(min(strength / MAX_STRENGTH, 1.0))
 
 
 def _numbers(side: IntArray) -> IntArray:

@@ -33,7 +33,7 @@ MAX_VIEW = 1e15
 """m; larger coordinates are ignored"""
 NEAR_DISTANCE = 0.1
 """Largest distance of visible static geometry from the bodies' box, relative to the size of the box."""
-FAR = 20.0
+MAX_EXTENT = 20.0
 """Limit of static geometry and flights, as a multiple of the size of the initial box."""
 
 
@@ -108,7 +108,7 @@ def view_bounds(scene: Scene, reach: ViewBox | None = None) -> ViewBox:
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
         middle = (low + high) / 2.0
         nearest = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
-        if np.abs(nearest - middle).max() <= FAR * float((high - low).max()):
+        if np.abs(nearest - middle).max() <= MAX_EXTENT * float((high - low).max()):
             low, high = np.minimum(low, nearest), np.maximum(high, nearest)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
@@ -117,8 +117,8 @@ def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) 
     """Return the box that the moving bodies stay in during a run without actions, by simulating it.
 
     Work is limited by counts, so that the result is machine-independent: `MAX_STEPS` steps and `MAX_BODY_STEPS` steps
-    times bodies. The run ends early at the duration of the scene, or if the box exceeds `FAR` times the initial view.
-    Returns None if nothing moves, the scene sets its view, or the engine cannot run the scene.
+    times bodies. The run ends early at the duration of the scene, or if the box exceeds `MAX_EXTENT` times the initial
+    view. Returns None if nothing moves, the scene sets its view, or the engine cannot run the scene.
     """
     bodies, world, solver = scene.bodies, scene.world, scene.solver if settings is None else settings
     moving = np.flatnonzero(~bodies.fixed)
@@ -131,7 +131,7 @@ def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) 
         return None
     box = present_box = bounding_box(bodies.position[moving], bodies.radius[moving])
     (left, bottom), (right, top) = view_bounds(scene)
-    farthest = FAR * max(right - left, top - bottom)
+    farthest = MAX_EXTENT * max(right - left, top - bottom)
     try:
         for _ in range(steps):
             simulation.step()
@@ -226,7 +226,7 @@ def _orbit_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
             spin = offset[:, 0] * motion[:, 1] - offset[:, 1] * motion[:, 0]
             eccentricity2 = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # squared eccentricity
             farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(eccentricity2)), np.nan)
-        farthest = farthest[~bodies.fixed & (farthest <= FAR * size)]
+        farthest = farthest[~bodies.fixed & (farthest <= MAX_EXTENT * size)]
         if len(farthest):
             reach = float(farthest.max())
             found.append((centre - reach, centre + reach))
@@ -281,7 +281,7 @@ def _swing_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     anchored = joints.some((joints.a < 0) & np.isin(joints.kind, ANCHORED_KINDS))
     anchor, position = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
-    is_near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
+    is_near = ((anchor >= start[0] - MAX_EXTENT * size) & (anchor <= start[1] + MAX_EXTENT * size)).all(axis=1)
     points = [anchor[is_near], joints.of(JointKind.PULLEY).wheels.reshape(-1, 2)]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
         swing = is_near & np.isin(anchored.kind, (JointKind.ROD, JointKind.SLIDE)) & ~bodies.fixed[anchored.b]

@@ -15,13 +15,13 @@ from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 from sandbox.window import sound
 from sandbox.window.sound import (
-    A_CALL,
-    HIGHEST,
-    LOWEST,
-    RATE,
-    SECONDS,
-    SILENT,
-    STEPS,
+    MAX_PITCH,
+    MAX_SOUNDS_PER_CALL,
+    MIN_PITCH,
+    MIN_STRENGTH,
+    PITCH_COUNT,
+    SAMPLE_RATE,
+    SOUND_DURATION,
     Sounds,
     impact_pitch,
     impact_sound,
@@ -29,7 +29,7 @@ from sandbox.window.sound import (
     volume,
 )
 
-PITCHES = [float(LOWEST * (HIGHEST / LOWEST) ** (k / (STEPS - 1))) for k in range(STEPS)]
+PITCHES = [float(MIN_PITCH * (MAX_PITCH / MIN_PITCH) ** (k / (PITCH_COUNT - 1))) for k in range(PITCH_COUNT)]
 
 
 def bodies(radii: list[float], fixed: bool = False) -> Bodies:
@@ -68,15 +68,15 @@ def sounds() -> Iterator[Sounds]:
 def test_spectrum_peaks_at_the_pitch(pitch: float) -> None:
     samples = impact_sound(pitch)
     spectrum = np.abs(np.fft.rfft(samples))
-    peak = float(spectrum.argmax()) * RATE / len(samples)
-    assert abs(peak - pitch) <= 1.0 / SECONDS  # Hz, one line of this spectrum
+    peak = float(spectrum.argmax()) * SAMPLE_RATE / len(samples)
+    assert abs(peak - pitch) <= 1.0 / SOUND_DURATION  # Hz, one line of this spectrum
 
 
 @pytest.mark.parametrize("pitch", PITCHES[::9])
 def test_samples_peak_at_six_tenths_of_full_scale(pitch: float) -> None:
     samples = impact_sound(pitch)
     assert samples.dtype == np.int16
-    assert len(samples) == int(SECONDS * RATE)
+    assert len(samples) == int(SOUND_DURATION * SAMPLE_RATE)
     assert int(np.abs(samples.astype(int)).max()) == round(0.6 * 32767)
     assert samples[0] == samples[-1] == 0  # no discontinuity, which would click
 
@@ -93,9 +93,9 @@ def test_pitch_falls_with_the_radius_and_stays_in_the_audible_range() -> None:
     pitches = [impact_pitch(radius) for radius in (1e-9, 0.01, 0.028575, 0.1, 0.5, 2.0, 1e9)]
     assert pitches == sorted(pitches, reverse=True)
     assert all(higher > lower for higher, lower in pairwise(pitches[1:6]))
-    assert (pitches[0], pitches[-1]) == (pytest.approx(HIGHEST), pytest.approx(LOWEST))
+    assert (pitches[0], pitches[-1]) == (pytest.approx(MAX_PITCH), pytest.approx(MIN_PITCH))
     assert impact_pitch(0.5) == pytest.approx(220.0, rel=0.06)  # half of a whole tone, to which pitches are rounded
-    assert len({impact_pitch(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == STEPS
+    assert len({impact_pitch(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == PITCH_COUNT
 
 
 def test_impact_sound_is_deterministic() -> None:
@@ -116,7 +116,7 @@ def test_fall_by_one_radius_is_audible_and_resting_contact_is_silent() -> None:
     fall, rest = 1.0 * (2 * 9.81 * 0.5) ** 0.5, 1.0 * 9.81 / 60
     strength, _ = loudness(touching((0.0, (0, -1), fall), (0.0, (0, -1), rest)), bodies([0.5]))
     assert strength[0] == pytest.approx(1.0, rel=1e-15)
-    assert strength[1] < SILENT
+    assert strength[1] < MIN_STRENGTH
     assert volume(4.0) == volume(1e9) == 1.0
     assert 0.0 < volume(0.2) < volume(1.0) < 1.0
 
@@ -141,9 +141,9 @@ def test_simultaneous_sounds_are_limited_and_distinct_in_pitch(sounds: Sounds) -
     radii = [float(r) for r in np.geomspace(0.01, 10.0, 12)]
     balls = bodies([*radii, 0.01])
     crowd = [(0.1, (k, -1), 40.0 * float(np.sqrt(radius))) for k, radius in enumerate(radii)]
-    assert sounds.hits(touching(*crowd), balls) == A_CALL
+    assert sounds.hits(touching(*crowd), balls) == MAX_SOUNDS_PER_CALL
     assert sounds.hits(touching((0.2, (0, -1), 5.0), (0.2, (12, -1), 5.0)), balls) == 1  # equal radii share one sound
-    assert len(sounds._sounds) <= A_CALL + 1
+    assert len(sounds._sounds) <= MAX_SOUNDS_PER_CALL + 1
 
 
 def test_sounds_are_limited_by_the_channels_of_the_mixer(sounds: Sounds, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,7 +179,7 @@ def test_mixer_opened_elsewhere_stays_open() -> None:
         assert sounds.enable()
         assert sounds.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 1
         (played,) = sounds._sounds.values()
-        assert played.get_length() == pytest.approx(SECONDS, abs=1e-3)  # s, a few samples
+        assert played.get_length() == pytest.approx(SOUND_DURATION, abs=1e-3)  # s, a few samples
         sounds.disable()
         assert pygame.mixer.get_init() == (22_050, -16, 1)
     finally:

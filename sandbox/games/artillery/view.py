@@ -24,8 +24,7 @@ from sandbox.games.artillery.view_state import (
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
-from sandbox.window.render.canvas import Canvas
-from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
 from sandbox.window.render.palette import (
     BACKGROUND,

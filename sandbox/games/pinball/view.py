@@ -9,8 +9,7 @@ from sandbox.arrays import IntArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import GROUND
 from sandbox.scene.description.fixed import Post
-from sandbox.window.render.canvas import Canvas
-from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext
 from sandbox.window.render.lamps import draw_lamps, draw_spot
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line
 from sandbox.window.render.palette import INK, RgbColour, colour_of_fixed, mix_colours

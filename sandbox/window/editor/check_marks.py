@@ -1,6 +1,7 @@
 """Marks of the live check: warnings at the elements that cause them, a plate of the whole scene, and remedies."""
 
 from collections.abc import Sequence
+from enum import Enum, auto
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ from sandbox.window.render.palette import (
     RgbColour,
     mix_colours,
 )
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.render.text import TextPlate, draw_box, draw_text, draw_text_lines, ellipsis, text_size, wrap_text
 from sandbox.window.ui.hud import draw_mark
 
 TEXT_SIZE = 12.5
@@ -65,9 +66,27 @@ TITLES = {
 }
 """Short names of diagnostics; others are called by their kind."""
 
-Target = SceneMark | Remedy | str
-"""What is at a position: a mark, a remedy, or the heading, the line of further warnings or the body of a plate."""
-HEADING, MORE, PLATE, CARD, CHIP = "heading", "more", "plate", "card", "chip "
+
+class PlatePart(Enum):
+    """Part of the plate or of a card."""
+
+    HEADING = auto()
+    MORE = auto()
+    """line of the warnings that are not listed"""
+    PLATE = auto()
+    CARD = auto()
+
+
+class EngineChip(NamedTuple):
+    """Name of an engine on the plate."""
+
+    engine: str
+    lacks: tuple[str, ...]
+    """features that the scene needs"""
+
+
+Target = SceneMark | Remedy | EngineChip | PlatePart
+"""What is at a position."""
 
 
 class MarkPlace(NamedTuple):
@@ -97,7 +116,6 @@ class CheckMarks:
         self._pressed: Target | None = None
         self._pointer = (-1, -1)
         self._first, self._listed = 0, 0
-        self._engines: dict[str, tuple[str, ...]] = {}
         self._bounds: dict[ElementKey, tuple[Point, Point] | None] = {}
         self._bounds_of: Scene | None = None
 
@@ -151,10 +169,10 @@ class CheckMarks:
         if isinstance(target, SceneMark):
             self._pinned = None if target == self._pinned else target
             self._hovered = self._pinned
-        elif target == HEADING:
+        elif target is PlatePart.HEADING:
             self.is_folded = not self.is_folded
             self._pinned = self._hovered = None
-        elif target == MORE:
+        elif target is PlatePart.MORE:
             self._first += self._listed
         return None
 
@@ -276,7 +294,6 @@ class CheckMarks:
         self, surface: pygame.Surface, scene: Scene, result: CheckResult, area: pygame.Rect, size: float
     ) -> None:
         """Draw the plate from its heading down; parts without space are dropped, the demands first."""
-        self._engines = dict(result.engines)
         pad, step = round(0.7 * size), round(1.5 * size)
         width = min(round(PLATE_WIDTH * size / TEXT_SIZE), area.width)
         room = width - 2 * pad
@@ -285,7 +302,7 @@ class CheckMarks:
             width = min(text_size(heading, size, bold=True)[0] + round(3.2 * size) + 2 * pad, width)
             room = width - 2 * pad
         rows = 0 if self.is_folded else (min(area.height, round(PLATE_HEIGHT_FRACTION * area.height)) - 2 * pad) // step
-        chips = _chip_rows(tuple(self._engines), size, room)
+        chips = _chip_rows([EngineChip(*each) for each in result.engines], size, room)
         lines = _mark_lines(result.marks, self._first, min(MAX_LINES, max(rows - 1, 0)))
         self._listed = sum(mark is not None for mark in lines)
         rows -= 1 + len(lines)
@@ -298,7 +315,7 @@ class CheckMarks:
         height = 2 * pad + step * (1 + len(lines) + len(texts) + len(chips)) + gap * (bool(texts) + bool(chips))
         self.rect = pygame.Rect(area.right - width, area.bottom - height, width, height)
         draw_box(surface, self.rect, 0.5 * size, opacity=235)
-        self._targets.append((self.rect, PLATE))
+        self._targets.append((self.rect, PlatePart.PLATE))
         y = self.rect.top + pad
         row = pygame.Rect(self.rect.left + pad, y, room, step)
         self._draw_heading(surface, result, heading, row, size)
@@ -332,7 +349,7 @@ class CheckMarks:
         tip = half if self.is_folded else -half  # it unfolds upwards
         corners = [(x - half, y + 0.5 * tip), (x + half, y + 0.5 * tip), (x, y - 0.7 * tip)]
         pygame.draw.polygon(surface, INK if is_hovered else FAINT, corners)
-        self._targets.append((target, HEADING))
+        self._targets.append((target, PlatePart.HEADING))
 
     def _draw_line(
         self,
@@ -352,7 +369,7 @@ class CheckMarks:
         if mark is None:
             text = f"{len(result.marks) - self._listed:,} more …"
             draw_text(surface, text, (x, row.centery), size, FAINT, "midleft")
-            self._targets.append((target, MORE))
+            self._targets.append((target, PlatePart.MORE))
             return
         draw_mark(surface, "triangle", (row.left + 0.5 * size, row.centery), 0.36 * size, _colour(mark))
         title = TITLES.get(mark.kind, mark.kind.replace("_", " "))
@@ -362,11 +379,11 @@ class CheckMarks:
         draw_text(surface, text, (end + 0.6 * size, row.centery), size, FAINT, "midleft")
         self._targets.append((target, mark))
 
-    def _draw_chips(self, surface: pygame.Surface, names: Sequence[str], row: pygame.Rect, size: float) -> None:
+    def _draw_chips(self, surface: pygame.Surface, chips: Sequence[EngineChip], row: pygame.Rect, size: float) -> None:
         x = row.left
-        for name in names:
-            lacks = self._engines[name]
-            rect = pygame.Rect(x, row.top, _chip_width(name, size), row.height).inflate(0, -round(0.2 * size))
+        for chip in chips:
+            name, lacks = chip
+            rect = pygame.Rect(x, row.top, _chip_width(chip, size), row.height).inflate(0, -round(0.2 * size))
             colour = mix_colours(FAINT, PANEL, 0.3) if lacks else INK
             pygame.draw.rect(surface, PANEL if lacks else PANEL_RAISED, rect, border_radius=rect.height // 2)
             pygame.draw.rect(surface, LINE, rect, max(round(size / 12), 1), border_radius=rect.height // 2)
@@ -375,27 +392,20 @@ class CheckMarks:
                 wide = text_size(name, 0.92 * size)[0] // 2 + 2
                 ends = (rect.centerx - wide, rect.centery + 1), (rect.centerx + wide, rect.centery + 1)
                 pygame.draw.line(surface, colour, *ends, max(round(size / 12), 1))
-            self._targets.append((rect, f"{CHIP}{name}"))
+            self._targets.append((rect, chip))
             x = rect.right + round(0.5 * size)
 
     def _draw_reasons(self, surface: pygame.Surface, area: pygame.Rect, size: float) -> None:
         """Draw what the engine under the pointer lacks."""
         target = self._target_at(self._pointer)
-        if not isinstance(target, str) or not target.startswith(CHIP) or self.shown is not None:
+        if not isinstance(target, EngineChip) or self.shown is not None:
             return
-        name = target.removeprefix(CHIP)
-        lacks = self._engines[name]
+        name, lacks = target
         text = f"{name} cannot run this scene: {'; '.join(lacks)}" if lacks else f"{name} can run this scene"
-        lines = wrap_text(text, size, min(280 * size / TEXT_SIZE, area.width - 1.5 * size), 6)
-        step = round(1.4 * size)
-        width = max(text_size(line, size)[0] for line in lines) + round(1.4 * size)
-        rect = pygame.Rect(0, 0, width, len(lines) * step + round(0.8 * size))
-        rect.midbottom = self._pointer[0], self.rects_of(target)[0].top - round(0.4 * size)
-        rect.clamp_ip(area)
-        draw_box(surface, rect, 0.4 * size, opacity=250)
-        for k, line in enumerate(lines):
-            at = rect.left + 0.7 * size, rect.top + 0.4 * size + (k + 0.5) * step
-            draw_text(surface, line, at, size, INK, "midleft")
+        plate = TextPlate(text, size, min(280 * size / TEXT_SIZE, area.width - 1.5 * size), 6)
+        plate.rect.midbottom = self._pointer[0], self.rects_of(target)[0].top - round(0.4 * size)
+        plate.rect.clamp_ip(area)
+        plate.draw(surface, 0.4 * size, 250)
 
     def _draw_card(self, surface: pygame.Surface, area: pygame.Rect, size: float) -> None:
         """Draw the message of the shown mark, with its remedies."""
@@ -414,12 +424,11 @@ class CheckMarks:
         self._anchor = self._nearest_anchor(mark)
         self.card = self._card_rect((width, height), area, size)
         draw_box(surface, self.card, 0.5 * size, opacity=250, edge=_colour(mark))
-        self._targets.append((self.card, CARD))
+        self._targets.append((self.card, PlatePart.CARD))
         left, y = self.card.left + pad, self.card.top + pad
         draw_mark(surface, "triangle", (left + 0.5 * size, y + 0.5 * step), 0.45 * size, _colour(mark))
         draw_text(surface, title, (left + 1.4 * size, y + 0.5 * step), size, INK, "midleft", bold=True)
-        for k, line in enumerate(lines):
-            draw_text(surface, line, (left, y + (k + 1.5) * step), size, INK, "midleft")
+        draw_text_lines(surface, lines, (left, y + step), step, size)
         y += step * (1 + len(lines)) + round(0.4 * size)
         for row in buttons:
             x = left
@@ -500,12 +509,12 @@ def _mark_lines(marks: Sequence[SceneMark], first: int, most: int) -> list[Scene
     return [*rotated[: most - 1], None]
 
 
-def _chip_width(name: str, size: float) -> int:
-    return text_size(name, 0.92 * size)[0] + round(1.3 * size)
+def _chip_width(chip: EngineChip, size: float) -> int:
+    return text_size(chip.engine, 0.92 * size)[0] + round(1.3 * size)
 
 
-def _chip_rows(names: Sequence[str], size: float, room: int) -> list[list[str]]:
-    return [[names[k] for k in row] for row in _rows_of([_chip_width(name, size) for name in names], size, room)]
+def _chip_rows(chips: Sequence[EngineChip], size: float, room: int) -> list[list[EngineChip]]:
+    return [[chips[k] for k in row] for row in _rows_of([_chip_width(chip, size) for chip in chips], size, room)]
 
 
 def _button_width(remedy: Remedy, size: float) -> int:

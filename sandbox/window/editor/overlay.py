@@ -27,7 +27,7 @@ from sandbox.window.hit_test import hulls_of, rounded_hull
 from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.lines import draw_arrow, draw_dashes, draw_line
 from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, PURPLE, SKY, WARNING, YELLOW, RgbColour, mix_colours
-from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
+from sandbox.window.render.text import TextPlate, draw_box, draw_text, text_size
 
 MAX_OUTLINES = 1_000
 """Elements, and bodies of an element, that get an outline"""
@@ -263,15 +263,8 @@ def _draw_fault(surface: pygame.Surface, camera: Camera, editor: Editor, message
     box = editor.selection_bounds()
     if box is None:
         return
-    size = 12.5 * view.ui_scale
-    lines = wrap_text(message, size, 320 * view.ui_scale, 4)
-    width = max(text_size(line, size)[0] for line in lines) + round(1.4 * size)
+    plate = TextPlate(message, 12.5 * view.ui_scale, 320 * view.ui_scale, pad=0.45)
     ((x, y),) = _nearest_to_view(camera, np.asarray(((0.5 * (box[0][0] + box[1][0]), box[0][1]),)))
-    step = round(1.4 * size)
-    rect = pygame.Rect(0, 0, width, len(lines) * step + round(0.9 * size))
-    rect.midtop = round(x), round(y + 14 * view.ui_scale)
-    rect.clamp_ip(surface.get_rect())
-    draw_box(surface, rect, 5 * view.ui_scale, opacity=245, edge=WARNING)
-    for k, line in enumerate(lines):
-        at = rect.left + 0.7 * size, rect.top + 0.45 * size + (k + 0.5) * step
-        draw_text(surface, line, at, size, INK, "midleft")
+    plate.rect.midtop = round(x), round(y + 14 * view.ui_scale)
+    plate.rect.clamp_ip(surface.get_rect())
+    plate.draw(surface, 5 * view.ui_scale, 245, WARNING)

@@ -8,7 +8,7 @@ from sandbox.window.render.palette import FAINT, INK, PANEL_RAISED, SKY, WARNING
 from sandbox.window.render.text import draw_box, draw_text, wrap_text
 from sandbox.window.ui.text_edit import TextEdit, draw_text_edit
 
-WIDTH = 520
+PROMPT_WIDTH = 520
 """px at UI scale 1"""
 
 
@@ -65,8 +65,8 @@ class PathPrompt:
     def draw(self, surface: pygame.Surface, ui_scale: float) -> None:
         """Draw the prompt in the middle of the window."""
         size = 13.5 * ui_scale
-        lines = wrap_text(self.note, size, (WIDTH - 40) * ui_scale, 3) if self.note else []
-        width = min(round(WIDTH * ui_scale), surface.get_width() - 20)
+        lines = wrap_text(self.note, size, (PROMPT_WIDTH - 40) * ui_scale, 3) if self.note else []
+        width = min(round(PROMPT_WIDTH * ui_scale), surface.get_width() - 20)
         rect = pygame.Rect(0, 0, width, round((96 + 20 * len(lines)) * ui_scale))
         rect.center = surface.get_rect().center
         draw_box(surface, rect, 8 * ui_scale, opacity=248, edge=SKY)

@@ -19,8 +19,8 @@ from sandbox.window.editor.property_rows import (
     PropertySection,
     RejectedInput,
     RowId,
-    draw_check_box,
     draw_choice,
+    draw_flag,
     draw_heading_button,
     draw_swatch,
     draw_value_box,
@@ -32,12 +32,10 @@ from sandbox.window.render.palette import (
     FAINT,
     INK,
     LINE,
-    PANEL,
-    PANEL_RAISED,
     WARNING,
 )
-from sandbox.window.render.text import draw_hint, draw_text, ellipsis, text_size, wrap_text
-from sandbox.window.ui.panel import MAX_WIDTH_FRACTION, PANEL_WIDTH, SCROLL_STEP
+from sandbox.window.render.text import draw_text, draw_text_lines, ellipsis, text_lines_width, text_size, wrap_text
+from sandbox.window.ui.scroll_column import ScrollColumn
 from sandbox.window.ui.text_edit import TextEdit, draw_text_edit
 
 LABEL_SIZE, UNIT_SIZE, ERROR_SIZE, NOTE_SIZE = 12.0, 10.5, 11.0, 12.0
@@ -46,7 +44,6 @@ ROW_HEIGHT, BOX_HEIGHT, HEADING_HEIGHT, SECTION_GAP = 24, 20, 26, 8
 """px at UI scale 1"""
 MAX_ERROR_LINES, MAX_NOTE_LINES = 5, 8
 _ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
-_MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
 
 
 class PanelItem(NamedTuple):
@@ -67,7 +64,7 @@ class PanelItem(NamedTuple):
         return RowId(self.section.key, "" if self.row is None else self.row.spec.key)
 
 
-class PropertyPanel:
+class PropertyPanel(ScrollColumn):
     """Panel of fields. `show` sets its content, `on_change` reports the user's changes."""
 
     def __init__(self, size: tuple[int, int], ui_scale: float = 1.0) -> None:
@@ -78,7 +75,7 @@ class PropertyPanel:
         """(section key) called by the cross of a heading"""
         self.on_add: Callable[[str], object] = _accept
         """(section key) called by the plus of a heading"""
-        self.size, self.ui_scale = size, ui_scale
+        super().__init__(size, ui_scale)
         self._sections: tuple[PropertySection, ...] = ()
         self._note = ""
         self._is_open: dict[str, bool] = {}
@@ -87,21 +84,16 @@ class PropertyPanel:
         self._rejected: dict[RowId, RejectedInput] = {}
         self._items: tuple[PanelItem, ...] = ()
         self._note_lines: tuple[str, ...] = ()
-        self._label_width, self._height = 0, 0
+        self._label_width = 0
         """px"""
-        self._scroll = 0
-        self._sheet = pygame.Surface((1, 1))
-        self._is_dirty = True  # whether the cached drawing is outdated
-        self._pointer: tuple[int, int] | None = None
         self._hovered: RowId | None = None
-        self._pressed: set[int] = set()
-        self._is_bar_held = self._is_selecting = False
+        self._is_selecting = False
         self.resize(size, ui_scale)
 
     @property
     def width(self) -> int:
         """Width that the panel covers at the right of the window, px."""
-        return max(min(round(PANEL_WIDTH * self.ui_scale), round(MAX_WIDTH_FRACTION * self.size[0])), 1)
+        return self.column_width
 
     @property
     def has_focus(self) -> bool:
@@ -112,12 +104,6 @@ class PropertyPanel:
     def focused(self) -> RowId | None:
         """Section and field that are edited as text."""
         return None if self._editing is None else self._editing.row
-
-    def resize(self, size: tuple[int, int], ui_scale: float) -> None:
-        """Lay out the panel for a window of another size, px."""
-        self.size, self.ui_scale = size, ui_scale
-        self._sheet = pygame.Surface((self.width, max(size[1], 1)))
-        self._lay_out()
 
     def show(self, sections: Sequence[PropertySection], note: str = "") -> None:
         """Show sections, and a note above them. The editing of a field continues if it is still among them."""
@@ -174,8 +160,8 @@ class PropertyPanel:
                     y += height
                 y += self._px(SECTION_GAP)
         self._items, self._height = tuple(items), y + self._px(6)
-        labels = {item.row.spec.key for item in items if item.row is not None}
-        widest = max((text_size(label, LABEL_SIZE * self.ui_scale)[0] for label in labels), default=0)
+        labels = [item.row.spec.key for item in items if item.row is not None]
+        widest = text_lines_width(labels, LABEL_SIZE * self.ui_scale)
         self._label_width = min(max(widest + self._px(8), round(0.36 * width)), round(0.53 * width))
         self._scroll_to(self._scroll)
         self._update_hover()
@@ -191,10 +177,6 @@ class PropertyPanel:
     def _wrapped_error(self, error: str) -> tuple[str, ...]:
         return wrap_text(error, ERROR_SIZE * self.ui_scale, self._column[1], MAX_ERROR_LINES)
 
-    def _scroll_to(self, scroll: int) -> None:
-        self._scroll = min(max(scroll, 0), max(self._height - self.size[1], 0))
-        self._is_dirty = True
-
     def _box(self, item: PanelItem) -> pygame.Rect:
         """Return the box of the value of a row on the sheet."""
         left, width = self._column
@@ -205,7 +187,7 @@ class PropertyPanel:
     def box_of(self, section: str, field: str) -> pygame.Rect | None:
         """Return the box of a field's value in the window, px, which may be out of view; None if it is not shown."""
         item = self._item_of(RowId(section, field))
-        return None if item is None else self._box(item).move(self.size[0] - self.width, 0)
+        return None if item is None else self._box(item).move(self.column_left, 0)
 
     def heading_of(self, section: str) -> pygame.Rect | None:
         """Return the rectangle of a heading in the window, px, which may be out of view; None if it is not shown."""
@@ -213,14 +195,14 @@ class PropertyPanel:
         if item is None:
             return None
         left, width = self._column
-        return pygame.Rect(self.size[0] - self.width + left, item.top - self._scroll, width, item.height)
+        return pygame.Rect(self.column_left + left, item.top - self._scroll, width, item.height)
 
     def button_of(self, section: str) -> pygame.Rect | None:
         """Return the box of the button of a heading in the window, px, which may be out of view; None without one."""
         item = self._item_of(RowId(section, ""))
         if item is None or not item.section.button:
             return None
-        return self._button(item).move(self.size[0] - self.width, 0)
+        return self._button(item).move(self.column_left, 0)
 
     def _button(self, item: PanelItem) -> pygame.Rect:
         """Return the box of the button of a heading on the sheet."""
@@ -344,46 +326,31 @@ class PropertyPanel:
 
         While a field is edited, keys are consumed, except function keys and shortcuts without a meaning for a text.
         """
-        if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
-            if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
-                self._release()
-            return False
         if event.type == pygame.KEYDOWN:
             return self._press_key(event)
         if event.type == pygame.TEXTINPUT:
             return self._type(event.text)
-        if event.type == pygame.MOUSEWHEEL:
-            return self._wheel(int(event.y))
-        if event.type not in _MOUSE_EVENTS:
-            return False
-        at = event.pos[0] - (self.size[0] - self.width), event.pos[1]
-        is_inside = bool(0 <= at[0] < self.width and 0 <= at[1] < self.size[1])
+        return super().handle_event(event)
+
+    def _handle_mouse(self, event: pygame.event.Event, at: tuple[int, int], is_ours: bool) -> None:
+        """Process a mouse event; a press elsewhere ends the editing of a field."""
         if event.type == pygame.MOUSEMOTION:
-            is_foreign = any(getattr(event, "buttons", ())) and not self._pressed
-            self._pointer = at if (is_inside and not is_foreign) or self._pressed else None
+            if not is_ours:
+                self._pointer = None  # a drag of the scene does not highlight rows
             self._drag(at)
-            return self._pointer is not None
-        self._pointer = at if is_inside or self._pressed else None
-        if event.type == pygame.MOUSEBUTTONDOWN:
-            if is_inside and event.button <= 3:  # buttons from 4 up are wheel events
-                self._pressed.add(event.button)
+        elif event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3:
+            if is_ours:
                 self._press(event.button, at)
-            elif event.button <= 3:
+            else:
                 self.commit()
-            return is_inside
-        is_ours = event.button in self._pressed
-        self._pressed.discard(event.button)
-        if is_ours and event.button == 1:
+        elif event.type == pygame.MOUSEBUTTONUP and event.button == 1 and is_ours:
             self._is_bar_held = self._is_selecting = False
             self._is_dirty = True
-        return is_ours
 
-    def _release(self) -> None:
+    def release(self) -> None:
         """End a press or drag without a mouse event."""
-        self._pressed.clear()
-        self._pointer = None
-        self._is_bar_held = self._is_selecting = False
-        self._is_dirty = True
+        super().release()
+        self._is_selecting = False
         self._update_hover()
 
     def _press_key(self, event: pygame.event.Event) -> bool:
@@ -410,12 +377,9 @@ class PropertyPanel:
         self._editing.is_touched = self._is_dirty = True
         return True
 
-    def _wheel(self, notches: int) -> bool:
-        if self._pointer is None:
-            return False
-        self._scroll_to(self._scroll - round(notches * SCROLL_STEP * self.ui_scale))
+    def _turn_wheel(self, notches: int, pointer: tuple[int, int]) -> None:
+        super()._turn_wheel(notches, pointer)
         self._update_hover()
-        return True
 
     def _press(self, button: int, at: tuple[int, int]) -> None:
         """Process a press in the panel.
@@ -432,7 +396,7 @@ class PropertyPanel:
             return
         target = None if item is None else item.row_id
         self.commit()  # may change the content
-        if button == 1 and self._height > self.size[1] and at[0] >= self.width - 9 * self.ui_scale:
+        if button == 1 and self._is_on_bar(at):
             self._is_bar_held = True
             self._drag(at)
             return
@@ -455,7 +419,7 @@ class PropertyPanel:
     def _drag(self, at: tuple[int, int]) -> None:
         """Scroll by the scroll bar, or extend the selection of the text."""
         if self._is_bar_held:
-            self._scroll_to(round(at[1] / max(self.size[1], 1) * self._height - self.size[1] / 2))
+            self._drag_bar(at)
         elif self._is_selecting:
             self._place_caret(at[0], is_selecting=True)
         self._update_hover()
@@ -483,21 +447,10 @@ class PropertyPanel:
 
     # Drawing
 
-    def draw(self, surface: pygame.Surface) -> None:
-        """Draw the panel at the right of the window."""
-        if self._is_dirty:
-            self._draw_sheet()
-            self._is_dirty = False
-        surface.blit(self._sheet, (self.size[0] - self.width, 0))
-        if self._hovered is not None and self._pointer is not None and not self._pressed:
-            hint = self._hint(self._hovered, self._pointer)
-            if hint:
-                x, y = self._pointer
-                draw_hint(surface, hint, (self.size[0] - self.width + x, y), self.ui_scale)
-
-    def _hint(self, row_id: RowId, pointer: tuple[int, int]) -> str:
+    def _hint(self, pointer: tuple[int, int]) -> str:
         """Return the tooltip: at a label the description, after a truncated key; at a truncated value the whole."""
-        item = self._item_of(row_id)
+        row_id = self._hovered
+        item = None if row_id is None else self._item_of(row_id)
         if item is not None and self._is_on_button(item, pointer):
             is_add = item.section.button == "add"
             return f"add a {item.section.key}" if is_add else f"remove {item.section.title}"
@@ -521,26 +474,16 @@ class PropertyPanel:
             if item.top + item.height >= self._scroll and item.top <= self._scroll + self.size[1]:
                 yield item
 
-    def _draw_sheet(self) -> None:
-        """Draw the column on the cached surface, which most frames only blit."""
-        sheet, left = self._sheet, self._column[0]
-        sheet.fill(PANEL)
-        for k, line in enumerate(self._note_lines):
-            y = self._px(12) - self._scroll + (k + 0.5) * self._note_step
-            draw_text(sheet, line, (left, y), NOTE_SIZE * self.ui_scale, FAINT, "midleft")
+    def _draw_content(self, sheet: pygame.Surface) -> None:
+        """Draw the note, and the visible headings and rows."""
+        left = self._column[0]
+        top = self._px(12) - self._scroll
+        draw_text_lines(sheet, self._note_lines, (left, top), self._note_step, NOTE_SIZE * self.ui_scale, FAINT)
         for item in self._visible_items():
             if item.row is None:
                 self._draw_heading(item)
             else:
                 self._draw_row(item, item.row)
-        pygame.draw.line(sheet, LINE, (0, 0), (0, self.size[1]), max(self._px(1), 1))
-        if self._height > self.size[1]:
-            height = max(round(self.size[1] ** 2 / self._height), self._px(16))
-            top = round(self._scroll / (self._height - self.size[1]) * (self.size[1] - height))
-            bar_width = self._px(5)
-            bar = pygame.Rect(self.width - bar_width - self._px(2), top, bar_width, height)
-            colour = LINE if self._is_bar_held else PANEL_RAISED
-            pygame.draw.rect(sheet, colour, bar, border_radius=bar_width)
 
     def _draw_heading(self, item: PanelItem) -> None:
         """Draw a heading with a triangle that shows whether the section is unfolded."""
@@ -576,14 +519,13 @@ class PropertyPanel:
         colour = INK if is_set else FAINT
         draw_text(sheet, self._label(row.spec.key), (left, box.centery), LABEL_SIZE * self.ui_scale, colour, "midleft")
         if row.spec.kind == "flag":
-            draw_check_box(sheet, box, row, item.row_id == self._hovered, self.ui_scale)
+            draw_flag(sheet, box, row, item.row_id == self._hovered, self.ui_scale)
         elif row.spec.kind == "choice":
             draw_choice(sheet, box, row, item.row_id == self._hovered, self.ui_scale)
         else:
             self._draw_value(item, row, box)
-        for k, line in enumerate(item.error):
-            y = box.bottom + self._px(3) + (k + 0.5) * self._error_step
-            draw_text(sheet, line, (left, y), ERROR_SIZE * self.ui_scale, WARNING, "midleft")
+        top = box.bottom + self._px(3)
+        draw_text_lines(sheet, item.error, (left, top), self._error_step, ERROR_SIZE * self.ui_scale, WARNING)
         if rejected is not None:
             pygame.draw.rect(sheet, WARNING, box, max(self._px(1), 1), border_radius=self._px(3))
 

@@ -19,6 +19,7 @@ from sandbox.window.render.palette import (
 )
 from sandbox.window.render.text import draw_text, ellipsis
 from sandbox.window.ui.text_edit import TextEdit
+from sandbox.window.ui.widgets import draw_check_box
 
 VALUE_SIZE = 11.5
 """px at UI scale 1, font size of values"""
@@ -137,24 +138,15 @@ def draw_value_box(sheet: pygame.Surface, box: pygame.Rect, is_hovered: bool, is
         pygame.draw.rect(sheet, edge, box, max(round(ui_scale), 1), border_radius=radius)
 
 
-def draw_check_box(
-    sheet: pygame.Surface, box: pygame.Rect, row: PropertyRow, is_hovered: bool, ui_scale: float
-) -> None:
+def draw_flag(sheet: pygame.Surface, box: pygame.Rect, row: PropertyRow, is_hovered: bool, ui_scale: float) -> None:
     """Draw the check box of a flag at the left of a box."""
     side = round(14 * ui_scale)
     value = row.spec.default if row.value is None else row.value
     is_on = bool(value) and not row.is_mixed
     is_default = row.value is None and not row.is_mixed
     square = pygame.Rect(box.left, box.centery - side // 2, side, side)
-    fill = (mix_colours(SKY, PANEL, 0.55) if is_default else SKY) if is_on else PANEL_RAISED
-    radius = round(3.5 * ui_scale)
-    pygame.draw.rect(sheet, fill, square, border_radius=radius)
-    edge = SKY if is_on or is_hovered else LINE
-    pygame.draw.rect(sheet, edge, square, max(round(ui_scale), 1), border_radius=radius)
-    if is_on:
-        tick = [(square.left + x * side, square.top + y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
-        pygame.draw.lines(sheet, BACKGROUND, False, tick, max(round(2 * ui_scale), 1))
-    elif row.is_mixed or value is None:
+    draw_check_box(sheet, square, is_on, is_hovered, ui_scale, mix_colours(SKY, PANEL, 0.55) if is_default else SKY)
+    if row.is_mixed or value is None:
         dash = pygame.Rect(0, 0, round(0.5 * side), max(round(2 * ui_scale), 1))
         dash.center = square.center
         pygame.draw.rect(sheet, INK if row.is_mixed else FAINT, dash)

@@ -6,13 +6,13 @@ from itertools import pairwise
 
 import pygame
 
-from sandbox.window.editor.tool_icons import tool_icon
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_hint, draw_text
+from sandbox.window.ui.icons import icon
 
-BUTTON = 32
+BUTTON_SIDE = 32
 """px at UI scale 1, side of a button"""
-GAP = 3
+BUTTON_GAP = 3
 """px at UI scale 1 between buttons"""
 MAX_COLUMNS = 4
 GROUP_STARTS = ("ball", "plane", "rod", "thrust", "eraser")
@@ -72,7 +72,7 @@ class Toolbar:
 
     def layout(self, area: pygame.Rect, ui_scale: float) -> None:
         """Lay out the buttons in an area, px: in one column, or in as many more as it needs if it is too low."""
-        side, gap, pad = round(BUTTON * ui_scale), round(GAP * ui_scale), round(6 * ui_scale)
+        side, gap, pad = round(BUTTON_SIDE * ui_scale), round(BUTTON_GAP * ui_scale), round(6 * ui_scale)
         free = area.height - 4 * pad
         columns = next((n for n in range(1, MAX_COLUMNS) if self._height(n, side, gap) <= free), MAX_COLUMNS)
         left, top = area.left + 2 * pad, area.top + 2 * pad
@@ -91,7 +91,7 @@ class Toolbar:
 
     def layout_row(self, corner: tuple[int, int], ui_scale: float) -> None:
         """Lay out the buttons in a row, with the upper left corner of the toolbar at a position, px."""
-        side, gap, pad = round(BUTTON * ui_scale), round(GAP * ui_scale), round(6 * ui_scale)
+        side, gap, pad = round(BUTTON_SIDE * ui_scale), round(BUTTON_GAP * ui_scale), round(6 * ui_scale)
         left, top = corner[0] + pad, corner[1] + pad
         self._rects = [
             (tool, pygame.Rect(left + k * (side + gap), top, side, side)) for k, tool in enumerate(self._tools)
@@ -138,7 +138,7 @@ class Toolbar:
             fill = SKY if is_chosen else LINE if tool is self._hovered else PANEL_RAISED
             pygame.draw.rect(surface, fill, rect, border_radius=round(5 * ui_scale))
             colour = BACKGROUND if is_chosen else INK
-            image = tool_icon(tool.name, round(0.66 * rect.width), colour)
+            image = icon(tool.name, round(0.66 * rect.width), colour)
             surface.blit(image, image.get_rect(center=rect.center))
             if len(tool.key) == 1:
                 corner = rect.right - 3 * ui_scale, rect.bottom - 1 * ui_scale

@@ -1,4 +1,4 @@
-"""Keymap: all key bindings of the window, and the state of the keyboard.
+"""Keymap: the commands of the window with their keys, and the state of the keyboard.
 
 A command's key is matched by its key code or its character, so that `[` also works on layouts that need AltGr for it,
 and by its scan code on layouts without Latin letters. The keys that a scene or its game binds come first (`bound_key`).
@@ -6,141 +6,104 @@ and by its scan code on layouts without Latin letters. The keys that a scene or 
 
 from collections.abc import Set as AbstractSet
 from enum import StrEnum
-from typing import NamedTuple
 
 import pygame
 
 from sandbox.window.playback.snapshot import OVERLAYS
 
+_TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Save and share"
+_CTRL, _SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
+
 
 class Command(StrEnum):
-    """Commands of the window. A command that toggles an overlay has its name in `OVERLAYS`."""
+    """Commands of the window, in the order of the help page. One that toggles an overlay has its name in `OVERLAYS`.
 
-    PAUSE = "pause"
-    STEP = "step"
-    BACK = "back"
-    RESTART = "restart"
-    PREVIOUS = "previous"
-    NEXT = "next"
-    PICKER = "picker"
-    SLOWER = "slower"
-    FASTER = "faster"
-    ENGINE = "engine"
-    GHOST = "ghost"
-    HOME = "home"
-    PANEL = "panel"
-    HELP = "help"
-    SCREENSHOT = "screenshot"
-    RECORD = "record"
-    RELOAD = "reload"
-    SAVE = "save"
-    QUIT = "quit"
-    UNDO = "undo"
-    FOLLOW = "follow"
-    FULL_SCREEN = "full screen"
-    TRUST = "trust"
-    SOUND = "sound"
-    DELETE = "delete"
-    ADD_BALL = "add ball"
-    ADD_BOX = "add box"
-    NUDGE = "nudge"
-    EDIT = "edit"
-    SHAPES = "shapes"
-    VELOCITIES = "velocities"
-    CONTACTS = "contacts"
-    IMPULSES = "impulses"
-    BOUNDS = "bounds"
-    JOINTS = "joints"
-    CENTRES = "centres"
-    NAMES = "names"
-    TRAILS = "trails"
-    ENERGY = "energy"
-
-    @property
-    def overlay(self) -> str | None:
-        """The overlay that the command toggles, one of `OVERLAYS`."""
-        return self.value if self.value in OVERLAYS else None
-
-
-class Binding(NamedTuple):
-    """Keys of a command."""
+    The columns are: name, key codes, modifiers, description, keys as shown on the help page, group of the help page,
+    characters, and whether the command repeats.
+    """
 
     keys: tuple[int, ...]
     """key codes, `pygame.K_…`"""
     modifiers: int
-    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0 for neither Ctrl nor Alt; Shift is ignored unless a binding requires it"""
-    command: Command
+    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0 for neither Ctrl nor Alt; Shift is ignored unless a command requires it"""
     about: str
     label: str
     """keys as shown on the help page"""
     group: str
-    characters: str = ""
+    characters: str
     """characters that trigger the command on any key"""
-    repeats: bool = False
+    repeats: bool
     """whether the command repeats while the key is held"""
 
+    def __new__(
+        cls,
+        name: str,
+        keys: tuple[int, ...],
+        modifiers: int,
+        about: str,
+        label: str,
+        group: str,
+        characters: str = "",
+        repeats: bool = False,
+    ) -> "Command":
+        """Create a member from its row."""
+        command = str.__new__(cls, name)
+        command._value_ = name
+        command.keys, command.modifiers, command.about, command.label = keys, modifiers, about, label
+        command.group, command.characters, command.repeats = group, characters, repeats
+        return command
 
-_TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Save and share"
-_CTRL, _SHIFT = pygame.KMOD_CTRL, pygame.KMOD_SHIFT
-_ABOUT_OVERLAYS = (
-    "shapes",
-    "velocities",
-    "contacts and normals",
-    "impulses",
-    "bounds",
-    "joints",
-    "centres of mass",
-    "names",
-    "trails",
-    "energy graph",
-)
+    PAUSE = "pause", (pygame.K_p, pygame.K_SPACE), 0, "pause / resume", "P or Space", _TIME
+    STEP = "step", (pygame.K_o, pygame.K_PERIOD), 0, "step forward", "O or .", _TIME, ".", True
+    BACK = "back", (pygame.K_COMMA,), 0, "step back", ",", _TIME, ",", True
+    RESTART = "restart", (pygame.K_r, pygame.K_BACKSPACE), 0, "restart", "R or Backspace", _TIME
+    SLOWER = "slower", (pygame.K_MINUS, pygame.K_KP_MINUS), 0, "slower: 80 %, 63 %, 50 % …", "-", _TIME, "-", True
+    FASTER = "faster", (pygame.K_EQUALS, pygame.K_PLUS, pygame.K_KP_PLUS), 0, "faster", "=", _TIME, "=+", True
+    PREVIOUS = "previous", (pygame.K_LEFTBRACKET,), 0, "previous scene", "[", _SCENE, "["
+    NEXT = "next", (pygame.K_RIGHTBRACKET,), 0, "next scene", "]", _SCENE, "]"
+    PICKER = "picker", (pygame.K_o,), _CTRL, "open a scene", "Ctrl+O", _SCENE
+    RELOAD = "reload", (pygame.K_l,), _CTRL, "reload the file", "Ctrl+L", _SCENE
+    EDIT = "edit", (pygame.K_e,), _CTRL, "edit the scene", "Ctrl+E", _SCENE
+    ENGINE = "engine", (pygame.K_e,), 0, "next engine", "E", _SCENE
+    GHOST = "ghost", (pygame.K_g,), 0, "ghost: another engine's run", "G", _SCENE
+    TRUST = "trust", (pygame.K_t,), 0, "predictability horizon", "T", _SCENE
+    HOME = "home", (pygame.K_HOME,), 0, "fit the scene; again: fit the bodies", "Home", _VIEW
+    FOLLOW = "follow", (pygame.K_f,), 0, "follow the selected body, or all", "F", _VIEW
+    FULL_SCREEN = "full screen", (pygame.K_F11,), 0, "full screen", "F11", _VIEW
+    PANEL = "panel", (pygame.K_TAB,), 0, "show or hide the panel", "Tab", _VIEW
+    ADD_BALL = "add ball", (pygame.K_b,), 0, "add a ball at the cursor", "B", _BODIES
+    ADD_BOX = "add box", (pygame.K_b,), _SHIFT, "add a box at the cursor", "Shift+B", _BODIES
+    NUDGE = "nudge", (pygame.K_n,), 0, "nudge the selected body", "N", _BODIES
+    DELETE = "delete", (pygame.K_DELETE,), 0, "remove the selected body", "Delete", _BODIES
+    UNDO = "undo", (pygame.K_z,), _CTRL, "restore the replaced session", "Ctrl+Z", _BODIES
+    SHAPES = "shapes", (pygame.K_1,), 0, "shapes", "1", _SHOW, "1"
+    VELOCITIES = "velocities", (pygame.K_2,), 0, "velocities", "2", _SHOW, "2"
+    CONTACTS = "contacts", (pygame.K_3,), 0, "contacts and normals", "3", _SHOW, "3"
+    IMPULSES = "impulses", (pygame.K_4,), 0, "impulses", "4", _SHOW, "4"
+    BOUNDS = "bounds", (pygame.K_5,), 0, "bounds", "5", _SHOW, "5"
+    JOINTS = "joints", (pygame.K_6,), 0, "joints", "6", _SHOW, "6"
+    CENTRES = "centres", (pygame.K_7,), 0, "centres of mass", "7", _SHOW, "7"
+    NAMES = "names", (pygame.K_8,), 0, "names", "8", _SHOW, "8"
+    TRAILS = "trails", (pygame.K_9,), 0, "trails", "9", _SHOW, "9"
+    ENERGY = "energy", (pygame.K_0,), 0, "energy graph", "0", _SHOW, "0"
+    SCREENSHOT = "screenshot", (pygame.K_p,), _CTRL, "screenshot", "Ctrl+P", _WINDOW
+    RECORD = "record", (pygame.K_r,), _CTRL, "start or stop recording", "Ctrl+R", _WINDOW
+    SAVE = "save", (pygame.K_s,), _CTRL, "save the session", "Ctrl+S", _WINDOW
+    SOUND = "sound", (pygame.K_m,), 0, "sound", "M", _WINDOW
+    HELP = "help", (pygame.K_F1, pygame.K_h), 0, "this help", "F1 or H", _WINDOW
+    QUIT = "quit", (pygame.K_ESCAPE,), 0, "quit", "Esc", _WINDOW
 
-BINDINGS: tuple[Binding, ...] = (
-    Binding((pygame.K_p, pygame.K_SPACE), 0, Command.PAUSE, "pause / resume", "P or Space", _TIME),
-    Binding((pygame.K_o, pygame.K_PERIOD), 0, Command.STEP, "step forward", "O or .", _TIME, ".", True),
-    Binding((pygame.K_COMMA,), 0, Command.BACK, "step back", ",", _TIME, ",", True),
-    Binding((pygame.K_r, pygame.K_BACKSPACE), 0, Command.RESTART, "restart", "R or Backspace", _TIME),
-    Binding(
-        (pygame.K_MINUS, pygame.K_KP_MINUS), 0, Command.SLOWER, "slower: 80 %, 63 %, 50 % …", "-", _TIME, "-", True
-    ),
-    Binding((pygame.K_EQUALS, pygame.K_PLUS, pygame.K_KP_PLUS), 0, Command.FASTER, "faster", "=", _TIME, "=+", True),
-    Binding((pygame.K_LEFTBRACKET,), 0, Command.PREVIOUS, "previous scene", "[", _SCENE, "["),
-    Binding((pygame.K_RIGHTBRACKET,), 0, Command.NEXT, "next scene", "]", _SCENE, "]"),
-    Binding((pygame.K_o,), _CTRL, Command.PICKER, "open a scene", "Ctrl+O", _SCENE),
-    Binding((pygame.K_l,), _CTRL, Command.RELOAD, "reload the file", "Ctrl+L", _SCENE),
-    Binding((pygame.K_e,), _CTRL, Command.EDIT, "edit the scene", "Ctrl+E", _SCENE),
-    Binding((pygame.K_e,), 0, Command.ENGINE, "next engine", "E", _SCENE),
-    Binding((pygame.K_g,), 0, Command.GHOST, "ghost: another engine's run", "G", _SCENE),
-    Binding((pygame.K_t,), 0, Command.TRUST, "predictability horizon", "T", _SCENE),
-    Binding((pygame.K_HOME,), 0, Command.HOME, "fit the scene; again: fit the bodies", "Home", _VIEW),
-    Binding((pygame.K_f,), 0, Command.FOLLOW, "follow the selected body, or all", "F", _VIEW),
-    Binding((pygame.K_F11,), 0, Command.FULL_SCREEN, "full screen", "F11", _VIEW),
-    Binding((pygame.K_TAB,), 0, Command.PANEL, "show or hide the panel", "Tab", _VIEW),
-    Binding((pygame.K_b,), 0, Command.ADD_BALL, "add a ball at the cursor", "B", _BODIES),
-    Binding((pygame.K_b,), _SHIFT, Command.ADD_BOX, "add a box at the cursor", "Shift+B", _BODIES),
-    Binding((pygame.K_n,), 0, Command.NUDGE, "nudge the selected body", "N", _BODIES),
-    Binding((pygame.K_DELETE,), 0, Command.DELETE, "remove the selected body", "Delete", _BODIES),
-    Binding((pygame.K_z,), _CTRL, Command.UNDO, "restore the replaced session", "Ctrl+Z", _BODIES),
-    *(
-        Binding((pygame.K_0 + int(digit),), 0, Command(name), about, digit, _SHOW, digit)
-        for digit, name, about in zip("1234567890", OVERLAYS, _ABOUT_OVERLAYS, strict=True)
-    ),
-    Binding((pygame.K_p,), _CTRL, Command.SCREENSHOT, "screenshot", "Ctrl+P", _WINDOW),
-    Binding((pygame.K_r,), _CTRL, Command.RECORD, "start or stop recording", "Ctrl+R", _WINDOW),
-    Binding((pygame.K_s,), _CTRL, Command.SAVE, "save the session", "Ctrl+S", _WINDOW),
-    Binding((pygame.K_m,), 0, Command.SOUND, "sound", "M", _WINDOW),
-    Binding((pygame.K_F1, pygame.K_h), 0, Command.HELP, "this help", "F1 or H", _WINDOW),
-    Binding((pygame.K_ESCAPE,), 0, Command.QUIT, "quit", "Esc", _WINDOW),
-)
-"""All bindings, in the order of the help page."""
+    @property
+    def overlay(self) -> str | None:
+        """The overlay that the command toggles, one of `OVERLAYS`."""
+        return str(self) if self in OVERLAYS else None
+
 
 GLOBAL = frozenset({pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE})
 """Keys that a scene cannot bind."""
 
-REPEATING = frozenset(binding.command for binding in BINDINGS if binding.repeats)
-
-_BY_KEY = {(key, binding.modifiers): binding.command for binding in BINDINGS for key in binding.keys}
-_BY_CHARACTER = {character: binding.command for binding in BINDINGS for character in binding.characters}
+_BY_KEY = {(key, command.modifiers): command for command in Command for key in command.keys}
+_BY_CHARACTER = {character: command for command in Command for character in command.characters}
 
 _NAMED = 1 << 30
 """bit that SDL sets in key codes without a character, such as F1"""
@@ -251,4 +214,4 @@ class Keyboard:
         self.is_repeat = pressed_key(event) in self._held
         self._held.add(pressed_key(event))
         command = command_for(event, claimed)
-        return None if self.is_repeat and command not in REPEATING else command
+        return None if command is None or (self.is_repeat and not command.repeats) else command

@@ -18,7 +18,7 @@ from sandbox.window.hit_test import Distance, Hull, hull_distance
 PATCH_DEPTH = 0.5
 """Depth of a patch in each piece, as a fraction of half the thickness of the thinner piece; a rim takes at most 0.16.
 """
-ABUTTING = 1e-6
+ABUTTING_TOLERANCE = 1e-6
 """Tolerance of abutting edges as a fraction of the size of a body, for rounded corners in scene files."""
 
 
@@ -164,7 +164,7 @@ def _patches(pieces: ConvexPieces, body: int, half_thickness: FloatArray) -> lis
     if len(sharp) < 2:
         return []
     polygons = [corners[k] for k in sharp]
-    tolerance = ABUTTING * float(np.ptp(np.concatenate(polygons), axis=0).max())
+    tolerance = ABUTTING_TOLERANCE * float(np.ptp(np.concatenate(polygons), axis=0).max())
     patches, junctions = [], list[FloatArray]()
     for i, a in enumerate(sharp):
         for b in sharp[i + 1 :]:

@@ -11,13 +11,13 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
 from sandbox.window.render.particles import packed_pixels
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf_disc, sdf_surface, shade_sdf
 
-LARGEST = 96.0
+MAX_SPRITE_RADIUS = 96.0
 """px, largest radius that is drawn as a sprite; larger discs are painted directly, clipped to the surface"""
 SPRITES_PER_PX = 128
 """Sprites per px of radius: radii are quantised to 1/128 px."""
-OFFSETS = 4
+SUBPIXEL_OFFSETS = 4
 """Sub-pixel positions of a sprite along each axis, so that slow balls move smoothly."""
 SPRITE_BUDGET = 8_000_000
 """px of cached sprites, 32 MB"""
@@ -61,7 +61,7 @@ class CircleRenderer:
             colours: (K, 3).
             style: of all discs; a hollow disc is only a rim, in the colour of the disc.
         """
-        small = radius <= LARGEST
+        small = radius <= MAX_SPRITE_RADIUS
         if small.all():
             self._blit(surface, centre, radius, colours, style)
             return
@@ -83,7 +83,7 @@ class CircleRenderer:
         self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
     ) -> None:
         size = np.maximum(np.rint(radius * SPRITES_PER_PX), 1.0).astype(np.int64)
-        steps = OFFSETS if style.antialias else 1
+        steps = SUBPIXEL_OFFSETS if style.antialias else 1
         subpixel = np.floor(centre * steps + 0.5).astype(np.int64)
         corner = subpixel // steps - (np.ceil(size / SPRITES_PER_PX).astype(np.int64) + 1)[:, None]
         keys = _keys(size, colours, subpixel % steps).tolist()
@@ -114,7 +114,7 @@ def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
     pixels = np.arange(2 * half + 1, dtype=np.float64) + 0.5
     # Coverage that falls off linearly over a pixel adds 1/12 px² to the squared radius, visible on tiny discs.
     drawn_radius = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
-    distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, drawn_radius)
+    distance = disc_distance(half + across / SUBPIXEL_OFFSETS, half + down / SUBPIXEL_OFFSETS, drawn_radius)
     return sdf_surface(
         shade_sdf(distance(pixels[:, None], pixels[None, :]), _shape_style(radius, (red, green, blue), style))
     )
@@ -131,15 +131,10 @@ def _paint(
     surface: pygame.Surface, x: float, y: float, radius: float, colour: RgbColour, style: CircleStyle, plain: bool
 ) -> None:
     """Draw a disc that is too large for a sprite."""
-    area = surface.get_clip()
     if plain and radius < SDL_COORDINATE_LIMIT:
         pygame.draw.circle(surface, colour, (round(x), round(y)), round(radius), 2 if style.hollow else 0)
         return
-    low = max(x - radius - 1.0, -1.0), max(y - radius - 1.0, -1.0)
-    high = min(x + radius + 2.0, area.right + 1.0), min(y + radius + 2.0, area.bottom + 1.0)
-    if low[0] < high[0] and low[1] < high[1]:
-        rect = pygame.Rect(int(low[0]), int(low[1]), math.ceil(high[0] - low[0]), math.ceil(high[1] - low[1]))
-        draw_sdf(surface, disc_distance(x, y, radius), _shape_style(radius, colour, style), rect)
+    draw_sdf_disc(surface, (x, y), radius, _shape_style(radius, colour, style))
 
 
 def darken(colour: RgbColour) -> RgbColour:

@@ -1,14 +1,28 @@
-"""Draw context: target surface, camera, snapshot and visible bodies of the frame being drawn."""
+"""Canvas: where and how a picture is drawn; draw context: a canvas with the frame being drawn."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pygame
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot
-from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleStyle
 from sandbox.window.render.palette import ColourArray
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """Target, camera and style of a picture."""
+
+    surface: pygame.Surface
+    """of size `camera.size`"""
+    camera: Camera
+    ui_scale: float = 1.0
+    """px, width of a line that is one pixel wide on a 1080p display; line widths and text scale with it"""
+    antialias: bool = True
+    """whether edges are smooth"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

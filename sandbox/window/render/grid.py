@@ -7,19 +7,19 @@ import pygame
 
 from sandbox.formatting import format_si
 from sandbox.window.camera import Camera
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
 from sandbox.window.render.text import draw_text
 
-NARROWEST = 56.0
+MIN_LINE_SPACING = 56.0
 """px, smallest spacing of grid lines"""
-STRONG = 5
+EMPHASIS_PERIOD = 5
 """Every fifth line is emphasised."""
 
 
 def step_of(camera: Camera, ui_scale: float = 1.0) -> float:
     """Return the grid spacing, m: 1, 2 or 5 times a power of ten."""
-    least = NARROWEST * ui_scale / camera.scale
+    least = MIN_LINE_SPACING * ui_scale / camera.scale
     power = 10.0 ** math.floor(math.log10(least))
     return next((k * power for k in (1.0, 2.0, 5.0) if k * power >= least), 10.0 * power)
 
@@ -42,7 +42,7 @@ def draw_grid(canvas: Canvas) -> None:
                 rect = pygame.Rect(int(pixel), 0, thickness, camera.size[1])
             else:
                 rect = pygame.Rect(0, int(pixel), camera.size[0], thickness)
-            lines.append((number % STRONG == 0, rect))
+            lines.append((number % EMPHASIS_PERIOD == 0, rect))
     for strong, rect in sorted(lines, key=lambda line: line[0]):  # emphasised lines last, as they cross the others
         canvas.surface.fill(GRID_STRONG if strong else GRID, rect)
 

@@ -36,7 +36,7 @@ from sandbox.window.render.palette import (
 from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, SignedDistance, arc_distance, capsule_distance, draw_sdf
 
-COILED = 500
+MAX_ZIGZAG_SPRINGS = 500
 """Number of springs up to which each is drawn as a zigzag."""
 SOLID_RODS = 500
 """Number of rods up to which each is drawn wider than one pixel."""
@@ -126,7 +126,7 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     if not len(springs.joints):
         return
     shade = strain(springs, view.camera.scale)
-    if len(springs.joints) > COILED:
+    if len(springs.joints) > MAX_ZIGZAG_SPRINGS:
         draw_thin_lines(view.surface, springs.ends, packed_pixels(SHADES[shade], view.surface), view.antialias)
         return
     rest = springs.joints.figures[:, 0] * view.camera.scale

@@ -11,16 +11,16 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.play import PlayPart
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import clip_segment
 from sandbox.window.render.palette import BACKGROUND, RgbColour, hex_colour, mix_colours
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 
 AMBER: RgbColour = (255, 196, 84)
 WHITE: RgbColour = (255, 255, 255)
-RADIUS = 0.0065
+LAMP_RADIUS = 0.0065
 """m"""
-GLOW, STRENGTH = 6.5, 0.75
+GLOW_RADIUS, GLOW_STRENGTH = 6.5, 0.75
 """radius of the glow in lamp radii, and its additive intensity next to the lamp"""
 MAX_LAMP_RADIUS = 400.0
 """px, radius above which no glow is drawn, as it would be costly"""
@@ -49,19 +49,13 @@ def draw_lamps(canvas: Canvas, scene: Scene) -> None:
                 1.0,
                 canvas.antialias,
             )
-            draw_spot(canvas, part.light, RADIUS, look)
+            draw_spot(canvas, part.light, LAMP_RADIUS, look)
 
 
 def draw_spot(canvas: Canvas, at: Point, radius: float, look: ShapeStyle) -> None:
     """Draw the visible part of a disc on the ground; position and radius in m."""
     ((x, y),), size = canvas.camera.to_screen(np.asarray([at])).tolist(), radius * canvas.camera.scale
-    if clip_segment((x, y), (x, y), canvas.surface.get_clip(), size + 4.0) is None:
-        return
-    reach = min(size, 1e6)
-    low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
-    (left, top), (right, bottom) = low, high
-    within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
-    draw_sdf(canvas.surface, disc_distance(x, y, size), look, within)
+    draw_sdf_disc(canvas.surface, (x, y), size, look)
 
 
 class LampRenderer:
@@ -72,14 +66,14 @@ class LampRenderer:
 
     def draw(self, canvas: Canvas, scene: Scene, lit: frozenset[str]) -> None:
         """Draw the lamps of the parts named in `lit`."""
-        radius = max(RADIUS * canvas.camera.scale, 1.0)
+        radius = max(LAMP_RADIUS * canvas.camera.scale, 1.0)
         if not lit or radius > MAX_LAMP_RADIUS:
             return
         for part in scene.play.parts:
             if part.light is None or part.name not in lit:
                 continue
             x, y = canvas.camera.to_screen(np.asarray(part.light)).tolist()
-            if clip_segment((x, y), (x, y), canvas.surface.get_clip(), GLOW * radius + 2.0) is None:
+            if clip_segment((x, y), (x, y), canvas.surface.get_clip(), GLOW_RADIUS * radius + 2.0) is None:
                 continue
             glow, bulb = self._sprite(_colour(part), radius)
             canvas.surface.blit(glow, glow.get_rect(center=(round(x), round(y))), special_flags=pygame.BLEND_RGB_ADD)
@@ -107,7 +101,7 @@ def _distances(reach: float) -> "np.ndarray[tuple[int, int], np.dtype[np.float64
 
 def _glow(colour: RgbColour, radius: float) -> pygame.Surface:
     """Return the glow: intensity falls quadratically to 0 at its radius."""
-    fraction = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
+    fraction = GLOW_STRENGTH * np.maximum(1.0 - _distances(GLOW_RADIUS * radius) / (GLOW_RADIUS * radius), 0.0) ** 2
     surface = pygame.Surface(fraction.shape, 0, 32)
     pygame.surfarray.blit_array(surface, np.rint(fraction[:, :, None] * colour).astype(np.uint8))
     return surface

@@ -25,12 +25,12 @@ from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import clip_segment, draw_line
 from sandbox.window.render.palette import BACKGROUND, YELLOW, mix_colours
 
-SPACING = 26.0
+CHEVRON_SPACING = 26.0
 """px between chevrons at a UI scale of 1"""
-HALF_WIDTH, LENGTH = 3.6, 4.6
+CHEVRON_HALF_WIDTH, CHEVRON_LENGTH = 3.6, 4.6
 """px, half width and length of a chevron"""
 MAX_CHEVRONS = 600
-STEEP = 0.2
+MIN_COSINE = 0.2
 """Cosine of the angle between a velocity and an edge, below which the edge has no chevrons"""
 ARC_STEPS = 24
 """Segments of a full circle"""
@@ -134,7 +134,7 @@ def _along_plane(view: DrawContext, plane: Plane) -> FloatArray:
     foot = centre - ((centre - np.asarray(plane.point)) @ normal) * normal
     reach = sum(camera.size) / camera.scale
     # Chevrons are counted from the point of the plane, so that they do not move with the camera.
-    spacing = SPACING * view.ui_scale / camera.scale
+    spacing = CHEVRON_SPACING * view.ui_scale / camera.scale
     offset = math.fmod(float((foot - np.asarray(plane.point)) @ along), spacing)
     return np.stack([foot + (sign * reach - offset) * along for sign in (-1.0, 1.0)])
 
@@ -177,7 +177,7 @@ def _chevrons(view: DrawContext, outline: MovingOutline) -> Iterator[Chevron]:
 def _along_outline(view: DrawContext, pixels: FloatArray, speed: float) -> Iterator[Chevron]:
     """Yield chevrons that travel along an outline (K, 2), px, at a speed, m/s."""
     lengths = np.hypot(*np.diff(pixels, axis=0).T)
-    total, spacing = float(lengths.sum()), SPACING * view.ui_scale
+    total, spacing = float(lengths.sum()), CHEVRON_SPACING * view.ui_scale
     if total < spacing:
         return
     if (pixels[0] == pixels[-1]).all():
@@ -200,7 +200,7 @@ def _across_velocity(
     view: DrawContext, pixels: FloatArray, origin: FloatArray, velocity: FloatArray
 ) -> Iterator[Chevron]:
     """Yield chevrons where lines across a velocity, m/s, which move with it, cross an outline (K, 2), px."""
-    spacing, speed = SPACING * view.ui_scale, math.hypot(*velocity)
+    spacing, speed = CHEVRON_SPACING * view.ui_scale, math.hypot(*velocity)
     direction = velocity * (1.0, -1.0) / speed  # y points down on the screen
     phase = math.fmod(speed * view.snapshot.frame.time * view.camera.scale, spacing)
     area = pygame.Rect((0, 0), view.camera.size)
@@ -211,7 +211,7 @@ def _across_velocity(
         start, end = np.asarray(clipped)
         edge, length = end - start, math.dist(*clipped)
         first, last = float((start - origin) @ direction) - phase, float((end - origin) @ direction) - phase
-        if abs(last - first) <= STEEP * length:
+        if abs(last - first) <= MIN_COSINE * length:
             continue
         along = edge / math.copysign(length, last - first)
         for k in range(math.ceil(min(first, last) / spacing), math.ceil(max(first, last) / spacing)):
@@ -221,7 +221,7 @@ def _across_velocity(
 
 def _draw_chevron(view: DrawContext, x: float, y: float, along_x: float, along_y: float) -> None:
     """Draw two strokes that meet in the direction of motion, on a dark halo."""
-    half, length = HALF_WIDTH * view.ui_scale, LENGTH * view.ui_scale
+    half, length = CHEVRON_HALF_WIDTH * view.ui_scale, CHEVRON_LENGTH * view.ui_scale
     tip = x + 0.5 * length * along_x, y + 0.5 * length * along_y
     back = x - 0.5 * length * along_x, y - 0.5 * length * along_y
     wings = [(back[0] - sign * half * along_y, back[1] + sign * half * along_x) for sign in (-1.0, 1.0)]

@@ -122,7 +122,7 @@ def packed_pixels(colours: ColourArray, surface: pygame.Surface) -> Packed:
     return np.asarray(channels[:, 0] << red | channels[:, 1] << green | channels[:, 2] << blue | alpha, np.uint32)
 
 
-SHADES = 64
+SHADE_COUNT = 64
 """Number of shades over a lifetime: neighbouring shades look alike, and the number of colours stays small."""
 
 
@@ -135,7 +135,7 @@ class LifetimeColours:
         self.shades: ColourArray = np.concatenate(
             [np.empty((0, 3), np.uint8), *(fade_colours(each) for each in colours if each is not None)]
         )
-        """(S, 3), SHADES rows for each fading element, in the order of elements"""
+        """(S, 3), SHADE_COUNT rows for each fading element, in the order of elements"""
         order = np.full(len(colours), -1, np.int64)
         order[fading] = np.arange(len(fading))
         row = order[bodies.element]
@@ -146,8 +146,8 @@ class LifetimeColours:
         """(F,) indices of the fading bodies"""
         self._row_of_body = np.full(len(bodies), -1, np.int64)
         self._row_of_body[numbers] = np.arange(len(numbers))
-        self._first: IntArray = row[numbers] * SHADES
-        self._born, self._rate = bodies.born[numbers], SHADES / bodies.lifetime[numbers]
+        self._first: IntArray = row[numbers] * SHADE_COUNT
+        self._born, self._rate = bodies.born[numbers], SHADE_COUNT / bodies.lifetime[numbers]
 
     def __len__(self) -> int:
         return len(self._born)
@@ -175,7 +175,7 @@ class LifetimeColours:
         if COMPILED:
             from sandbox.window.render.kernels import rasterise_faded_points
 
-            rasterise_faded_points(tones, shades, time, self._born, self._rate, self._first, SHADES)
+            rasterise_faded_points(tones, shades, time, self._born, self._rate, self._first, SHADE_COUNT)
         return COMPILED
 
     def over(self, colours: ColourArray, numbers: IntArray, time: float) -> ColourArray:
@@ -189,12 +189,12 @@ class LifetimeColours:
     def _shade(self, time: float, rows: slice | IntArray) -> IntArray:
         """Return the indices into the shades of fading bodies at a time in s."""
         age = (time - self._born[rows]) * self._rate[rows]
-        return self._first[rows] + np.clip(age, 0.0, SHADES - 1.0).astype(np.int64)
+        return self._first[rows] + np.clip(age, 0.0, SHADE_COUNT - 1.0).astype(np.int64)
 
 
 def fade_colours(colours: tuple[str, ...]) -> ColourArray:
-    """Return the colours interpolated in equal steps from first to last, (SHADES, 3)."""
+    """Return the colours interpolated in equal steps from first to last, (SHADE_COUNT, 3)."""
     stops = np.asarray([hex_colour(each) for each in colours], np.float64)
-    along = np.linspace(0.0, len(stops) - 1.0, SHADES)
+    along = np.linspace(0.0, len(stops) - 1.0, SHADE_COUNT)
     mixed = [np.interp(along, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]
     return np.rint(np.stack(mixed, 1)).astype(np.uint8)

@@ -16,10 +16,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.accents import AccentNumbers
-from sandbox.window.render.attractions import draw_attractions
-from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
-from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext
 from sandbox.window.render.game_view import GameViews, HasHud
 from sandbox.window.render.grid import draw_grid, draw_scale
 from sandbox.window.render.lamps import LampRenderer, draw_lamps
@@ -29,6 +27,7 @@ from sandbox.window.render.particles import MAX_POINT_SIZE, LifetimeColours, Pac
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.static_geometry import (
     LayerRenderer,
+    draw_attractions,
     draw_bounds,
     draw_markings,
     draw_static_bodies,
@@ -323,9 +322,9 @@ def _contact_colours(overlapping: BoolArray, count: int) -> ColourArray:
     return np.where(touching[:, None], np.asarray(TOUCHING, np.uint8), np.asarray(CLEAR, np.uint8))
 
 
-WIDE, HIGH = 0.72, 0.38
+MAX_INSET_WIDTH, MAX_INSET_HEIGHT = 0.72, 0.38
 """Largest width and height of an inset, as fractions of the free area."""
-MARGIN = 10
+INSET_MARGIN = 10
 """px at a UI scale of 1, distance to the edges of the surface"""
 MIN_MAGNIFICATION = 1.5
 """Smallest magnification, relative to the main view, at which an inset is shown."""
@@ -364,7 +363,7 @@ class InsetRenderer:
         box = snapshot.scene.play.inset
         if box is None:
             return None
-        rect = _inset_rect(box, free, round(MARGIN * ui_scale), aside)
+        rect = _inset_rect(box, free, round(INSET_MARGIN * ui_scale), aside)
         inset_camera = Camera.fitting(box, rect.size, margin=0.0)
         if min(rect.size) < 1 or inset_camera.scale < MIN_MAGNIFICATION * camera.scale or camera.turned:
             return None
@@ -387,7 +386,9 @@ def _inset_rect(box: ViewBox, free: pygame.Rect, margin: int, occupied: int) -> 
     """Return the largest permitted rectangle for the inset of a box."""
     (left, bottom), (right, top) = box
     available = free.width - 2 * margin - (occupied + margin if occupied else 0)
-    scale = min(min(WIDE * free.width, available) / (right - left), HIGH * free.height / (top - bottom))
+    scale = min(
+        min(MAX_INSET_WIDTH * free.width, available) / (right - left), MAX_INSET_HEIGHT * free.height / (top - bottom)
+    )
     size = max(round(scale * (right - left)), 0), max(round(scale * (top - bottom)), 0)
     rect = pygame.Rect((0, 0), size)
     rect.bottomright = free.right - margin - (occupied + margin if occupied else 0), free.bottom - margin

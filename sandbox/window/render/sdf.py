@@ -146,6 +146,16 @@ def draw_sdf(
     surface.set_clip(clip)
 
 
+def draw_sdf_disc(surface: pygame.Surface, centre: tuple[float, float], radius: float, style: ShapeStyle) -> None:
+    """Paint a disc or ring of any size and position, px, onto a surface."""
+    (x, y), area = centre, surface.get_clip()
+    left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
+    right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
+    if left < right and top < bottom:
+        rect = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
+        draw_sdf(surface, disc_distance(x, y, radius), style, rect)
+
+
 def _fill(surface: pygame.Surface, full: npt.NDArray[np.bool_], area: pygame.Rect, colour: RgbColour) -> None:
     """Fill the interior tiles, one rectangle for each run in a row."""
     if full.all():

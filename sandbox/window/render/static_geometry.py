@@ -1,4 +1,4 @@
-"""Static geometry: planes, walls, posts, bounds, markings, zones and raised layers."""
+"""Static geometry: planes, walls, posts, bounds, markings, zones, raised layers and centres of attraction."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,8 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import (
     SDL_COORDINATE_LIMIT,
     Pixel,
@@ -34,6 +35,7 @@ from sandbox.window.render.palette import (
     SKY,
     SOLID,
     SURFACE,
+    YELLOW,
     RgbColour,
     colour_of_fixed,
     hex_colour,
@@ -45,6 +47,7 @@ from sandbox.window.render.sdf import (
     capsule_distance,
     disc_distance,
     draw_sdf,
+    draw_sdf_disc,
     line_distance,
 )
 
@@ -222,26 +225,20 @@ def _draw_post(canvas: Canvas, post: Post) -> None:
         return
     x, y = canvas.camera.to_screen(position)[0].tolist()
     edge = colour_of_fixed(post, NEUTRAL)
-    rect = _surrounding_rect((x, y), (x, y), radius, canvas.surface.get_clip())
     if not post.solid:
         faint = mix_colours(BACKGROUND, edge, ABSENT_FRACTION)
-        draw_sdf(
-            canvas.surface,
-            disc_distance(x, y, radius),
-            ShapeStyle(BACKGROUND, faint, 1.0 * ui_scale, antialias=antialias),
-            rect,
-        )
+        draw_sdf_disc(canvas.surface, (x, y), radius, ShapeStyle(BACKGROUND, faint, ui_scale, antialias=antialias))
         return
     style = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * ui_scale, radius), antialias=antialias)
-    draw_sdf(canvas.surface, disc_distance(x, y, radius), style, rect)
+    draw_sdf_disc(canvas.surface, (x, y), radius, style)
     if post.kick is not None and radius > MIN_RING_RADIUS * ui_scale:  # ring of a bumper
         ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * ui_scale, antialias=antialias)
-        draw_sdf(canvas.surface, disc_distance(x, y, 0.6 * radius), ring, rect)
+        draw_sdf_disc(canvas.surface, (x, y), 0.6 * radius, ring)
 
 
-OPACITY = 165
+UPPER_LAYER_OPACITY = 165
 """of 255, opacity of layers above the ground"""
-MARGIN = 4
+LAYER_MARGIN = 4
 """px, margin around a cached layer"""
 
 
@@ -307,7 +304,7 @@ def _layer_sprite(canvas: Canvas, scene: Scene) -> Sprite | None:
     if not discs:
         return None
     pixels = np.asarray(canvas.camera.to_screen(np.asarray([position for position, _ in discs])))
-    reach = np.asarray([[size * canvas.camera.scale] for _, size in discs]) + MARGIN * canvas.ui_scale
+    reach = np.asarray([[size * canvas.camera.scale] for _, size in discs]) + LAYER_MARGIN * canvas.ui_scale
     low, high = (
         (pixels - reach).min(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
         (pixels + reach).max(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
@@ -326,7 +323,7 @@ def _layer_sprite(canvas: Canvas, scene: Scene) -> Sprite | None:
     picture = pygame.Surface(box.size, pygame.SRCALPHA, 32)
     colours = black * (255.0 / np.maximum(cover, 1.0))[:, :, None]
     pygame.surfarray.pixels3d(picture)[:] = colours.clip(0, 255).astype(np.uint8)
-    pygame.surfarray.pixels_alpha(picture)[:] = (cover * (OPACITY / 255.0)).astype(np.uint8)
+    pygame.surfarray.pixels_alpha(picture)[:] = (cover * (UPPER_LAYER_OPACITY / 255.0)).astype(np.uint8)
     return picture, box.topleft
 
 
@@ -360,18 +357,13 @@ def _draw_circle(
     if not canvas.camera.in_sight(position, np.asarray([radius / canvas.camera.scale]))[0]:
         return
     x, y = canvas.camera.to_screen(position)[0].tolist()
-    area = canvas.surface.get_clip()
-    left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
-    right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
-    if left < right and top < bottom:
-        rect = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
-        look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=canvas.antialias)
-        draw_sdf(canvas.surface, disc_distance(x, y, radius), look, rect)
+    look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=canvas.antialias)
+    draw_sdf_disc(canvas.surface, (x, y), radius, look)
 
 
-FILLED, LINED = 0.13, 0.55
+ZONE_FILL_OPACITY, ZONE_LINE_OPACITY = 0.13, 0.55
 """opacity of the area and of the outline"""
-LINE = 1.5
+ZONE_LINE_WIDTH = 1.5
 """px, width of the outline"""
 
 
@@ -382,8 +374,13 @@ def draw_zones(canvas: Canvas, scene: Scene) -> None:
         distance, within = _distance(zone, canvas.camera)
         box = within.inflate(4, 4).clip(canvas.surface.get_clip())
         colour = colour_of_zone(zone)
-        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, FILLED, antialias), box)
-        draw_sdf(canvas.surface, distance, ShapeStyle(None, colour, LINE * canvas.ui_scale, LINED, antialias), box)
+        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, ZONE_FILL_OPACITY, antialias), box)
+        draw_sdf(
+            canvas.surface,
+            distance,
+            ShapeStyle(None, colour, ZONE_LINE_WIDTH * canvas.ui_scale, ZONE_LINE_OPACITY, antialias),
+            box,
+        )
 
 
 def colour_of_zone(zone: Zone) -> RgbColour:
@@ -444,3 +441,34 @@ def _box(corners: FloatArray, reach: float) -> pygame.Rect:
         (corners.max(axis=0) + reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
     )
     return pygame.Rect(*np.floor(low).astype(int).tolist(), *np.ceil(high - low + 1.0).astype(int).tolist())
+
+
+SUN_RADIUS, RAY_LENGTH = 6.0, 5.0
+"""px at a UI scale of 1, of the disc, and length of a ray"""
+RAY_GAP = 2.5
+"""px between the disc and its rays"""
+RAY_COUNT = 8
+SUN_COLOUR = mix_colours(BACKGROUND, YELLOW, 0.8)
+
+
+def draw_attractions(canvas: Canvas, scene: Scene) -> None:
+    """Draw the centre of each attraction towards a point: a sun with rays, or a hollow one if it repels.
+
+    An attraction towards a body has no symbol, as the body itself is visible.
+    """
+    for attraction in scene.attractions:
+        if isinstance(attraction.toward, str) or not attraction.strength:
+            continue
+        x, y = canvas.camera.to_screen(np.asarray(attraction.toward)).tolist()
+        if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT:
+            _draw_sun(canvas, (x, y), repels=attraction.strength < 0.0)
+
+
+def _draw_sun(canvas: Canvas, centre: tuple[float, float], *, repels: bool) -> None:
+    unit, (x, y) = canvas.ui_scale, centre
+    for k in range(RAY_COUNT):
+        across, up = math.cos(math.tau * k / RAY_COUNT), math.sin(math.tau * k / RAY_COUNT)
+        inner, outer = (SUN_RADIUS + RAY_GAP) * unit, (SUN_RADIUS + RAY_GAP + RAY_LENGTH) * unit
+        ends = (x + inner * across, y + inner * up), (x + outer * across, y + outer * up)
+        draw_line(canvas.surface, *ends, SUN_COLOUR, 1.6 * unit, canvas.antialias)
+    draw_disc(canvas.surface, centre, SUN_RADIUS * unit, SUN_COLOUR, hole=(SUN_RADIUS - 2.0) * unit if repels else 0.0)

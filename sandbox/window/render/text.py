@@ -14,7 +14,7 @@ from sandbox.window.render.palette import INK, LINE, PANEL, RgbColour
 
 MAX_TEXT_LENGTH = 400
 """Number of characters of a line that are rendered; limits the width of the surface."""
-SMALLEST, MAX_TEXT_SIZE = 4, 128
+MIN_FONT_SIZE, MAX_FONT_SIZE = 4, 128
 """px, range of font sizes"""
 
 
@@ -58,7 +58,7 @@ def text_size(text: str, size: float, bold: bool = False, mono: bool = False) ->
 
 
 def _integer_size(size: float) -> int:
-    return round(min(max(size, SMALLEST), MAX_TEXT_SIZE)) if math.isfinite(size) else SMALLEST
+    return round(min(max(size, MIN_FONT_SIZE), MAX_FONT_SIZE)) if math.isfinite(size) else MIN_FONT_SIZE
 
 
 def renderable(text: str) -> str:
@@ -102,8 +102,8 @@ def font_file(bold: bool, mono: bool) -> Path | None:
     return path if path.is_file() else None
 
 
-OPACITY = 214
-MAX_BOX = 16_384
+BOX_OPACITY = 214
+MAX_BOX_SIDE = 16_384
 """px, largest side of a box"""
 
 
@@ -112,11 +112,11 @@ def draw_box(
     rect: pygame.Rect,
     radius: float,
     colour: RgbColour = PANEL,
-    opacity: int = OPACITY,
+    opacity: int = BOX_OPACITY,
     edge: RgbColour | None = LINE,
 ) -> None:
     """Draw a rounded translucent box; nothing if its area is empty."""
-    if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX:
+    if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX_SIDE:
         return
     surface.blit(_plate(rect.size, round(radius), colour, opacity, edge), rect)
 
@@ -186,16 +186,46 @@ def wrap_text(
     return tuple(lines)
 
 
+def text_lines_width(lines: Sequence[str], size: float, bold: bool = False, mono: bool = False) -> int:
+    """Return the width of the longest of some lines, px; 0 without any."""
+    return max((text_size(line, size, bold, mono)[0] for line in lines), default=0)
+
+
+def draw_text_lines(
+    surface: pygame.Surface,
+    lines: Sequence[str],
+    at: tuple[float, float],
+    step: int,
+    size: float,
+    colour: RgbColour = INK,
+    anchor: str = "midleft",
+    bold: bool = False,
+) -> None:
+    """Draw lines below each other, `step` px apart; `at` is the point of the upper edge that the anchor names, px."""
+    for k, line in enumerate(lines):
+        draw_text(surface, line, (at[0], at[1] + (k + 0.5) * step), size, colour, anchor, bold)
+
+
+class TextPlate:
+    """Text on a box. It is laid out before it is drawn, so that the caller can place `rect`."""
+
+    def __init__(self, text: str, size: float, max_width: float, max_lines: int = 4, pad: float = 0.4) -> None:
+        """Wrap a text to a width, px; `pad` is the space above and below it in text heights."""
+        self._lines = wrap_text(text, size, max_width, max_lines)
+        self._size, self._step, self._pad = size, round(1.4 * size), pad
+        width, height = text_lines_width(self._lines, size), len(self._lines) * self._step
+        self.rect = pygame.Rect(0, 0, width + round(1.4 * size), height + round(2.0 * pad * size))
+
+    def draw(self, surface: pygame.Surface, radius: float, opacity: int, edge: RgbColour = LINE) -> None:
+        """Draw the plate with rounded corners."""
+        draw_box(surface, self.rect, radius, opacity=opacity, edge=edge)
+        at = self.rect.left + 0.7 * self._size, self.rect.top + self._pad * self._size
+        draw_text_lines(surface, self._lines, at, self._step, self._size)
+
+
 def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], ui_scale: float) -> None:
     """Draw a tooltip below the pointer, kept inside the surface."""
-    size = 12 * ui_scale
-    lines = wrap_text(text, size, min(280 * ui_scale, 0.9 * surface.get_width()), 4)
-    wide = max((text_size(line, size)[0] for line in lines), default=0)
-    step = round(1.4 * size)
-    box = pygame.Rect(0, 0, wide + round(1.4 * size), len(lines) * step + round(0.8 * size))
-    box.topright = pointer[0], pointer[1] + round(20 * ui_scale)
-    box.clamp_ip(surface.get_rect())
-    draw_box(surface, box, 4 * ui_scale, opacity=246)
-    for k, line in enumerate(lines):
-        at = box.left + 0.7 * size, box.top + 0.4 * size + (k + 0.5) * step
-        draw_text(surface, line, at, size, INK, "midleft")
+    plate = TextPlate(text, 12 * ui_scale, min(280 * ui_scale, 0.9 * surface.get_width()))
+    plate.rect.topright = pointer[0], pointer[1] + round(20 * ui_scale)
+    plate.rect.clamp_ip(surface.get_rect())
+    plate.draw(surface, 4 * ui_scale, 246)

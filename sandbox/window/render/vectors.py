@@ -120,7 +120,7 @@ VELOCITY_TIME = 0.1
 """s: the arrow of a velocity v has length v · SPAN"""
 NORMAL_LENGTH = 16.0
 """px, length of a contact normal"""
-WEIGHT = 26.0
+WEIGHT_LENGTH = 26.0
 """px, length of a force of one weight m·g"""
 LONGEST_ARROW = 80.0
 """px, length of the largest force if weights would make it longer"""
@@ -194,7 +194,7 @@ def draw_impulses(view: DrawContext) -> None:
         weights = (
             force / (_lighter(view, contacts.pair[visible]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
         )
-        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * fraction * view.ui_scale
+        length = np.minimum(WEIGHT_LENGTH * float(np.max(weights)), LONGEST_ARROW) * fraction * view.ui_scale
     drawn = np.flatnonzero(length > 1.0)
     drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last, on top
     for k in drawn.tolist():

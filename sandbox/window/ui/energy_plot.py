@@ -204,7 +204,7 @@ def spread_labels(targets: Sequence[float], gap: float, low: float, high: float)
 
 MAX_DRAWN_SAMPLES = 500
 """number of samples in the plotted time span"""
-WIDTH, HEIGHT, MARGIN = 330.0, 130.0, 12.0
+FIGURE_WIDTH, FIGURE_HEIGHT, FIGURE_MARGIN = 330.0, 130.0, 12.0
 """px at UI scale 1"""
 
 
@@ -228,8 +228,10 @@ class RunGraph:
         for row in [*range(first, last - 1, stride), last - 1]:
             self._graph.add(float(self._run.time[row]), *(float(each[row]) for each in self._energies))
         width, height = surface.get_size()
-        rect = pygame.Rect(0, 0, round(min(WIDTH * ui_scale, width / 2)), round(min(HEIGHT * ui_scale, height / 2)))
-        rect.bottomright = width - round(MARGIN * ui_scale), height - round(MARGIN * ui_scale)
+        rect = pygame.Rect(
+            0, 0, round(min(FIGURE_WIDTH * ui_scale, width / 2)), round(min(FIGURE_HEIGHT * ui_scale, height / 2))
+        )
+        rect.bottomright = width - round(FIGURE_MARGIN * ui_scale), height - round(FIGURE_MARGIN * ui_scale)
         self._graph.draw(surface, rect, ui_scale)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from operator import is_
 from pathlib import Path
+from typing import NamedTuple
 
 import pygame
 
@@ -27,7 +28,7 @@ from sandbox.window.ui.energy_plot import EnergyGraph
 from sandbox.window.ui.help import HelpOverlay
 from sandbox.window.ui.high_score_dialog import HighScoreDialog
 from sandbox.window.ui.hud import MAX_SHOWN_MESSAGES, hud_width
-from sandbox.window.ui.panel import SidePanel
+from sandbox.window.ui.panel import BUTTONS, SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
 from sandbox.window.ui.score_panel import ScoreLayout, draw_score, layout_score
 from sandbox.window.ui.status import hud_status, settings_text
@@ -36,6 +37,14 @@ from sandbox.window.view_bounds import field_rect, has_field
 
 GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
+
+
+class GuiFrame(NamedTuple):
+    """Values that a picture shows."""
+
+    status: HudStatus
+    display: GameDisplay | None
+    """of the game, if any"""
 
 
 class Gui:
@@ -63,14 +72,12 @@ class Gui:
         self._parameters = SessionParameters()
         self._size = size
         self._announces_keys = False  # whether the keys of a new scene are still to be announced
-        self._display: GameDisplay | None = None  # of the game, and status, from `update` to the end of `draw`
-        self._status: HudStatus | None = None
+        self._frame: GuiFrame | None = None  # from `update` to the end of `draw`
         self._score: tuple[object, ScoreLayout] | None = None  # arguments of the last layout, and the layout
         self._panel_inputs: tuple[object, ...] = ()  # values shown by the panel at its last update
         self._heard: object = None  # contacts that were last passed to the sounds
         self.bodies_out_of_view = False
         """whether all moving bodies are outside the view"""
-        self._faults = pygame.Rect(0, 0, 0, 0)  # box with the faults of the scene file
         self._plates: dict[str, pygame.Rect] = {}
 
     def on_scene_changed(self, same: bool) -> None:
@@ -136,7 +143,8 @@ class Gui:
         show, area = app_state.view, self.area
         if show is None:
             return []
-        status = self._status or hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None)
+        frame = self._frame
+        status = hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None) if frame is None else frame.status
         longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
         rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
@@ -157,7 +165,7 @@ class Gui:
         return float(self.bottom_margin + self.score_margins(app_state)[1])
 
     def _display_of(self, host: GameHost) -> GameDisplay:
-        return self._display or host.shown()
+        return host.shown() if self._frame is None or self._frame.display is None else self._frame.display
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
         """Return the layout of the score panel, cached for the last arguments."""
@@ -241,14 +249,15 @@ class Gui:
 
     def _close_faults(self, event: pygame.event.Event, app_state: AppState) -> bool:
         escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
-        click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self._faults.collidepoint(event.pos)
-        if not app_state.faults or not (escape or click):
+        click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3
+        box = self._plates.get("faults")
+        if not app_state.faults or not (escape or (click and box is not None and box.collidepoint(event.pos))):
             return False
         app_state.faults = ()
         return True
 
-    def update(self, app_state: AppState, frame_rate: float, recording: str | None) -> None:
-        """Update the status and the high-score dialog for the next picture.
+    def update(self, app_state: AppState, frame_rate: float, recording: str | None) -> GuiFrame:
+        """Update the high-score dialog, and return the values that the next picture shows.
 
         Args:
             app_state: the application state.
@@ -256,23 +265,27 @@ class Gui:
             recording: length and format of the film being recorded, if any.
         """
         host, controls = app_state.host, app_state.controls
-        self._display = None if host is None else host.shown()
+        display = None if host is None else host.shown()
         if host is not None and not self.help.open and (controls is None or controls.is_own_score):
             for note in self._high_scores.update(host):
                 app_state.messages.add(note, "warning")
-        self._status = hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording)
+        self._frame = GuiFrame(hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording), display)
+        return self._frame
 
-    def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState) -> None:
-        """Draw the scene and all widgets, with the status of the last `update`.
+    def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState, frame: GuiFrame) -> None:
+        """Draw the scene and all widgets.
 
         Args:
             surface: the window.
             camera: its camera.
             app_state: the application state.
+            frame: result of `update`.
         """
-        assert self._status is not None, "update comes first"
-        self._draw(surface, camera, app_state, self._status, self._display)
-        self._status = self._display = None  # outdated by the next event
+        if self.scene_browser is not None:
+            self.scene_browser.draw(surface, self.ui_scale)
+        else:
+            self._draw(surface, camera, app_state, *frame)
+        self._frame = None  # outdated by the next event
 
     def _draw(
         self,
@@ -282,40 +295,28 @@ class Gui:
         status: HudStatus,
         display: GameDisplay | None,
     ) -> None:
-        show = app_state.view
-        if self.scene_browser is not None:
-            self.scene_browser.draw(surface, self.ui_scale)
-            return
-        plates: dict[str, pygame.Rect] = {}
+        show, plates, scale_bar, field = app_state.view, dict[str, pygame.Rect](), None, None
         if show is None:
             surface.fill(BACKGROUND)
         else:
             self._draw_scene(surface, camera, app_state, show, display, plates)
             self._play_sounds(app_state, show)
-        if show is not None:
             if not self.help.open:
                 self._draw_game(surface, app_state, show, display, plates)
-            self._draw_graph(surface, app_state, plates)
-        self._faults = hud.draw_hud(
-            surface,
-            replace(status, out_of_sight=self.describe_out_of_view(app_state)),
-            self.ui_scale,
-            right=self.panel.width,
-            bottom=self.bottom_margin,
-            taken=[rect for rect in plates.values() if rect.width and rect.height],
-            scale=None if show is None else scale_rect(camera, self.ui_scale, self._scale_foot(app_state)),
-            field=None if show is None or not has_field(show.scene) else field_rect(show.scene, camera),
-            plates=plates,
-        )
+            if "energy" in self.overlays:
+                self._draw_graph(surface, app_state, show, plates)
+            scale_bar = scale_rect(camera, self.ui_scale, self._scale_foot(app_state))
+            field = field_rect(show.scene, camera) if has_field(show.scene) else None
+        status = replace(status, out_of_sight=self.describe_out_of_view(app_state))
+        taken = [rect for rect in plates.values() if rect.width and rect.height]
+        plates |= hud.draw_hud(surface, status, self.area, self.ui_scale, taken, scale_bar, field)
         if show is not None:
             if self._high_scores.entry is not None and not self.help.open:
                 self._high_scores.draw(surface, self.area, self.ui_scale)
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
-                now = show.frame.time
-                self._timeline.draw(
-                    surface, rect, show.start_time, now, show.end_time, show.keyframe_times, self.ui_scale
-                )
+                times = show.start_time, show.frame.time, show.end_time
+                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale)
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
@@ -438,11 +439,14 @@ class Gui:
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
-    def _draw_graph(self, surface: pygame.Surface, app_state: AppState, plates: dict[str, pygame.Rect]) -> None:
+    def _draw_graph(
+        self,
+        surface: pygame.Surface,
+        app_state: AppState,
+        show: LiveView | RecordedView,
+        plates: dict[str, pygame.Rect],
+    ) -> None:
         """Draw the energy graph at the lower right, above other plates; smaller if there is little space."""
-        show = app_state.view
-        if show is None or "energy" not in self.overlays:
-            return
         self._graph.add(show.frame.time, *show.energy())
         area, margin = self.area, round(10 * self.ui_scale)
         taken = [*self.permanent_plates(app_state), *plates.values()]
@@ -465,18 +469,8 @@ class Gui:
         if live is not None:
             toggles |= {"ghost": live.diagnostics.has_ghost, "trust": live.diagnostics.divergence is not None}
         toggles |= {"sound": self._sounds.enabled, "antialias": self.antialias}
-        buttons = (
-            "play" if app_state.paused else "pause",
-            "back",
-            "step",
-            "restart",
-            "camera",
-            "stop" if recording else "record",
-            "save",
-            "edit",
-            "picker",
-            "help",
-        )
+        hidden = {"pause" if app_state.paused else "play", "record" if recording else "stop"}
+        buttons = tuple(name for name in BUTTONS if name not in hidden)
         session = (
             ()
             if live is None

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import pygame
 
-from sandbox.window.input.keymap import BINDINGS, Binding
+from sandbox.window.input.keymap import Command
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
+from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_lines_width, text_size
 
 TEXT_SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0, 8.0)
 """px at UI scale 1: the largest size at which everything fits is used; at the smallest, the page can be scrolled"""
@@ -43,10 +43,10 @@ def help_groups(
     scene_keys: Sequence[tuple[str, str]] = (), gamepad: Sequence[tuple[str, str]] = ()
 ) -> tuple[HelpGroup, ...]:
     """Return all groups: keys of the scene, gamepad, other bindings, and the mouse actions that the scene leaves."""
-    titles = dict.fromkeys(binding.group for binding in BINDINGS)
+    titles = dict.fromkeys(command.group for command in Command)
     taken = {name for label, _ in scene_keys for name in _key_names(label)}
     own = tuple(
-        HelpGroup(title, tuple(_binding_line(binding, taken) for binding in BINDINGS if binding.group == title))
+        HelpGroup(title, tuple(_command_line(command, taken) for command in Command if command.group == title))
         for title in titles
     )
     first = (HelpGroup(SCENE_GROUP, tuple(scene_keys)),) if scene_keys else ()
@@ -60,10 +60,10 @@ def _key_names(label: str) -> list[str]:
     return [name.split(" (")[0].strip() for name in label.split(" or ")]
 
 
-def _binding_line(binding: Binding, taken: set[str]) -> tuple[str, str]:
-    """Return the line of a binding without keys that the scene binds; in parentheses if none remains."""
-    keys = [name for name in _key_names(binding.label) if name in RESERVED_KEYS or name not in taken]
-    return (" or ".join(keys), binding.about) if keys else (binding.label, f"({binding.about})")
+def _command_line(command: Command, taken: set[str]) -> tuple[str, str]:
+    """Return the line of a command without keys that the scene binds; in parentheses if none remains."""
+    keys = [name for name in _key_names(command.label) if name in RESERVED_KEYS or name not in taken]
+    return (" or ".join(keys), command.about) if keys else (command.label, f"({command.about})")
 
 
 class HelpOverlay:
@@ -112,9 +112,8 @@ HelpColumn = list[HelpGroup]
 
 def _group_widths(group: HelpGroup, size: float) -> tuple[int, int]:
     """Return the widths of the keys and of the descriptions of a group, px."""
-    keys = max(text_size(keys, 0.92 * size, mono=True)[0] for keys, _ in group.lines)
-    words = max(text_size(words, size)[0] for _, words in group.lines)
-    return keys + round(1.0 * size), words
+    keys, words = zip(*group.lines, strict=True)
+    return text_lines_width(keys, 0.92 * size, mono=True) + round(1.0 * size), text_lines_width(words, size)
 
 
 def _group_height(group: HelpGroup, size: float) -> float:

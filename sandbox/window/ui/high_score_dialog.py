@@ -9,7 +9,7 @@ from sandbox.games.high_scores import BEST, LETTERS, Entry, HighScores, initials
 from sandbox.window.game_host import GameHost
 from sandbox.window.input.keymap import latin_key
 from sandbox.window.render.palette import FAINT, GREEN, INK
-from sandbox.window.render.text import draw_box, draw_text, text_size
+from sandbox.window.render.text import draw_box, draw_text, text_lines_width, text_size
 from sandbox.window.ui.text_edit import TextEdit, is_text_shortcut
 
 TEXT_SIZE = 15.0
@@ -160,7 +160,7 @@ class HighScoreDialog:
         width = max(
             text_size(title, size, bold=True)[0],
             text_size(hint, 0.85 * size)[0],
-            *(text_size(line, 1.2 * size, mono=True)[0] for line in lines),
+            text_lines_width(lines, 1.2 * size, mono=True),
         )
         rect = pygame.Rect(0, 0, round(width + 3 * size), round((1.9 * len(lines) + 5.4) * size))
         rect.center = area.center

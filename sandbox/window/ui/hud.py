@@ -10,7 +10,15 @@ from sandbox.formatting import format_percent, format_si, format_time
 from sandbox.window.playback.snapshot import HudStatus
 from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, RgbColour
-from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
+from sandbox.window.render.text import (
+    draw_box,
+    draw_text,
+    draw_text_lines,
+    ellipsis,
+    text_lines_width,
+    text_size,
+    wrap_text,
+)
 
 MAX_SPEED_ERROR = 0.10
 """relative difference between real and requested speed above which both are shown"""
@@ -158,47 +166,40 @@ def layout_rows(status: HudStatus, area: pygame.Rect, ui_scale: float, taken: Se
 def draw_hud(
     surface: pygame.Surface,
     status: HudStatus,
+    visible: pygame.Rect,
     ui_scale: float,
-    *,
-    right: int = 0,
-    bottom: int = 0,
     taken: Sequence[pygame.Rect] = (),
-    scale: pygame.Rect | None = None,
+    scale_bar: pygame.Rect | None = None,
     field: pygame.Rect | None = None,
-    plates: dict[str, pygame.Rect] | None = None,
-) -> pygame.Rect:
+) -> dict[str, pygame.Rect]:
     """Draw all plates of the head-up display; plates without space are dropped, the least important first.
 
     Args:
         surface: the window.
         status: the values to show.
+        visible: area of the window that nothing covers, px.
         ui_scale: 1 on a display of 1080 lines.
-        right: px covered at the right.
-        bottom: px covered at the bottom.
         taken: rectangles of other plates, which are kept free.
-        scale: of the scale bar at the lower left; messages are drawn beside it.
+        scale_bar: at the lower left; messages are drawn beside it.
         field: of a playing field, which messages leave free if there is enough space to its left.
-        plates: receives the rectangle of each plate.
 
     Returns:
-        The rectangle of the box with the faults of the scene file; empty without faults.
+        The rectangles of the plates, px, by name; empty ones of those that are not drawn.
     """
-    plates, nothing = {} if plates is None else plates, pygame.Rect(0, 0, 0, 0)
-    visible = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
     area, size = _scale_area(visible, ui_scale)
     if area.width < 2 * size or area.height < size:
-        return nothing
+        return {}
     rows = layout_rows(status, visible, ui_scale, taken)
     _draw_rows(surface, rows, size)
-    plates["state"] = rows.rect
-    plates["rate"] = _draw_rate(surface, status, area, [rows.rect, *taken], size)
+    plates = {"state": rows.rect, "rate": _draw_rate(surface, status, area, [rows.rect, *taken], size)}
     if status.faults:
         top = rows.rect.bottom + _pad(size)
         below = pygame.Rect(area.left, top, area.width, area.bottom - top)
-        return _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
+        plates["faults"] = _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
+        return plates
     plates["picked"] = _draw_picked(surface, status.picked, area, [rows.rect, plates["rate"], *taken], size)
     others = [rows.rect, plates["rate"], plates["picked"], *taken]
-    message_area = _message_area(area, scale, field, size)
+    message_area = _message_area(area, scale_bar, field, size)
     for k, rect in enumerate(draw_messages(surface, status.messages, message_area, others, size)):
         plates[f"message {k}"] = rect
     if status.question is not None:
@@ -208,7 +209,7 @@ def draw_hud(
         draw_notice(surface, "Press Space to start", on_field, 1.5 * size, SKY, status.start_keys)
     elif status.out_of_sight is not None:
         draw_notice(surface, status.out_of_sight, area, size, SKY)
-    return nothing
+    return plates
 
 
 def hud_width(longest: str, ui_scale: float) -> int:
@@ -268,19 +269,14 @@ def draw_notice(
     small = 0.62 * size
     details = wrap_text(detail, small, area.width - 2 * size, 4) if detail else ()
     line_height, small_height = round(1.4 * size), round(1.5 * small)
-    width = max(
-        *(text_size(each, size, bold=True)[0] for each in lines), *(text_size(each, small)[0] for each in details), 0
-    )
+    width = max(text_lines_width(lines, size, bold=True), text_lines_width(details, small))
     height = len(lines) * line_height + len(details) * small_height + round(size)
     rect = pygame.Rect(0, 0, width + 2 * round(size), height)
     rect.center = area.center
     draw_box(surface, rect, 0.5 * size, opacity=244, edge=edge)
-    for k, each in enumerate(details):
-        y = rect.top + 0.5 * size + len(lines) * line_height + (k + 0.5) * small_height
-        draw_text(surface, each, (rect.centerx, y), small, FAINT, "center")
-    for k, each in enumerate(lines):
-        position = rect.centerx, rect.top + 0.5 * size + (k + 0.5) * line_height
-        draw_text(surface, each, position, size, INK, "center", bold=True)
+    x, y = rect.centerx, rect.top + 0.5 * size
+    draw_text_lines(surface, details, (x, y + len(lines) * line_height), small_height, small, FAINT, "center")
+    draw_text_lines(surface, lines, (x, y), line_height, size, INK, "center", bold=True)
 
 
 def _draw_rate(
@@ -329,13 +325,15 @@ def _draw_picked(
     return rect
 
 
-def _message_area(area: pygame.Rect, scale: pygame.Rect | None, field: pygame.Rect | None, size: float) -> pygame.Rect:
+def _message_area(
+    area: pygame.Rect, scale_bar: pygame.Rect | None, field: pygame.Rect | None, size: float
+) -> pygame.Rect:
     """Return the area for messages: beside the scale bar and left of the field, as far as both leave enough width."""
     left, right = area.left, area.right
     if field is not None and field.left - _pad(size) - left >= round(MIN_MESSAGE_WIDTH * size):
         right = min(right, field.left - _pad(size))
-    if scale is not None and right - scale.right - _pad(size) >= round(MIN_MESSAGE_WIDTH * size):
-        left = max(left, scale.right + _pad(size))
+    if scale_bar is not None and right - scale_bar.right - _pad(size) >= round(MIN_MESSAGE_WIDTH * size):
+        left = max(left, scale_bar.right + _pad(size))
     return pygame.Rect(left, area.top, right - left, area.height)
 
 
@@ -361,7 +359,7 @@ def draw_messages(
                 slot.width = min(slot.width, each.left - pad - area.left)
         room = slot.width - 2 * pad - mark_room
         lines = wrap_text(text, size, room, 2)
-        width = max((text_size(part, size)[0] for part in lines), default=0)
+        width = text_lines_width(lines, size)
         rect = pygame.Rect(area.left, 0, width + 2 * pad + mark_room, len(lines) * line_height + 2 * pad)
         rect.bottom = bottom
         while (hit := rect.collidelist(list(taken))) >= 0 and rect.top >= area.top:
@@ -370,15 +368,7 @@ def draw_messages(
             return drawn
         draw_box(surface, rect, 0.5 * size)
         draw_mark(surface, mark, (rect.left + pad + 0.5 * size, rect.top + pad + line_height / 2), 0.42 * size, colour)
-        for k, part in enumerate(lines):
-            draw_text(
-                surface,
-                part,
-                (rect.right - pad - width, rect.top + pad + (k + 0.5) * line_height),
-                size,
-                INK,
-                "midleft",
-            )
+        draw_text_lines(surface, lines, (rect.right - pad - width, rect.top + pad), line_height, size)
         bottom = rect.top - round(0.4 * size)
         drawn.append(rect)
     return drawn

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import pygame
 
-from sandbox.window.input.keymap import BINDINGS, Command
+from sandbox.window.input.keymap import Command
 from sandbox.window.playback.parameters import Parameter, ParameterValue
-from sandbox.window.render.palette import FAINT, LINE, PANEL, PANEL_RAISED
-from sandbox.window.render.text import draw_hint, draw_text
+from sandbox.window.render.palette import FAINT, LINE
+from sandbox.window.render.text import draw_text
+from sandbox.window.ui.scroll_column import COLUMN_WIDTH, ScrollColumn
 from sandbox.window.ui.widgets import (
     Checkbox,
     OptionButton,
@@ -21,6 +22,36 @@ from sandbox.window.ui.widgets import (
     Widget,
     WidgetEvent,
 )
+
+
+class PanelButton(NamedTuple):
+    """Button of the panel."""
+
+    command: Command
+    about: str
+    """tooltip, without the key"""
+
+    @property
+    def hint(self) -> str:
+        """Tooltip of the button."""
+        return f"{self.about} ({self.command.label})"
+
+
+BUTTONS = {
+    "play": PanelButton(Command.PAUSE, "Resume"),
+    "pause": PanelButton(Command.PAUSE, "Pause"),
+    "back": PanelButton(Command.BACK, "Step back"),
+    "step": PanelButton(Command.STEP, "Step forward"),
+    "restart": PanelButton(Command.RESTART, "Restart"),
+    "camera": PanelButton(Command.SCREENSHOT, "Screenshot"),
+    "record": PanelButton(Command.RECORD, "Record"),
+    "stop": PanelButton(Command.RECORD, "Stop recording"),
+    "save": PanelButton(Command.SAVE, "Save the session"),
+    "edit": PanelButton(Command.EDIT, "Edit the scene"),
+    "picker": PanelButton(Command.PICKER, "Open a scene"),
+    "help": PanelButton(Command.HELP, "Help"),
+}
+"""Buttons by their icons, in the order of the panel, which shows either `play` or `pause`, and `record` or `stop`."""
 
 
 class PanelHeading(NamedTuple):
@@ -107,35 +138,14 @@ def _layout_checkboxes(
     return y + rows * height
 
 
-PANEL_WIDTH = 264
-"""px at UI scale 1"""
-MAX_WIDTH_FRACTION = 0.6
-"""largest fraction of the window's width that the panel covers"""
 FOLD_WIDTH_FRACTION = 0.45
 """fraction of the window's width above which the panel is initially hidden"""
-SCROLL_STEP = 48
-"""px at UI scale 1 per notch of the wheel"""
 
-_BUTTONS = {
-    "play": ("Resume", Command.PAUSE),
-    "pause": ("Pause", Command.PAUSE),
-    "step": ("Step forward", Command.STEP),
-    "back": ("Step back", Command.BACK),
-    "restart": ("Restart", Command.RESTART),
-    "camera": ("Screenshot", Command.SCREENSHOT),
-    "record": ("Record", Command.RECORD),
-    "stop": ("Stop recording", Command.RECORD),
-    "save": ("Save the session", Command.SAVE),
-    "help": ("Help", Command.HELP),
-    "picker": ("Open a scene", Command.PICKER),
-    "edit": ("Edit the scene", Command.EDIT),
-}
 _LABELS = {"trust": "horizon", "antialias": "antialiasing"}
 """labels that differ from the name"""
-_MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
 
 
-class SidePanel:
+class SidePanel(ScrollColumn):
     """Column of widgets. `show` sets its content; callbacks report user actions."""
 
     def __init__(self, size: tuple[int, int], ui_scale: float = 1.0) -> None:
@@ -143,33 +153,23 @@ class SidePanel:
         self.on_change: Callable[[str, ParameterValue, bool], None] = _ignore
         """(key, value, final); values of integer parameters are floats too"""
         self.on_toggle: Callable[[str, bool], None] = _ignore
-        self.on_button: Callable[[str], None] = _ignore
-        self.size, self.ui_scale = size, ui_scale
+        self.on_button: Callable[[Command], None] = _ignore
+        super().__init__(size, ui_scale)
         self._visible: bool | None = None  # set by the user; None: shown unless the window is small
         self._parameter_widgets: dict[str, ParameterWidget] = {}
         self._checkboxes: dict[str, Checkbox] = {}
         self._buttons: list[PushButton] = []
         self._layout = PanelLayout((), (), 0)
-        self._scroll = 0
-        self._sheet = pygame.Surface((1, 1))
         self._drawn_state: tuple[object, ...] = ()
         """all values that the cached drawing depends on"""
-        self._pointer: tuple[int, int] | None = None
-        self._pressed: set[int] = set()
-        self._bar_held = False
         self.used = True
         """whether an event or a resize may have changed a widget, so that `show` is required; reset by the owner"""
-        self._dirty = True  # whether the cached drawing may be outdated
         self.resize(size, ui_scale)
 
     @property
     def width(self) -> int:
         """Width that the panel covers at the right of the window, px; 0 while hidden."""
-        return self._full_width if self.visible else 0
-
-    @property
-    def _full_width(self) -> int:
-        return max(min(round(PANEL_WIDTH * self.ui_scale), round(MAX_WIDTH_FRACTION * self.size[0])), 1)
+        return self.column_width if self.visible else 0
 
     @property
     def visible(self) -> bool:
@@ -179,7 +179,7 @@ class SidePanel:
         """
         if self._visible is not None:
             return self._visible
-        return round(PANEL_WIDTH * self.ui_scale) <= FOLD_WIDTH_FRACTION * self.size[0]
+        return round(COLUMN_WIDTH * self.ui_scale) <= FOLD_WIDTH_FRACTION * self.size[0]
 
     @visible.setter
     def visible(self, visible: bool) -> None:
@@ -194,15 +194,13 @@ class SidePanel:
 
     def resize(self, size: tuple[int, int], ui_scale: float) -> None:
         """Lay out the panel for a window of another size, px."""
-        self.size, self.ui_scale = size, ui_scale
-        self._sheet = pygame.Surface((self._full_width, max(size[1], 1)))
         self._drawn_state = ()
         self.used = True
-        self._layout_widgets()
+        super().resize(size, ui_scale)
 
     def show(self, parameters: Sequence[Parameter], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
         """Show parameters, check boxes and buttons, without callbacks. Widgets that remain keep their drags."""
-        self._dirty = True
+        self._is_dirty = True
         before = [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]
         parameter_widgets: dict[str, ParameterWidget] = {}
         for parameter in parameters:
@@ -218,110 +216,72 @@ class SidePanel:
         for k, name in enumerate(buttons):
             if k == len(self._buttons):
                 self._buttons.append(PushButton(self._sheet, name))
-            self._buttons[k].name, self._buttons[k].hint = name, _button_hint(name)
+            self._buttons[k].name, self._buttons[k].hint = name, BUTTONS[name].hint
         if changed or before != [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]:
-            self._layout_widgets()
+            self._lay_out()
 
     def _checkbox(self, name: str, on: bool) -> Checkbox:
         checkbox = self._checkboxes.get(name)
         if checkbox is None:
-            key = next((binding.label for binding in BINDINGS if binding.command == name), "")
+            key = next((command.label for command in Command if command == name), "")
             checkbox = Checkbox(self._sheet, name, on, _LABELS.get(name, ""), key)
         checkbox.on = on
         return checkbox
 
-    def _layout_widgets(self) -> None:
+    def _lay_out(self) -> None:
         """Lay out all widgets in content coordinates."""
         self._layout = arrange_widgets(
             self._buttons,
             list(self._parameter_widgets.values()),
             list(self._checkboxes.values()),
-            self._full_width,
+            self.column_width,
             self.ui_scale,
         )
-        self._move()
+        self._height = self._layout.height
+        self._scroll_to(self._scroll)
 
-    def _move(self) -> None:
-        """Move the widgets to the present scroll position."""
-        self._dirty = True
-        self._scroll = min(max(self._scroll, 0), max(self._layout.height - self.size[1], 0))
+    def _scroll_to(self, scroll: int) -> None:
+        """Scroll to a position, px, which is clamped, and move the widgets."""
+        super()._scroll_to(scroll)
         for widget, rect in self._layout.rects:
             widget.surface = self._sheet
             widget.set_rect(rect.move(0, -self._scroll), self.ui_scale)
 
     def release(self) -> None:
         """End a drag, with its final event."""
-        self.used = self._dirty = True
-        self._pressed.clear()
-        self._bar_held = False
-        self._pointer = None
+        super().release()
+        self.used = True
         for widget in self.widgets:
             widget.release()
         self._report_events()
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Process an event; return whether it was consumed. Motion events are required: wheel events have no position.
+        """Process an event; return whether it was consumed. A hidden panel still ends its drags."""
+        is_loss = event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE)
+        return (self.visible or is_loss) and super().handle_event(event)
 
-        A press outside the panel belongs to the scene view, as do the motion and the release that follow it.
-        """
-        if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
-            if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
-                self.release()
-            return False
-        if not self.visible:
-            return False
-        if event.type == pygame.MOUSEWHEEL:
-            return self._wheel(event)
-        if event.type not in _MOUSE_EVENTS:
-            return False
-        at = event.pos[0] - (self.size[0] - self._full_width), event.pos[1]
-        inside = 0 <= at[0] < self._full_width and 0 <= at[1] < self.size[1]
-        self._pointer = at if inside or self._pressed else None
-        if event.type == pygame.MOUSEBUTTONUP:
-            ours = event.button in self._pressed
-            self._pressed.discard(event.button)
-        elif event.type == pygame.MOUSEBUTTONDOWN:
-            ours = inside
-            if ours and event.button <= 3:  # buttons from 4 up are wheel events
-                self._pressed.add(event.button)
-        else:
-            foreign = any(getattr(event, "buttons", ())) and not self._pressed
-            ours = bool(self._pressed) or (inside and not foreign)
-        if ours or event.type == pygame.MOUSEMOTION:
-            self._dispatch(event, at)
-        return ours
-
-    def _dispatch(self, event: pygame.event.Event, at: tuple[int, int]) -> None:
-        self.used = self._dirty = True
-        if self._drag_bar(event, at):
+    def _handle_mouse(self, event: pygame.event.Event, at: tuple[int, int], is_ours: bool) -> None:
+        """Drag the scroll bar, or pass the event to the widgets."""
+        if not is_ours and event.type != pygame.MOUSEMOTION:
+            return
+        self.used = self._is_dirty = True
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
+            self._is_bar_held = self._is_on_bar(at)
+        if self._is_bar_held:
+            self._is_bar_held = event.type != pygame.MOUSEBUTTONUP or event.button != 1
+            self._drag_bar(at)
             return
         moved = pygame.event.Event(event.type, {**event.dict, "pos": at})
         for widget in self.widgets:
             widget.handle_event(moved)
         self._report_events()
 
-    def _drag_bar(self, event: pygame.event.Event, at: tuple[int, int]) -> bool:
-        """Scroll by the scroll bar at the right edge; return whether it is being dragged."""
-        if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-            self._bar_held = self._layout.height > self.size[1] and at[0] >= self._full_width - 9 * self.ui_scale
-        if not self._bar_held:
-            return False
-        if event.type == pygame.MOUSEBUTTONUP and event.button == 1:
-            self._bar_held = False
-        self._scroll = round(at[1] / max(self.size[1], 1) * self._layout.height - self.size[1] / 2)
-        self._move()
-        return True
-
-    def _wheel(self, event: pygame.event.Event) -> bool:
-        if self._pointer is None:
-            return False
-        self.used = self._dirty = True
-        notches = int(event.y)
-        if notches and not any(widget.scroll(notches, self._pointer) for widget in self._parameter_widgets.values()):
-            self._scroll -= round(notches * SCROLL_STEP * self.ui_scale)
-            self._move()
+    def _turn_wheel(self, notches: int, pointer: tuple[int, int]) -> None:
+        """Change the parameter under the pointer, or scroll."""
+        self.used = self._is_dirty = True
+        if notches and not any(widget.scroll(notches, pointer) for widget in self._parameter_widgets.values()):
+            super()._turn_wheel(notches, pointer)
         self._report_events()
-        return True
 
     def _report_events(self) -> None:
         """Report the events since the last call; a callback may change the content of the panel."""
@@ -331,7 +291,7 @@ class SidePanel:
             widget.events.clear()
         for used in events:
             if used.kind == "button":
-                self.on_button(used.name)
+                self.on_button(BUTTONS[used.name].command)
             elif isinstance(used.value, bool):
                 self.on_toggle(used.name, used.value)
             else:
@@ -339,54 +299,33 @@ class SidePanel:
 
     def draw(self, surface: pygame.Surface) -> None:
         """Draw the panel at the right of the window, if visible."""
-        if not self.visible:
-            return
-        if self._dirty:
-            self._dirty = False
-            state = (
-                self._scroll,
-                self._bar_held,
-                self._layout.headings,
-                *(widget.draw_state for widget in self.widgets),
-            )
-            if state != self._drawn_state:
-                self._draw_sheet()
-                self._drawn_state = state
-        surface.blit(self._sheet, (self.size[0] - self._full_width, 0))
-        self._draw_hint(surface)
+        if self.visible:
+            super().draw(surface)
 
     def _draw_sheet(self) -> None:
-        """Draw the column on the cached surface, which most frames only blit."""
-        sheet, ui_scale = self._sheet, self.ui_scale
-        sheet.fill(PANEL)
+        """Draw the column on the cached surface if it has changed."""
+        states = (widget.draw_state for widget in self.widgets)
+        state = (self._scroll, self._is_bar_held, self._layout.headings, *states)
+        if state != self._drawn_state:
+            super()._draw_sheet()
+            self._drawn_state = state
+
+    def _draw_content(self, sheet: pygame.Surface) -> None:
+        """Draw the headings and the visible widgets."""
+        ui_scale = self.ui_scale
         for text, top in self._layout.headings:
             y = top - self._scroll + 10 * ui_scale
             word = draw_text(sheet, text.upper(), (14 * ui_scale, y), 10.5 * ui_scale, FAINT, "midleft", bold=True)
-            start = word.right + 8 * ui_scale
-            pygame.draw.line(sheet, LINE, (start, y), (self._full_width - 18 * ui_scale, y), max(round(ui_scale), 1))
+            ends = (word.right + 8 * ui_scale, y), (self.column_width - 18 * ui_scale, y)
+            pygame.draw.line(sheet, LINE, *ends, max(round(ui_scale), 1))
         for widget in self.widgets:
             if widget.rect.bottom >= -40 * ui_scale and widget.rect.top <= self.size[1] + 40 * ui_scale:
                 widget.draw()
-        pygame.draw.line(sheet, LINE, (0, 0), (0, self.size[1]), max(round(ui_scale), 1))
-        if self._layout.height > self.size[1]:
-            height = max(round(self.size[1] ** 2 / self._layout.height), round(16 * ui_scale))
-            top = round(self._scroll / (self._layout.height - self.size[1]) * (self.size[1] - height))
-            bar_width = round(5 * ui_scale)
-            bar = pygame.Rect(self._full_width - bar_width - round(2 * ui_scale), top, bar_width, height)
-            pygame.draw.rect(sheet, LINE if self._bar_held else PANEL_RAISED, bar, border_radius=bar_width)
 
-    def _draw_hint(self, surface: pygame.Surface) -> None:
-        hint = next((widget.hint for widget in self.widgets if widget.hovered and widget.hint), "")
-        if hint and self._pointer is not None and not self._pressed:
-            x, y = self._pointer
-            draw_hint(surface, hint, (self.size[0] - self._full_width + x, y), self.ui_scale)
+    def _hint(self, pointer: tuple[int, int]) -> str:  # noqa: ARG002
+        """Return the tooltip of the widget under the pointer; empty without one."""
+        return next((widget.hint for widget in self.widgets if widget.hovered and widget.hint), "")
 
 
 def _ignore(*_: object) -> None:
     """No-op, the default of the callbacks."""
-
-
-def _button_hint(name: str) -> str:
-    about, command = _BUTTONS.get(name, ("", None))
-    key = next((binding.label for binding in BINDINGS if binding.command == command), "")
-    return f"{about} ({key})" if key else about

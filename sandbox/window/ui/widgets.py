@@ -120,13 +120,7 @@ class Checkbox(Widget):
         size, rect = WIDGET_TEXT_SIZE * self.ui_scale, self.rect
         side = round(14 * self.ui_scale)
         box = pygame.Rect(rect.left, rect.centery - side // 2, side, side)
-        radius = round(3.5 * self.ui_scale)
-        pygame.draw.rect(self.surface, SKY if self.on else PANEL_RAISED, box, border_radius=radius)
-        edge = SKY if self.on or self.hovered else LINE
-        pygame.draw.rect(self.surface, edge, box, max(round(self.ui_scale), 1), border_radius=radius)
-        if self.on:
-            tick = [(box.left + x * side, box.top + y * side) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))]
-            pygame.draw.lines(self.surface, BACKGROUND, False, tick, max(round(2 * self.ui_scale), 1))
+        draw_check_box(self.surface, box, self.on, self.hovered, self.ui_scale)
         left = box.right + round(0.5 * size)
         key_width = text_size(self.key, 0.85 * size, mono=True)[0] + round(0.6 * size) if self.key else 0
         draw_text(self.surface, self.key, (rect.right, rect.centery), 0.85 * size, FAINT, "midright", mono=True)
@@ -134,8 +128,23 @@ class Checkbox(Widget):
         draw_text(self.surface, label, (left, rect.centery), size, INK if self.on else FAINT, "midleft")
 
 
+def draw_check_box(
+    surface: pygame.Surface, box: pygame.Rect, is_on: bool, is_hovered: bool, ui_scale: float, fill: RgbColour = SKY
+) -> None:
+    """Draw the square of a check box; `fill` is its colour while it is on."""
+    radius = round(3.5 * ui_scale)
+    pygame.draw.rect(surface, fill if is_on else PANEL_RAISED, box, border_radius=radius)
+    edge = SKY if is_on or is_hovered else LINE
+    pygame.draw.rect(surface, edge, box, max(round(ui_scale), 1), border_radius=radius)
+    if is_on:
+        tick = [
+            (box.left + x * box.width, box.top + y * box.width) for x, y in ((0.22, 0.52), (0.42, 0.72), (0.78, 0.28))
+        ]
+        pygame.draw.lines(surface, BACKGROUND, False, tick, max(round(2 * ui_scale), 1))
+
+
 class PushButton(Widget):
-    """Button with an icon, or with its name if there is no such icon."""
+    """Button with an icon, by whose name it is called."""
 
     def __init__(self, surface: pygame.Surface, name: str, hint: str = "") -> None:
         super().__init__(surface)
@@ -158,11 +167,7 @@ class PushButton(Widget):
         pygame.draw.rect(self.surface, colour, rect, border_radius=round(5 * self.ui_scale))
         side = round(0.62 * min(rect.size))
         image = icon(self.name, side, WARNING if self.name in ("record", "stop") else INK)
-        if image is not None:
-            self.surface.blit(image, image.get_rect(center=rect.center))
-        else:
-            size = WIDGET_TEXT_SIZE * self.ui_scale
-            draw_text(self.surface, ellipsis(self.name, size, rect.width - size), rect.center, size, INK, "center")
+        self.surface.blit(image, image.get_rect(center=rect.center))
 
 
 class ParameterWidget(Widget):

@@ -18,7 +18,7 @@ from sandbox.window.capture.export import RunRenderer, frame_times
 from sandbox.window.capture.image_files import offscreen, rgb_pixels
 from sandbox.window.playback.recorded import CONTACT_DURATION, RecordedRun, bodies_of_run, scene_of_run
 from sandbox.window.playback.snapshot import OVERLAYS
-from sandbox.window.render.lamps import RADIUS
+from sandbox.window.render.lamps import LAMP_RADIUS
 from sandbox.window.render.palette import BACKGROUND, SKY
 from sandbox.window.view_bounds import crowd_bounds
 from tests.toml_text import toml
@@ -301,7 +301,7 @@ def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_p
     assert len(brighter)
     rows_and_columns = camera.to_screen(np.asarray([lamps[name] for name in names]))[:, ::-1]
     distance = np.linalg.norm(brighter[:, None] - rows_and_columns[None], axis=2).min(axis=1)
-    assert distance.max() <= 6.5 * RADIUS * camera.scale + 2.0  # within the radius of the glow
+    assert distance.max() <= 6.5 * LAMP_RADIUS * camera.scale + 2.0  # within the radius of the glow
 
 
 @pytest.mark.fail_slow(60)  # takes over half a second

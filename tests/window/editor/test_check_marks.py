@@ -9,7 +9,7 @@ import pytest
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.window.camera import Camera
-from sandbox.window.editor.check_marks import HEADING, MORE, CheckMarks
+from sandbox.window.editor.check_marks import CheckMarks, EngineChip, PlatePart
 from sandbox.window.editor.live_check import CheckResult, Remedy, SceneMark, check_scene
 from tests.toml_text import toml
 from tests.window.editor.hand import Hand, OpenOn
@@ -151,13 +151,13 @@ def test_plate_folds_to_its_heading_and_unfolds(scene: Scene, result: CheckResul
     marks = CheckMarks()
     drawn(marks, scene, result)
     height = marks.rect.height
-    (heading,) = marks.rects_of(HEADING)
+    (heading,) = marks.rects_of(PlatePart.HEADING)
     assert click(marks, heading.center) == (True, None)
     assert marks.is_folded
     drawn(marks, scene, result)
     assert marks.rect.height < 0.4 * height
     assert marks.rect.bottomright == AREA.bottomright
-    (heading,) = marks.rects_of(HEADING)
+    (heading,) = marks.rects_of(PlatePart.HEADING)
     click(marks, heading.center)
     drawn(marks, scene, result)
     assert marks.rect.height == height
@@ -187,7 +187,7 @@ def test_further_warnings_are_listed_in_turn(scene: Scene) -> None:
     for _ in range(4):
         drawn(marks, scene, many)
         found |= {mark.message for mark in many.marks if marks.rects_of(mark)}
-        (more,) = marks.rects_of(MORE)
+        (more,) = marks.rects_of(PlatePart.MORE)
         click(marks, more.center)
     assert len(found) == 12
 
@@ -195,7 +195,7 @@ def test_further_warnings_are_listed_in_turn(scene: Scene) -> None:
 def test_lost_release_does_not_take_the_next_one(scene: Scene, result: CheckResult) -> None:
     marks = CheckMarks()
     drawn(marks, scene, result)
-    marks.handle_event(press(*marks.rects_of(HEADING)[0].center))
+    marks.handle_event(press(*marks.rects_of(PlatePart.HEADING)[0].center))
     assert marks.handle_event(press(500, 100)) == (False, None)
     assert marks.handle_event(release(500, 100)) == (False, None)
     assert not marks.is_folded
@@ -225,8 +225,8 @@ def test_nothing_is_drawn_outside_the_area(
             marks.handle_event(move(*rect.center))
             assert_only_within(drawn(marks, scene, result, area, ui_scale, size), area)
             assert marks.card.width == 0 or area.contains(marks.card)
-    for name, _ in result.engines:
-        for rect in marks.rects_of(f"chip {name}"):
+    for engine in result.engines:
+        for rect in marks.rects_of(EngineChip(*engine)):
             marks.handle_event(move(*rect.center))
             assert_only_within(drawn(marks, scene, result, area, ui_scale, size), area)
 
@@ -284,7 +284,7 @@ def test_plate_leaves_the_toolbar_the_file_and_messages_free(open_on: OpenOn) ->
     assert not view.check_marks.rect.colliderect(view.actions.rect)
     assert hand.window.context.gui.area.contains(view.check_marks.rect)
     assert view.editor.selection == []
-    center = view.check_marks.rects_of(HEADING)[0].center
+    center = view.check_marks.rects_of(PlatePart.HEADING)[0].center
     hand.frame(move(*center), press(*center), release(*center))
     assert view.check_marks.is_folded
     assert view.editor.selection == []

@@ -3,7 +3,7 @@
 import pygame
 import pytest
 
-from sandbox.window.input.keymap import BINDINGS, GLOBAL, Command, Keyboard, command_for
+from sandbox.window.input.keymap import GLOBAL, Command, Keyboard, command_for
 from sandbox.window.playback.snapshot import OVERLAYS
 from tests.window.pressing import FOCUS_LOST, key, key_up
 
@@ -31,7 +31,7 @@ def test_some_keys_have_the_commands_of_the_documentation() -> None:
 
 def test_key_gives_its_command_by_code_and_by_character_with_exactly_its_modifiers() -> None:
     """Ctrl gives only the commands bound to it, at either Ctrl key; Alt and Meta leave a key to the system."""
-    bound = {(code, binding.modifiers): binding.command for binding in BINDINGS for code in binding.keys}
+    bound = {(code, command.modifiers): command for command in Command for code in command.keys}
     for code in {code for code, _ in bound}:
         for event in (key(code), key(code, unicode=typed(code))):
             assert command_for(event) == bound.get((code, 0))
@@ -56,7 +56,7 @@ def test_shift_and_b_add_a_box(mod: int) -> None:
 
 
 def test_claimed_keys_give_no_command_except_global_ones() -> None:
-    every = frozenset(code for binding in BINDINGS for code in binding.keys)
+    every = frozenset(code for command in Command for code in command.keys)
     for character in (lambda _: "", typed):
         kept = {code for code in every if command_for(key(code, unicode=character(code)), every) is not None}
         assert kept == GLOBAL == {pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE}
@@ -97,9 +97,9 @@ def test_other_events_and_keys_give_no_command() -> None:
     assert command_for(key(pygame.K_q, unicode="q")) is None
 
 
-def test_every_command_has_a_binding_and_every_key_one_command() -> None:
-    assert {binding.command for binding in BINDINGS} == set(Command)
-    bound = [(code, binding.modifiers) for binding in BINDINGS for code in binding.keys]
+def test_every_command_has_a_key_and_every_key_one_command() -> None:
+    assert all(command.keys for command in Command)
+    bound = [(code, command.modifiers) for command in Command for code in command.keys]
     assert len(bound) == len(set(bound))
 
 
@@ -111,13 +111,13 @@ def test_overlay_commands_follow_the_order_of_overlays() -> None:
 
 def test_only_step_and_speed_keys_repeat() -> None:
     repeating = {Command.STEP, Command.BACK, Command.SLOWER, Command.FASTER}
-    for binding in BINDINGS:
+    for command in Command:
         keyboard = Keyboard()
-        event = key(binding.keys[0], binding.modifiers)
-        assert keyboard.command(event) == binding.command
-        assert keyboard.command(event) == (binding.command if binding.command in repeating else None)
-        assert keyboard.command(key_up(binding.keys[0])) is None
-        assert keyboard.command(event) == binding.command
+        event = key(command.keys[0], command.modifiers)
+        assert keyboard.command(event) == command
+        assert keyboard.command(event) == (command if command in repeating else None)
+        assert keyboard.command(key_up(command.keys[0])) is None
+        assert keyboard.command(event) == command
 
 
 def test_repeat_of_a_claimed_key_is_detected() -> None:

@@ -5,7 +5,7 @@ import pygame
 import pytest
 
 from sandbox.window.render.circles import (
-    LARGEST,
+    MAX_SPRITE_RADIUS,
     SPRITE_BUDGET,
     CircleRenderer,
     CircleStyle,
@@ -25,7 +25,7 @@ def disc(
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 
-@pytest.mark.parametrize("radius", [3.0, 4.7, 10.0, 33.3, LARGEST, 120.0])
+@pytest.mark.parametrize("radius", [3.0, 4.7, 10.0, 33.3, MAX_SPRITE_RADIUS, 120.0])
 @pytest.mark.parametrize("offset", [0.0, 0.25, 0.4])
 def test_antialiased_disc_has_its_area_and_centre(radius, offset):
     picture = disc(150.0 + offset, 150.0 - offset, radius)

@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sandbox.window.camera import Camera
-from sandbox.window.render.canvas import Canvas
-from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, step_of
+from sandbox.window.render.draw_context import Canvas
+from sandbox.window.render.grid import MIN_LINE_SPACING, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
 from tests.window.render.drawn import CAMERA, SIZE, changed_pixels, colour_at, render, scene, snapshot
@@ -163,7 +163,7 @@ def test_grid_step_is_1_2_or_5_times_a_power_of_ten_and_wide_enough(power, ui_sc
     assert f"{step:.0e}"[0] in "125"
     assert step == pytest.approx(float(f"{step:.0e}"))
     assert (
-        NARROWEST * ui_scale * (1 - 1e-9) <= step * 10.0**power <= 2.5 * NARROWEST * ui_scale * (1 + 1e-9)
+        MIN_LINE_SPACING * ui_scale * (1 - 1e-9) <= step * 10.0**power <= 2.5 * MIN_LINE_SPACING * ui_scale * (1 + 1e-9)
     )  # rounding
 
 

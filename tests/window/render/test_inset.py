@@ -8,7 +8,7 @@ from sandbox.scene.files.load import from_document
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import hex_colour
-from sandbox.window.render.renderer import HIGH, WIDE, InsetRenderer, Renderer
+from sandbox.window.render.renderer import MAX_INSET_HEIGHT, MAX_INSET_WIDTH, InsetRenderer, Renderer
 from tests.window.render.drawn import frame
 
 SIZE = (800, 600)
@@ -39,8 +39,8 @@ def test_inset_shows_its_region_enlarged_in_the_corner() -> None:
     before, after, rect = render(scene([[8.0, -0.5], [10.0, 0.5]]), wide_camera())
     assert rect is not None
     assert FREE.contains(rect)
-    assert rect.width <= WIDE * FREE.width + 1
-    assert rect.height <= HIGH * FREE.height + 1
+    assert rect.width <= MAX_INSET_WIDTH * FREE.width + 1
+    assert rect.height <= MAX_INSET_HEIGHT * FREE.height + 1
     assert abs(rect.width - 2 * rect.height) <= 2  # px: it has the aspect ratio of its region
     red = np.array(hex_colour(COLOUR))
     inside = after[rect.left : rect.right, rect.top : rect.bottom]

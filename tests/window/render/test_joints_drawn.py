@@ -10,7 +10,7 @@ from sandbox.engines.common import kernel
 from sandbox.scene.compile.scene import Scene
 from sandbox.window.render import kernels
 from sandbox.window.render import lines as module
-from sandbox.window.render.joints import COILED, SHADES, JointSegments, strain
+from sandbox.window.render.joints import MAX_ZIGZAG_SPRINGS, SHADES, JointSegments, strain
 from sandbox.window.render.lines import draw_thin_lines
 from sandbox.window.render.palette import BACKGROUND, ORANGE, SKY
 from tests.window.render.drawn import CAMERA, ball, changed_pixels, colour_at, frame, render, scene, snapshot
@@ -124,7 +124,7 @@ def test_strain_colours_go_from_blue_over_grey_to_orange():
 def test_springs_of_a_cloth_are_lines():
     grid = {"corner": [-4.0, 4.0], "columns": 20, "rows": 16, "spacing": [0.4, 0.4], "radius": 0.001}
     model = scene(cloth=[grid | {"name": "rag", "stiffness": 1.0, "mass": 1.0}])
-    assert len(model.joint_arrays) > COILED
+    assert len(model.joint_arrays) > MAX_ZIGZAG_SPRINGS
     picture = render(snapshot(model))
     differ = changed_pixels(picture, render(snapshot(scene(world={}))))
     assert differ[21:170, 68].all(), "a row of it, from its left to its right"

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as st_numpy
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.camera import Camera
 from sandbox.window.render import particles as module
-from sandbox.window.render.particles import SHADES, LifetimeColours, ParticleRenderer, fade_colours, packed_pixels
+from sandbox.window.render.particles import SHADE_COUNT, LifetimeColours, ParticleRenderer, fade_colours, packed_pixels
 from tests.window.render.drawn import colour_at, frame, render, scene, snapshot
 
 CAMERA = Camera((3.0, -2.0), 10.0, (64, 48))
@@ -158,7 +158,7 @@ def drawn_colour(model, time: float, x: float = 0.0, bodies: Bodies | None = Non
 
 def test_fade_colours_are_evenly_spaced_and_reach_both_ends():
     shades = fade_colours(("#ff0000", "#00ff00", "#0000ff")).astype(int)
-    assert len(shades) == SHADES
+    assert len(shades) == SHADE_COUNT
     assert shades[0].tolist() == [255, 0, 0]
     assert shades[-1].tolist() == [0, 0, 255]
     assert (np.abs(shades.sum(axis=1) - 255) <= 1).all()  # each channel is rounded to a whole number

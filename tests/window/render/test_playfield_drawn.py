@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sandbox.games.pinball import view
 from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera
-from sandbox.window.render.lamps import GLOW, MAX_LAMP_RADIUS, RADIUS
+from sandbox.window.render.lamps import GLOW_RADIUS, LAMP_RADIUS, MAX_LAMP_RADIUS
 from sandbox.window.render.lines import clip_polygon
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
@@ -110,14 +110,14 @@ def test_lit_lamp_is_bright_and_its_glow_fades_to_zero(ground: str) -> None:
     assert dark[0][0] > 16 + 30  # brighter than the marking
     assert dark[0].max() < 130
     more = (lit - dark).sum(axis=1)
-    edge, end = round(RADIUS * SCALE) + 3, round(GLOW * RADIUS * SCALE) + 2
+    edge, end = round(LAMP_RADIUS * SCALE) + 3, round(GLOW_RADIUS * LAMP_RADIUS * SCALE) + 2
     assert more[edge] > 100
     assert (np.diff(more[edge:end]) <= 0).all()
     assert (more[end:] == 0).all()
 
 
 def test_lamp_has_the_colour_of_its_part() -> None:
-    red, green, blue = row_colours(lamps(colour="#20ff40"), "post-1")[round(RADIUS * SCALE) + 3]
+    red, green, blue = row_colours(lamps(colour="#20ff40"), "post-1")[round(LAMP_RADIUS * SCALE) + 3]
     assert green > max(red, blue) + 60
 
 
@@ -141,7 +141,7 @@ def test_background_is_cached_while_lamps_change(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.fail_slow(60)  # takes over half a second
-@pytest.mark.parametrize("scale", [1e-12, 1.0, MAX_LAMP_RADIUS / RADIUS, 1e6, 1e12])
+@pytest.mark.parametrize("scale", [1e-12, 1.0, MAX_LAMP_RADIUS / LAMP_RADIUS, 1e6, 1e12])
 def test_lit_lamps_are_drawn_at_any_scale(scale: float) -> None:
     camera = Camera((0.0, 0.0), scale, SIZE)
     assert row_colours(lamps(), "post-1", camera=camera).shape == (SIZE[0] // 2, 3)

@@ -116,7 +116,7 @@ def draw_and_record(
     surface = pygame.Surface(size)
     hud.draw_box = record
     try:
-        draw_hud(surface, status, ui_scale, right=right)
+        draw_hud(surface, status, pygame.Rect(0, 0, surface.get_width() - right, surface.get_height()), ui_scale)
     finally:
         hud.draw_box = original
     return plates, surface
@@ -145,9 +145,10 @@ def test_newest_message_is_kept_in_a_tiny_window() -> None:
 
 def test_faults_are_drawn_at_the_centre_in_the_returned_rectangle() -> None:
     surface, middle = pygame.Surface((640, 480)), np.s_[300:340, 240:300]
-    assert draw_hud(surface, MINIMAL, 1.0).size == (0, 0)
+    assert "faults" not in draw_hud(surface, MINIMAL, surface.get_rect(), 1.0)
     assert not pygame.surfarray.array3d(surface)[middle].any()
-    assert draw_hud(surface, replace(MINIMAL, faults=("a.toml:3: ball: wrong",)), 1.0).collidepoint(320, 260)
+    faulty = replace(MINIMAL, faults=("a.toml:3: ball: wrong",))
+    assert draw_hud(surface, faulty, surface.get_rect(), 1.0)["faults"].collidepoint(320, 260)
     assert pygame.surfarray.array3d(surface)[middle].any()
 
 

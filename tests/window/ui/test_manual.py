@@ -5,16 +5,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.window.input.keymap import BINDINGS
+from sandbox.window.input.keymap import Command
 from sandbox.window.ui.help import SCENE_GROUP, HelpOverlay, help_groups
 from tests.window.pressing import key, press, wheel
 
 SCENE_KEYS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
 
 
-def test_help_lists_every_binding() -> None:
+def test_help_lists_every_command() -> None:
     listed = {line for group in help_groups() for line in group.lines}
-    assert {(binding.label, binding.about) for binding in BINDINGS} <= listed
+    assert {(command.label, command.about) for command in Command} <= listed
 
 
 def test_help_lists_the_actions_of_the_mouse() -> None:

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from sandbox.window.playback.parameters import Parameter
 from sandbox.window.playback.snapshot import OVERLAYS
-from sandbox.window.ui.panel import SidePanel
+from sandbox.window.ui.panel import BUTTONS, SidePanel
 from sandbox.window.ui.widgets import Checkbox, ParameterSlider, PushButton, Widget
 from tests.window.pressing import FOCUS_LOST, move, press, release, wheel
 
 SIZE = (1280, 800)
-BUTTONS = ("play", "step", "back", "restart", "camera", "record", "save")
+SHOWN = ("play", "step", "back", "restart", "camera", "record", "save")
 TOGGLES = dict.fromkeys((*OVERLAYS, "ghost", "trust", "sound", "antialias"), False)
 PARAMETERS = (
     Parameter("gravity", "gravity", -30, 30, -9.8, step=0.1, unit="m/s²", default=-9.8),
@@ -34,7 +34,7 @@ class RecordedPanel:
         self.panel.on_change = lambda key, value, final: self.calls.append(("change", key, value, final))
         self.panel.on_toggle = lambda name, on: self.calls.append(("toggle", name, on))
         self.panel.on_button = lambda name: self.calls.append(("button", name))
-        self.panel.show(PARAMETERS, TOGGLES, BUTTONS)
+        self.panel.show(PARAMETERS, TOGGLES, SHOWN)
 
     def find(self, name: str) -> Widget:
         for widget in self.panel.widgets:
@@ -50,10 +50,11 @@ class RecordedPanel:
 
 def test_click_on_any_widget_within_one_frame_makes_one_callback() -> None:
     recorded = RecordedPanel()
-    for name in (*BUTTONS, *TOGGLES, "integrator"):
+    for name in (*SHOWN, *TOGGLES, "integrator"):
         assert recorded.panel.handle_event(press(*recorded.centre(name)))
         assert recorded.panel.handle_event(release(*recorded.centre(name)))
-    buttons, toggles = [("button", name) for name in BUTTONS], [("toggle", name, True) for name in TOGGLES]
+    buttons = [("button", BUTTONS[name].command) for name in SHOWN]
+    toggles = [("toggle", name, True) for name in TOGGLES]
     assert recorded.calls == [*buttons, *toggles, ("change", "integrator", "a", True)]
 
 
@@ -85,9 +86,9 @@ def test_show_makes_no_callbacks_and_keeps_the_widgets() -> None:
     recorded = RecordedPanel()
     before = recorded.panel.widgets
     recorded.panel.show(
-        [*PARAMETERS[:2], Parameter("dt", "time step", 1e-3, 1, 0.5, log=True), PARAMETERS[3]], TOGGLES, BUTTONS
+        [*PARAMETERS[:2], Parameter("dt", "time step", 1e-3, 1, 0.5, log=True), PARAMETERS[3]], TOGGLES, SHOWN
     )
-    recorded.panel.show(PARAMETERS, {**TOGGLES, "trails": True}, ("pause", *BUTTONS[1:]))
+    recorded.panel.show(PARAMETERS, {**TOGGLES, "trails": True}, ("pause", *SHOWN[1:]))
     assert recorded.calls == []
     assert recorded.panel.widgets == before
     trails = recorded.find("trails")
@@ -99,7 +100,7 @@ def test_drag_continues_when_other_content_is_shown() -> None:
     recorded = RecordedPanel()
     x, y = recorded.centre("gravity")
     recorded.panel.handle_event(press(x, y))
-    recorded.panel.show(PARAMETERS, TOGGLES, ("pause", *BUTTONS[1:]))
+    recorded.panel.show(PARAMETERS, TOGGLES, ("pause", *SHOWN[1:]))
     recorded.panel.show(PARAMETERS[:3], {"trails": True}, ())  # another layout
     assert recorded.panel.handle_event(move(5000, y, held=True))
     recorded.panel.handle_event(release(5000, y))
@@ -195,7 +196,7 @@ def test_cached_picture_is_redrawn_after_a_change(change: str) -> None:
     else:
         name = "height" if change == "label" else "gravity"
         parameter = Parameter("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
-        buttons = ("pause" if change == "button" else "play", *BUTTONS[1:])
+        buttons = ("pause" if change == "button" else "play", *SHOWN[1:])
         panel.show((parameter, *PARAMETERS[1:]), {**TOGGLES, "shapes": change == "toggle"}, buttons)
     panel.draw(after)
     assert pygame.image.tobytes(before, "RGB") != pygame.image.tobytes(after, "RGB")
@@ -227,7 +228,7 @@ def test_widgets_do_not_overlap_and_stay_inside(size: tuple[int, int], unit: flo
 def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count: int) -> None:
     panel = SidePanel((width, height), unit)
     panel.visible = True  # a small window hides it
-    panel.show(PARAMETERS[:count], TOGGLES, BUTTONS)
+    panel.show(PARAMETERS[:count], TOGGLES, SHOWN)
     surface = pygame.Surface((width, height))
     panel.handle_event(move(width - 1, height // 2))
     panel.draw(surface)

@@ -16,7 +16,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.window.camera import Camera, ViewBox
-from sandbox.window.render.canvas import Canvas
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, RgbColour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
