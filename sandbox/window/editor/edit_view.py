@@ -16,21 +16,20 @@ from sandbox.scene.editing.elements import differ_in_places_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
-from sandbox.window.editor.draw_gestures import OutlineGesture
 from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, KEPT_IN_FIELDS, TYPED
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import location_of, property_sections
-from sandbox.window.editor.gestures import ViewScale
 from sandbox.window.editor.ghost_path import GhostPredictor
 from sandbox.window.editor.live_check import LiveCheck
 from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
 from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel
-from sandbox.window.editor.snapping import grid_step
+from sandbox.window.editor.snapping import ViewScale
 from sandbox.window.editor.toolbar import TOOLS, EditTool, Toolbar
 from sandbox.window.input.keymap import Command, latin_key
 from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
@@ -192,7 +191,7 @@ class EditView:
         elif key in (pygame.K_SPACE, pygame.K_p):
             self._leave()
         elif key in ARROWS:
-            step = grid_step(self.view_scale.scale, self.view_scale.ui_scale) * (10.0 if shift else 1.0)
+            step = self.view_scale.grid * (10.0 if shift else 1.0)
             x, y = ARROWS[key]
             self.editor.nudge((x * step, y * step))
         elif key in (pygame.K_DELETE, pygame.K_BACKSPACE):
@@ -212,17 +211,10 @@ class EditView:
         gesture = self.editor.gesture
         assert gesture is not None
         if key in (pygame.K_RETURN, pygame.K_KP_ENTER):
-            if isinstance(gesture, OutlineGesture) and gesture.typed:
-                gesture.click(gesture.end)
-            else:
-                self.editor.finish()
+            self.editor.confirm()
             return True
-        if key == pygame.K_BACKSPACE and gesture.typed:
-            self.editor.type_text(gesture.typed[:-1])
-            return True
-        if key == pygame.K_BACKSPACE and isinstance(gesture, OutlineGesture):
-            if not gesture.remove_corner():
-                self.editor.cancel()
+        if key == pygame.K_BACKSPACE and (gesture.typed or gesture.corners):
+            self.editor.take_back()
             return True
         name = pygame.key.name(key)
         return key == pygame.K_SPACE or (len(name) == 1 and name in TYPED)  # comes as text, too
@@ -413,7 +405,7 @@ class EditView:
         snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)
-        draw_overlay(surface, context.camera, editor, self.view_scale)
+        draw_overlay(Canvas(surface, context.camera, gui.ui_scale), editor, self.view_scale)
         area = gui.area
         self.toolbar.layout(area, gui.ui_scale)
         self._draw_check(surface, scene, area)
@@ -451,7 +443,7 @@ class EditView:
         body = None if self.editor.is_locked else self.editor.single_body
         self._ghost.submit(scene, body)
         if self._ghost.path is not None:
-            draw_ghost_path(surface, self._context.camera, self._ghost.path, self._context.gui.ui_scale)
+            draw_ghost_path(Canvas(surface, self._context.camera, self._context.gui.ui_scale), self._ghost.path)
         if self._ghost.fault is not None:
             self._context.app_state.messages.add(self._ghost.fault, "warning")
             self._ghost.fault = None
@@ -477,9 +469,8 @@ class EditView:
         size, pad = 13.0 * ui_scale, round(6 * ui_scale)
         path = self.draft.path
         name = ("new scene" if path is None else path.name) + (" ●" if self.draft.is_changed else "")
-        grid = grid_step(self.view_scale.scale, ui_scale)
         ghost = self._ghost.path
-        detail = f"grid {grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
+        detail = f"grid {self.view_scale.grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
         left, top = self.toolbar.rect.right + pad, self.toolbar.rect.top
         self.actions.layout_row((left, top), ui_scale)
         x = self.actions.rect.right + pad
