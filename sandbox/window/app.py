@@ -20,7 +20,7 @@ from sandbox.window.app_state import AppState
 from sandbox.window.commands import LOSE_DRAFT, CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
-from sandbox.window.editor.edit_keys import HELP_GROUPS
+from sandbox.window.editor.edit_keys import GLOBAL_KEYS, HELP_GROUPS, press_key
 from sandbox.window.editor.edit_view import EditView
 from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.clipboard import ClipboardError
@@ -51,13 +51,6 @@ MODIFIER_KEYS = frozenset(
 )
 """keys that have no command of their own"""
 
-NOT_REPEATED = frozenset(
-    {
-        *(pygame.K_ESCAPE, pygame.K_SPACE, pygame.K_p, pygame.K_e, pygame.K_s, pygame.K_o, pygame.K_r),
-        *(pygame.K_TAB, pygame.K_F1, pygame.K_h, pygame.K_F11),
-    }
-)
-"""keys of the editor that act only once while they are held; a held Esc must not clear the selection and then quit"""
 TOOLBAR_ZOOM = 0.9
 """zoom factor at which a fitted scene leaves room for the toolbar of the editor"""
 EMPTY_VIEW = (-6.0, -0.6), (6.0, 6.0)
@@ -330,9 +323,9 @@ class App:
 
     def _edit(self, editing: EditView, event: pygame.event.Event) -> None:
         """Pass an event to the editor; zoom, panning and Esc are those of the window."""
-        if event.type == pygame.KEYDOWN and latin_key(event) in NOT_REPEATED and self._keyboard.is_repeat:
+        if event.type == pygame.KEYDOWN and latin_key(event) in GLOBAL_KEYS and self._keyboard.is_repeat:
             return
-        if editing.handle_event(event):
+        if editing.handle_event(event) or (event.type == pygame.KEYDOWN and press_key(editing, event)):
             return
         if event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
             self.commands.run(Command.QUIT)

@@ -274,18 +274,19 @@ class Editor:
         if self.gesture is not None and self.gesture.confirm():
             self.finish()
 
-    def take_back(self) -> None:
-        """Remove the last character that was typed during a gesture, or else the last corner."""
+    def take_back(self) -> bool:
+        """Remove the last typed character of a gesture, else its last corner; return whether there was one."""
         gesture = self.gesture
-        if gesture is None:
-            return
+        if gesture is None or not (gesture.typed or gesture.corners):
+            return False
         if gesture.typed:
             self.type_text(gesture.typed[:-1])
-            return
+            return True
         self._preview = None
         gesture.corners.pop()
         if not gesture.corners:
             self.cancel()
+        return True
 
     def cancel(self) -> bool:
         """Cancel the gesture, else clear the selection, else choose the select tool; return whether any applied."""
