@@ -154,7 +154,7 @@ def session_of_recording(recording: Recording) -> LiveView:
         rules = None
     game = None if rules is None else GameSession(rules, recording.presses)
     session = Session.of_recording(recording, game)
-    session.mark_unsaved()
+    session.log.saved = ()
     live = LiveView(session)
     live.seek(round(recording.duration / session.settings.dt))
     return live
@@ -384,7 +384,7 @@ class AppState:
         if live is None or self.host is not None:
             return 0
         kept = SetParameter if restart else ()
-        actions = [action for action in live.session.unsaved_actions if not isinstance(action, kept)]
+        actions = [action for action in live.session.log.unsaved if not isinstance(action, kept)]
         return count_changes(actions, live.scene.play.arrows)
 
     def restore_session(self) -> None:
