@@ -11,7 +11,7 @@ from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at
-from sandbox.scene.geometry.vectors import nearest_fraction
+from sandbox.scene.geometry.vectors import offset_from_segment
 from sandbox.window.editor.picking import bounds_of, start_frame
 from sandbox.window.hit_test import hulls_of
 
@@ -171,29 +171,21 @@ def _ball_gaps(scene: Scene, keys: Collection[ElementKey], ball: int) -> Iterato
     """Yield the gap of a ball to each wall, post and other ball, m, and the direction from there to the ball."""
     bodies = scene.bodies
     centre, radius = bodies.position[ball], float(bodies.radius[ball])
-    nearest: list[tuple[FloatArray, float]] = []
+    offsets: list[tuple[FloatArray, float]] = []
     for k, wall in enumerate(scene.walls):
         if ElementKey("wall", k) not in keys:
-            ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
-            nearest += [
-                (_nearest_on_segment(np.asarray(a), np.asarray(b), centre), 0.5 * wall.thickness)
-                for a, b in zip(wall.points, ends, strict=False)
-            ]
-    nearest += [
-        (np.asarray(post.position), post.radius)
+            points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+            sides = offset_from_segment(centre, points[:-1], np.diff(points, axis=0))
+            offsets += [(offset, 0.5 * wall.thickness) for offset in sides]
+    offsets += [
+        (centre - np.asarray(post.position), post.radius)
         for k, post in enumerate(scene.posts)
         if ElementKey("post", k) not in keys
     ]
     others = np.flatnonzero(bodies.round & (np.hypot(*(bodies.position - centre).T) <= 2.0 * radius + bodies.radius))
-    nearest += [(bodies.position[k], float(bodies.radius[k])) for k in others.tolist() if k != ball]
-    for point, margin in nearest:
-        offset = centre - point
+    offsets += [(centre - bodies.position[k], float(bodies.radius[k])) for k in others.tolist() if k != ball]
+    for offset, margin in offsets:
         distance = float(np.hypot(*offset))
         if distance > 0.0:
             x, y = (offset / distance).tolist()
             yield distance - radius - margin, (x, y)
-
-
-def _nearest_on_segment(a: FloatArray, b: FloatArray, point: FloatArray) -> FloatArray:
-    """Return the point of a segment that is nearest to another, (2,) m."""
-    return np.asarray(a + nearest_fraction(*a.tolist(), *b.tolist(), *point.tolist()) * (b - a))
