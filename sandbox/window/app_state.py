@@ -28,7 +28,7 @@ from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, 
 from sandbox.window.input.body_tools import BodyTools, count_changes
 from sandbox.window.playback.diagnostics import GHOST_ENGINES, Diagnostics
 from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.parameters import ParameterValue, turned
+from sandbox.window.playback.parameters import ParameterValue, parameter_actions
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.session import Session
 from sandbox.window.view_bounds import predict_bounds
@@ -505,7 +505,7 @@ class AppState:
             return
 
         def apply() -> None:
-            for action in turned(live, key, value, self.body_tools.picked_index(live)):
+            for action in parameter_actions(live, key, value, self.body_tools.picked_index(live)):
                 live.apply(action)
                 if isinstance(action, SetParameter):
                     self._preferences.store_parameter(action)

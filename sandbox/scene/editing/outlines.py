@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sandbox.arrays import FloatArray
 from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.vectors import offset_from_segment
 
 
 def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
@@ -29,7 +29,8 @@ def simplified(points: Sequence[Point], tolerance: float) -> list[Point]:
         first, last = open_parts.pop()
         if last - first < 2:
             continue
-        distance = _distances(line[first + 1 : last], line[first], line[last])
+        offset = offset_from_segment(line[first + 1 : last], line[first], line[last] - line[first])
+        distance = np.hypot(offset[:, 0], offset[:, 1])
         farthest = int(np.argmax(distance))
         if distance[farthest] > tolerance:
             middle = first + 1 + farthest
@@ -52,13 +53,3 @@ def simplified_loop(points: Sequence[Point], tolerance: float) -> list[Point]:
     first = simplified(points[: split + 1], tolerance)
     second = simplified([*points[split:], points[0]], tolerance)
     return [*first[:-1], *second[:-1]]
-
-
-def _distances(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the distances of points, (K, 2) m, from the segment between two others, (K,) m."""
-    along = b - a
-    squared = float(along @ along)
-    if squared == 0.0:
-        return np.asarray(np.hypot(*(points - a).T))
-    fraction = np.clip((points - a) @ along / squared, 0.0, 1.0)
-    return np.asarray(np.hypot(*(points - a - fraction[:, None] * along).T))

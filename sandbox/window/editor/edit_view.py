@@ -12,7 +12,7 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import differ_in_places_only
+from sandbox.scene.editing.elements import differ_in_poses_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
@@ -328,7 +328,7 @@ class EditView:
         scene = editor.scene
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
         # While bodies are dragged, only the frame differs, so that the renderer need not prepare the scene again.
-        drawn = self.draft.scene if differ_in_places_only(scene, self.draft.scene) else scene
+        drawn = self.draft.scene if differ_in_poses_only(scene, self.draft.scene) else scene
         snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)

@@ -7,19 +7,25 @@ from typing import Any, Literal
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
+from sandbox.scene.editing.clipboard import CopiedElement, copy_elements, paste_elements, paste_shift
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import (
     ElementKey,
     all_elements,
     bodies_of,
-    counted,
+    describe_elements,
     exists,
     name_of,
-    removal,
+    removal_changes,
 )
-from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
-from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, mirroring, transformation
+from sandbox.scene.editing.take_apart import TakeApartError, take_apart_changes
+from sandbox.scene.editing.transforms import (
+    AlignmentSide,
+    Similarity,
+    alignment_shift,
+    mirror_transform,
+    transform_elements,
+)
 from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import (
     AddElement,
@@ -306,7 +312,7 @@ class Editor:
         key = pick_element(self.draft.scene, point, view.metres(PICK_REACH))
         if key is not None and (self.is_dragging is False or key.table != "plane"):
             self.selection = []
-            self.apply(removal(self.draft.scene, [key]), f"erase {name_of(self.draft.scene, key)}")
+            self.apply(removal_changes(self.draft.scene, [key]), f"erase {name_of(self.draft.scene, key)}")
             self.hovered = None
 
     # --- Operations ----------------------------------------------------------------------------------------------
@@ -337,7 +343,7 @@ class Editor:
         keys = self._selection_or_note()
         if keys:
             self.selection = []
-            if not self.apply(removal(self.draft.scene, keys), f"delete {counted(keys)}"):
+            if not self.apply(removal_changes(self.draft.scene, keys), f"delete {describe_elements(keys)}"):
                 self.selection = keys
 
     def select_all(self) -> None:
@@ -352,7 +358,7 @@ class Editor:
         """Copy the selection."""
         keys = self._selection_or_note()
         if keys:
-            self._clip, self._pastes = copied(self.draft.scene, keys), 0
+            self._clip, self._pastes = copy_elements(self.draft.scene, keys), 0
 
     def cut(self) -> None:
         """Copy and delete the selection."""
@@ -373,27 +379,27 @@ class Editor:
         keys = self._selection_or_note()
         if keys:
             shift = paste_shift(view.grid, 1)
-            self._add_copies(copied(self.draft.scene, keys), shift, "duplicate")
+            self._add_copies(copy_elements(self.draft.scene, keys), shift, "duplicate")
 
     def _add_copies(self, elements: tuple[CopiedElement, ...], shift: Point, label: str) -> None:
-        changes, keys = pasting(self.draft.scene, elements, Similarity(shift=shift))
-        if changes and self.apply(changes, f"{label} {counted(keys)}"):
+        changes, keys = paste_elements(self.draft.scene, elements, Similarity(shift=shift))
+        if changes and self.apply(changes, f"{label} {describe_elements(keys)}"):
             self.tool = "select"
             self.selection = [key for key in keys if key.table not in ("drive",)]
 
     def nudge(self, shift: Point) -> None:
         """Move the selection by a vector, m."""
         if self.selection:
-            values = transformation(self.draft.scene, self.selection, Similarity(shift=shift))
-            self.apply(set_values(values), f"move {counted(self.selection)}", "nudge")
+            values = transform_elements(self.draft.scene, self.selection, Similarity(shift=shift))
+            self.apply(set_values(values), f"move {describe_elements(self.selection)}", "nudge")
 
     def mirror(self, *, is_vertical: bool = False) -> None:
         """Mirror the selection about the middle of its box, left and right or up and down."""
         box = self.selection_bounds(self.draft.scene)
         if box is None or not self._selection_or_note():
             return
-        values = transformation(self.draft.scene, self.selection, mirroring(box, is_vertical=is_vertical))
-        self.apply(set_values(values), f"mirror {counted(self.selection)}")
+        values = transform_elements(self.draft.scene, self.selection, mirror_transform(box, is_vertical=is_vertical))
+        self.apply(set_values(values), f"mirror {describe_elements(self.selection)}")
 
     def align(self, side: AlignmentSide) -> None:
         """Align the selected elements by a side of their boxes, with the box of all of them."""
@@ -405,8 +411,8 @@ class Editor:
         for key in self.selection:
             own = bounds_of(self.draft.scene, key)
             if own is not None:
-                values |= transformation(self.draft.scene, [key], Similarity(shift=alignment(own, box, side)))
-        self.apply(set_values(values), f"align {counted(self.selection)}")
+                values |= transform_elements(self.draft.scene, [key], Similarity(shift=alignment_shift(own, box, side)))
+        self.apply(set_values(values), f"align {describe_elements(self.selection)}")
 
     def reorder(self, step: Literal[-1, 1]) -> None:
         """Exchange the selected element with the next (1) or the previous one (−1) of its table.
@@ -463,12 +469,12 @@ class Editor:
     def _take_elements_apart(self) -> None:
         keys = self._selection_or_note()
         try:
-            changes = taking_apart(self.draft.scene, keys)
+            changes = take_apart_changes(self.draft.scene, keys)
         except TakeApartError as error:
             self._notify(str(error), "warning")
             return
-        are_walls = all(key.table == "wall" for key in keys)
-        if keys and self.apply(changes, f"divide {counted(keys)}" if are_walls else f"take {counted(keys)} apart"):
+        are_walls, described = all(key.table == "wall" for key in keys), describe_elements(keys)
+        if keys and self.apply(changes, f"divide {described}" if are_walls else f"take {described} apart"):
             self.selection = []
             parts = sum(isinstance(change, AddElement) for change in changes)
             walls = f"divided into {parts + len(keys)} walls of two points"
@@ -484,7 +490,7 @@ class Editor:
     def set_property(self, keys: Collection[ElementKey], name: str, value: Any) -> str | None:
         """Set a key of elements, as `element_changes` does; return the message of a fault, or None."""
         changes = element_changes(self.draft.scene, self.draft.document, keys, name, value)
-        return self._change_property(changes, f"set {name} of {counted(list(keys))}", name)
+        return self._change_property(changes, f"set {name} of {describe_elements(list(keys))}", name)
 
     def set_value(self, location: Location, name: str, value: Any) -> str | None:
         """Set a key of a table at a location, as `table_changes` does; return the message of a fault, or None."""

@@ -5,7 +5,14 @@ from typing import Any, cast
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Point
-from sandbox.scene.editing.elements import ElementKey, all_names, element_at, element_of_body, naming, unique_name
+from sandbox.scene.editing.elements import (
+    ElementKey,
+    all_names,
+    element_at,
+    element_of_body,
+    naming_changes,
+    unique_name,
+)
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture, typed_numbers
@@ -74,7 +81,7 @@ class ThrustGesture(Gesture):
         values: dict[str, Any] = {"name": self.name, "body": body, "force": [x + 0.0 for x in own]}
         if any(point):
             values["point"] = point
-        return [*naming(self.scene, self._body), AddElement("thrust", values)]
+        return [*naming_changes(self.scene, self._body), AddElement("thrust", values)]
 
     def dimensions(self) -> str:
         """Return the magnitude of the force."""
@@ -105,7 +112,7 @@ class AttractionGesture(Gesture):
             "strength": float(f"{ATTRACTION * (0.25 * size) ** 2:.2g}"),
             "softening": float(f"{0.02 * size:.1g}"),
         }
-        return [*(naming(scene, found[0]) if found else ()), AddElement("attraction", values)]
+        return [*(naming_changes(scene, found[0]) if found else ()), AddElement("attraction", values)]
 
     @property
     def selects(self) -> list[ElementKey] | None:
@@ -173,7 +180,7 @@ class FlipperGesture(DriveGesture):
             "torque": float(f"{moment * 2.0 * SWING / STROKE_TIME**2:.2g}"),
             "bounce": 0.2,
         }
-        return [*naming(scene, body), AddElement("drive", values)]
+        return [*naming_changes(scene, body), AddElement("drive", values)]
 
 
 class PlungerGesture(DriveGesture):
@@ -207,7 +214,7 @@ class PlungerGesture(DriveGesture):
             "travel": travel,
             "speed": float(f"{PLUNGER_RATE * travel:.2g}"),
         }
-        return [*naming(self.scene, self.body), AddElement("drive", values)]
+        return [*naming_changes(self.scene, self.body), AddElement("drive", values)]
 
     def dimensions(self) -> str:
         """Return the length of the pull."""

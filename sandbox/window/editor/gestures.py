@@ -19,7 +19,7 @@ from sandbox.scene.editing.elements import (
     with_elements,
     with_moved_bodies,
 )
-from sandbox.scene.editing.transforms import Similarity, plain_value, round_value, transformation
+from sandbox.scene.editing.transforms import Similarity, plain_value, round_value, transform_elements
 from sandbox.scene.files.toml_changes import Change, SetValue
 from sandbox.window.editor.picking import elements_within
 from sandbox.window.editor.snapping import Pointer, SnappedPoint, anchor_of, snap_point, surface_shift
@@ -126,7 +126,7 @@ class TransformGesture(Gesture):
 
     def values(self) -> Mapping[ElementKey, dict[str, Any]]:
         """Return the new values of each element."""
-        return transformation(self.scene, self.keys, self.by)
+        return transform_elements(self.scene, self.keys, self.by)
 
     def preview(self) -> Scene:
         """Return the scene with the elements transformed."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import all_names, naming, unique_name
+from sandbox.scene.editing.elements import all_names, naming_changes, unique_name
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
@@ -199,7 +199,7 @@ def _names(scene: Scene, bodies: list[int]) -> tuple[list[str], list[Change]]:
     names, changes = [], list[Change]()
     for body in bodies:
         names.append(scene.bodies.names[body])
-        changes += [change for change in naming(scene, body) if change not in changes]
+        changes += [change for change in naming_changes(scene, body) if change not in changes]
     return names, changes
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.editing.outlines import simplified, simplified_loop
-from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
+from sandbox.scene.editing.take_apart import TakeApartError, take_apart_changes
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import with_changes
 
@@ -70,7 +70,7 @@ colour = "#ff0000"
 
 def test_generators_taken_apart_start_as_before() -> None:
     before = loads(TEXT)
-    text = with_changes(TEXT, taking_apart(before, [ElementKey("stack", 0), ElementKey("grid", 0)]))
+    text = with_changes(TEXT, take_apart_changes(before, [ElementKey("stack", 0), ElementKey("grid", 0)]))
     after = loads(text)
     assert (after.grids, after.stacks, len(after.balls), len(after.boxes)) == ((), (), 4, 4)
     assert sorted(after.bodies.names) == sorted(before.bodies.names)
@@ -100,7 +100,7 @@ points = [[7, 7], [8, 8]]
 
 def test_walls_are_divided_at_their_corners_and_keep_all_else() -> None:
     before = loads(WALLS)
-    text = with_changes(WALLS, taking_apart(before, [ElementKey("wall", 0), ElementKey("wall", 1)]))
+    text = with_changes(WALLS, take_apart_changes(before, [ElementKey("wall", 0), ElementKey("wall", 1)]))
     after = loads(text)
     assert 'name = "fence"  # kept' in text
     assert [(wall.name, wall.points) for wall in after.walls] == [
@@ -118,10 +118,10 @@ def test_walls_are_divided_at_their_corners_and_keep_all_else() -> None:
     for k in (1, 5, 6):
         assert (after.walls[k].friction, after.walls[k].thickness) == (0.5, 0.1)
     with pytest.raises(TakeApartError, match="two points"):
-        taking_apart(before, [ElementKey("wall", 2)])
+        take_apart_changes(before, [ElementKey("wall", 2)])
 
 
 def test_other_elements_cannot_be_taken_apart() -> None:
     scene = loads(TEXT + '[[ball]]\nname = "a"\nposition = [9, 9]\nradius = 1\n')
     with pytest.raises(TakeApartError, match="cannot be taken apart"):
-        taking_apart(scene, [ElementKey("ball", 0)])
+        take_apart_changes(scene, [ElementKey("ball", 0)])
