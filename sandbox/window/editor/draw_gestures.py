@@ -13,9 +13,9 @@ from sandbox.scene.description.bodies import Box, Capsule, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.editing.elements import FIELD_OF, ElementKey, all_names, elements_of_table, unique_name
-from sandbox.scene.editing.outlines import simplified, simplified_loop
 from sandbox.scene.editing.transforms import plain_value, round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
+from sandbox.scene.geometry.polyline import simplify_loop, simplify_polyline
 from sandbox.window.editor.gestures import Gesture, typed_numbers
 from sandbox.window.editor.snapping import REACH, Pointer, rounded
 from sandbox.window.render.canvas import Canvas
@@ -246,7 +246,7 @@ class OutlineGesture(DrawGesture):
         near = math.dist(self._freehand[0], point) <= self._reach and len(self._freehand) > 8
         self.is_closed = near or self.table != "wall"
         points = self._freehand[:-1] if near else self._freehand
-        self.corners = (simplified_loop if self.is_closed else simplified)(points, tolerance)
+        self.corners = (simplify_loop if self.is_closed else simplify_polyline)(points, tolerance)
         self.end = self.corners[-1]
 
     def click(self, pointer: Pointer) -> bool:
