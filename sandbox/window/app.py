@@ -17,10 +17,10 @@ from sandbox.scene.editing.draft import NEW_SCENE, SceneDraft
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps
 from sandbox.window.app_state import AppState
-from sandbox.window.commands import LOSE_DRAFT, CommandDispatcher
+from sandbox.window.commands import CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
-from sandbox.window.editor.edit_keys import HELP_GROUPS
+from sandbox.window.editor.edit_keys import GLOBAL_KEYS, HELP_GROUPS, press_key
 from sandbox.window.editor.edit_view import EditView
 from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.clipboard import ClipboardError
@@ -51,13 +51,6 @@ MODIFIER_KEYS = frozenset(
 )
 """keys that have no command of their own"""
 
-NOT_REPEATED = frozenset(
-    {
-        *(pygame.K_ESCAPE, pygame.K_SPACE, pygame.K_p, pygame.K_e, pygame.K_s, pygame.K_o, pygame.K_r),
-        *(pygame.K_TAB, pygame.K_F1, pygame.K_h, pygame.K_F11),
-    }
-)
-"""keys of the editor that act only once while they are held; a held Esc must not clear the selection and then quit"""
 TOOLBAR_ZOOM = 0.9
 """zoom factor at which a fitted scene leaves room for the toolbar of the editor"""
 EMPTY_VIEW = (-6.0, -0.6), (6.0, 6.0)
@@ -126,7 +119,17 @@ class App:
         """the editor of the open scene, which was left to run it"""
         self.commands.on_edit = self.start_editing
         self._folder = folder or Path()
-        self._asked: Command | None = None  # command that the last event may have confirmed
+        self._command: Command | None = None  # of the last event
+        self._layers: tuple[Callable[[pygame.event.Event], object], ...] = (
+            self._start_game,
+            self._use_gamepad,
+            self._edit,
+            lambda event: self.context.gui.handle_event(event, app_state),
+            self._run_command,
+            self._press_key,
+            self.mouse.handle_event,
+        )
+        """functions that return whether they have used an event, the topmost first"""
         self._clock = pygame.time.Clock()
         app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
@@ -232,45 +235,41 @@ class App:
         pygame.event.pump()  # keeps the window manager from marking the window as unresponsive
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Handle an event; a message says so if it needs the clipboard and the system gives no access to it."""
+        """Handle an event: note what it means for the window and the keyboard, and pass it to the layers."""
         try:
-            self._dispatch(event)
-        except ClipboardError as error:
+            self._handle_window_event(event)
+            self._command = self._keyboard.command(event, self.app_state.key_bindings.pressed.keys())
+            self._withdraw_question(event)
+            self._release_keys(event)
+            for handle in self._layers:
+                if handle(event):
+                    return
+        except ClipboardError as error:  # the system gives no access to the clipboard
             self.app_state.messages.add(str(error), "warning")
 
-    def _dispatch(self, event: pygame.event.Event) -> None:
-        """Handle an event: window events, start of a game, gamepads, then keys and mouse, topmost part first."""
-        app_state, gui = self.app_state, self.context.gui
-        if self.context.exit_status is None:
-            self._asked = self.commands.pending
+    def _handle_window_event(self, event: pygame.event.Event) -> None:
         if event.type == pygame.QUIT:
             self.commands.run(Command.QUIT)
         elif event.type == pygame.WINDOWFOCUSLOST:
-            app_state.unfocused = True
+            self.app_state.unfocused = True
         elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
-            app_state.unfocused = False
+            self.app_state.unfocused = False
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
-            self._resize()
-        if self._starts_game(event):
-            app_state.start_game()
-            return
-        if event.type in GAMEPAD_EVENTS:
-            for error in self._gamepads.handle_event(event, app_state.host, lambda: self.commands.run(Command.PAUSE)):
-                app_state.messages.add(str(error), "warning")
-        command = self._keyboard.command(event, app_state.key_bindings.pressed.keys())
-        self._cancel_confirmation(event, command)
-        self._release_keys(event)
-        if self.editing is not None and not gui.covers_scene:
-            self._edit(self.editing, event)
-            return
-        if gui.handle_event(event, app_state):
-            return
-        if command is not None:
-            self.commands.run(command)
-        elif event.type == pygame.KEYDOWN:
-            self._press_key(event)
-        else:
-            self.mouse.handle_event(event)
+            surface = pygame.display.get_surface()
+            if surface is not None and surface.get_size() != self.context.camera.size:
+                self.context.resize(surface)
+
+    def _use_gamepad(self, event: pygame.event.Event) -> bool:
+        if event.type not in GAMEPAD_EVENTS:
+            return False
+        for error in self._gamepads.handle_event(event, self.app_state.host, lambda: self.commands.run(Command.PAUSE)):
+            self.app_state.messages.add(str(error), "warning")
+        return True
+
+    def _run_command(self, _: pygame.event.Event) -> bool:
+        if self._command is not None:
+            self.commands.run(self._command)
+        return self._command is not None
 
     def start_editing(self) -> None:
         """Edit the open scene, or go on editing it; without a scene, a new one with a ground."""
@@ -328,13 +327,16 @@ class App:
             self.editing = editing  # no engine can run it, which a message says
         self._edited = editing
 
-    def _edit(self, editing: EditView, event: pygame.event.Event) -> None:
+    def _edit(self, event: pygame.event.Event) -> bool:
         """Pass an event to the editor; zoom, panning and Esc are those of the window."""
-        if event.type == pygame.KEYDOWN and latin_key(event) in NOT_REPEATED and self._keyboard.is_repeat:
-            return
-        if editing.handle_event(event):
-            return
-        if event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE:
+        editing, is_key = self.editing, event.type == pygame.KEYDOWN
+        if editing is None or self.context.gui.covers_scene:
+            return False
+        if is_key and latin_key(event) in GLOBAL_KEYS and self._keyboard.is_repeat:
+            return True
+        if editing.handle_event(event) or (is_key and press_key(editing, event)):
+            return True
+        if is_key and event.key == pygame.K_ESCAPE:
             self.commands.run(Command.QUIT)
         elif (
             event.type in (pygame.MOUSEWHEEL, pygame.WINDOWFOCUSLOST)
@@ -342,6 +344,7 @@ class App:
             or (event.type == pygame.MOUSEMOTION and self.mouse.is_panning)
         ):
             self.mouse.handle_event(event)
+        return True
 
     def _draw_editing(self, editing: EditView) -> None:
         """Draw the scene that is edited, and what covers it."""
@@ -353,38 +356,42 @@ class App:
             size = 16 * context.gui.ui_scale
             draw_notice(context.surface, self.app_state.question, context.gui.area, size, ORANGE)
 
-    def _press_key(self, event: pygame.event.Event) -> None:
+    def _press_key(self, event: pygame.event.Event) -> bool:
         """Run the handler that the scene or its game binds to a key."""
+        if event.type != pygame.KEYDOWN:
+            return False
         if self.app_state.waits_for_start or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
-            return
+            return True
         bindings = self.app_state.key_bindings
         key = bound_key(event, bindings.pressed.keys())
         if key is not None and (key in bindings.repeated or not self._keyboard.is_repeat):
             self.app_state.run_handler(bindings.pressed[key])
             if key in bindings.released:
                 self._release_handlers[pressed_key(event)] = bindings.released[key]
+        return True
 
-    def _cancel_confirmation(self, event: pygame.event.Event, command: Command | None) -> None:
+    def _withdraw_question(self, event: pygame.event.Event) -> None:
         """Withdraw a question if the event is another key or a click on the scene; the panel may confirm it as well."""
-        pending = self.commands.pending
-        if pending is None:
+        confirmation = self.commands.confirmation
+        if confirmation.pending is None:
             return
         if event.type == pygame.KEYDOWN:
-            other = command != pending and event.key not in MODIFIER_KEYS and not self._keyboard.is_repeat
+            is_answer = self._command == confirmation.pending or event.key in MODIFIER_KEYS or self._keyboard.is_repeat
         else:
             left = self.context.surface.get_width() - self.context.gui.panel.width
-            other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
-        if other:
-            self.commands.cancel_confirmation()
-            self._asked = None
+            is_answer = event.type != pygame.MOUSEBUTTONDOWN or event.pos[0] >= left
+        if not is_answer:
+            confirmation.cancel()
 
-    def _starts_game(self, event: pygame.event.Event) -> bool:
-        """Return whether an event starts the game that waits for it: Space, or any button of a gamepad."""
+    def _start_game(self, event: pygame.event.Event) -> bool:
+        """Start the game that waits for it, with Space or any button of a gamepad."""
         is_hidden = self.editing is not None or self.context.gui.covers_scene
         if not self.app_state.waits_for_start or is_hidden or self.app_state.faults:
             return False
-        space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
-        return space or event.type == pygame.JOYBUTTONDOWN
+        if event.type != pygame.JOYBUTTONDOWN and not (event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE):
+            return False
+        self.app_state.start_game()
+        return True
 
     def _release_keys(self, event: pygame.event.Event) -> None:
         """Run the release handlers of bound keys, also if the event itself is consumed elsewhere."""
@@ -399,22 +406,17 @@ class App:
 
     def _on_scene_changed(self, same: bool) -> None:
         self._release_handlers.clear()  # they act on the former session
-        is_reload_confirmed = self._asked is Command.RELOAD and self.commands.pending is None
+        is_reload_confirmed = self.commands.confirmation.given is Command.RELOAD
         if not same or is_reload_confirmed:
             self._end_editing()
             self.app_state.has_unsaved_draft = False
         self.context.on_scene_changed(same)
 
     def _end_editing(self) -> None:
-        """Close the editor; unsaved changes are lost only if the last event has confirmed it."""
+        """Close the editor; unsaved changes are lost only if the user has agreed."""
         if self._edited is not None:
-            self._edited.close(is_lost=self._asked in LOSE_DRAFT and self.commands.pending is None)
+            self._edited.close(is_lost=self.commands.confirmation.loses_draft)
         self.editing = self._edited = None
-
-    def _resize(self) -> None:
-        surface = pygame.display.get_surface()
-        if surface is not None and surface.get_size() != self.context.camera.size:
-            self.context.resize(surface)
 
     @contextmanager
     def _signals(self) -> Iterator[None]:

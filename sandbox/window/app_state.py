@@ -29,7 +29,7 @@ from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, 
 from sandbox.window.input.body_tools import BodyTools, count_changes
 from sandbox.window.playback.diagnostics import GHOST_ENGINES, Diagnostics
 from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.parameters import ParameterValue, turned
+from sandbox.window.playback.parameters import ParameterValue, parameter_actions
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.session import Session
 from sandbox.window.view_bounds import predict_bounds
@@ -155,7 +155,7 @@ def session_of_recording(recording: Recording) -> LiveView:
         rules = None
     game = None if rules is None else GameSession(rules, recording.presses)
     session = Session.of_recording(recording, game)
-    session.mark_unsaved()
+    session.log.saved = ()
     live = LiveView(session)
     live.seek(round(recording.duration / session.settings.dt))
     return live
@@ -385,7 +385,7 @@ class AppState:
         if live is None or self.host is not None:
             return 0
         kept = SetParameter if restart else ()
-        actions = [action for action in live.session.unsaved_actions if not isinstance(action, kept)]
+        actions = [action for action in live.session.log.unsaved if not isinstance(action, kept)]
         return count_changes(actions, live.scene.play.arrows)
 
     def restore_session(self) -> None:
@@ -506,7 +506,7 @@ class AppState:
             return
 
         def apply() -> None:
-            for action in turned(live, key, value, self.body_tools.picked_index(live)):
+            for action in parameter_actions(live, key, value, self.body_tools.picked_index(live)):
                 live.apply(action)
                 if isinstance(action, SetParameter):
                     self._preferences.store_parameter(action)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from sandbox.window.app_state import AppState
 from sandbox.window.context import WindowContext
 from sandbox.window.input.body_tools import describe_loss
 from sandbox.window.input.keymap import Command
@@ -23,14 +24,49 @@ LOSE_DRAFT = (Command.PREVIOUS, Command.NEXT, Command.RELOAD, Command.QUIT)
 """Commands that lose the unsaved changes of an edited scene."""
 
 
+class CommandConfirmation:
+    """Question before a command that loses unsaved changes: the command must be given again, as the next one."""
+
+    def __init__(self, app_state: AppState) -> None:
+        self._app_state = app_state
+        self.pending: Command | None = None
+        """command that waits to be given again"""
+        self.given: Command | None = None
+        """command that was given again, while it runs and when it has closed the window"""
+
+    @property
+    def loses_draft(self) -> bool:
+        """Whether the user has agreed to lose the unsaved changes of an edited scene."""
+        return self.given in LOSE_DRAFT
+
+    def is_needed(self, command: Command) -> bool:
+        """Ask if a command would lose changes; return False if none would be lost or it was just given again."""
+        app_state, self.given = self._app_state, command if command == self.pending else None
+        self.cancel()
+        if command not in CONFIRMATIONS or self.given or (command is Command.QUIT and app_state.saves_at_end):
+            return False
+        if app_state.has_unsaved_draft and command in LOSE_DRAFT:
+            question = f"the edited scene is not saved: {CONFIRMATIONS[command]}, Ctrl+E and Ctrl+S save it"
+        else:
+            count = app_state.count_unsaved(restart=command is Command.RESTART)
+            if not count:
+                return False
+            question = describe_loss(count, CONFIRMATIONS[command], kept=app_state.count_unsaved() - count)
+        self.pending, app_state.question = command, question
+        return True
+
+    def cancel(self) -> None:
+        """Withdraw the question."""
+        self.pending = self._app_state.question = None
+
+
 class CommandDispatcher:
     """Handlers of commands and of the panel's widgets."""
 
     def __init__(self, context: WindowContext, mouse: MouseController) -> None:
         self._context, self._mouse = context, mouse
         self._changed: dict[str, ParameterValue] = {}  # parameter changes since the last `flush`, latest last
-        self.pending: Command | None = None
-        """command waiting for confirmation"""
+        self.confirmation = CommandConfirmation(context.app_state)
         self.on_edit: Callable[[], None] = lambda: None
         """callback that starts the editing of the scene"""
         app_state, gui = context.app_state, context.gui
@@ -72,32 +108,14 @@ class CommandDispatcher:
     def run(self, command: Command) -> None:
         """Run a command after applying the pending changes of parameters and of the mouse."""
         self.flush()
-        if self._needs_confirmation(command):
+        if self.confirmation.is_needed(command):
             return
         if command.overlay is not None:
             self._context.gui.overlays ^= {command.overlay}
         else:
             self._handlers[command]()
-
-    def _needs_confirmation(self, command: Command) -> bool:
-        """Ask for confirmation if manual changes would be lost; return False if none is needed or it was just given."""
-        app_state, confirmed = self._context.app_state, command == self.pending
-        self.cancel_confirmation()
-        if command not in CONFIRMATIONS or confirmed or (command is Command.QUIT and app_state.saves_at_end):
-            return False
-        if app_state.has_unsaved_draft and command in LOSE_DRAFT:
-            question = f"the edited scene is not saved: {CONFIRMATIONS[command]}, Ctrl+E and Ctrl+S save it"
-        else:
-            count = app_state.count_unsaved(restart=command is Command.RESTART)
-            if not count:
-                return False
-            question = describe_loss(count, CONFIRMATIONS[command], kept=app_state.count_unsaved() - count)
-        self.pending, app_state.question = command, question
-        return True
-
-    def cancel_confirmation(self) -> None:
-        """Cancel the pending confirmation."""
-        self.pending = self._context.app_state.question = None
+        if self._context.exit_status is None:
+            self.confirmation.given = None
 
     def toggle(self, name: str) -> None:
         """Toggle one of the panel's checkboxes."""

@@ -15,7 +15,9 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.filters import bits_of_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import mask_of
+from sandbox.scene.geometry.hulls import hull_distance
 from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.geometry.vectors import offset_from_segment
 from sandbox.trajectory import Frame
 
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
@@ -44,7 +46,7 @@ def hulls_of(bodies: Bodies, frame: Frame, index: int) -> list[Hull]:
     return found
 
 
-def hull_distance(hull: Hull) -> Distance:
+def distance_from_hull(hull: Hull) -> Distance:
     """Return the signed distance function of a hull, exact inside and outside."""
     corners, radius = hull
     if len(corners) == 1:
@@ -119,7 +121,7 @@ def _area(corners: FloatArray) -> float:
 def signed_distance(hulls: list[Hull], x: float, y: float) -> float:
     """Return the signed distance of a point from the nearest hull; inf without hulls."""
     point = np.asarray(x), np.asarray(y)
-    return min((float(hull_distance(hull)(*point)) for hull in hulls), default=math.inf)
+    return min((float(distance_from_hull(hull)(*point)) for hull in hulls), default=math.inf)
 
 
 def hull_gap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
@@ -132,55 +134,23 @@ def hull_gap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArra
     """
     gaps, midpoints = [], []
     for one, other in ((a, b), (b, a)):
-        nearest = _closest(one.corners, other.corners)
-        offset = one.corners - nearest
+        offset = _offsets(one.corners, other.corners)
         length = np.hypot(offset[:, 0], offset[:, 1])[:, None]
         # Midpoint of the gap, or of the overlap, between the two surfaces.
         shift = 0.5 * (length + other.radius - one.radius)
-        midpoints.append(nearest + offset / np.maximum(length, 1e-300) * shift)
+        midpoints.append(one.corners - offset + offset / np.maximum(length, 1e-300) * shift)
         gaps.append(length[:, 0])
     gap, points = np.concatenate(gaps), np.concatenate(midpoints)
     is_closest = gap <= float(gap.min()) + tolerance
-    separation = _separation(a.corners, b.corners)
-    smallest = separation if -math.inf < separation <= 0.0 else float(gap.min())
-    return smallest - a.radius - b.radius, np.asarray(points[is_closest].mean(axis=0))
+    first, second = (each[::-1] if _area(each) < 0.0 else each for each in (a.corners, b.corners))
+    distance = float(hull_distance(first[None], second[None])[0])
+    return distance - a.radius - b.radius, np.asarray(points[is_closest].mean(axis=0))
 
 
-def _edges(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the start points and vectors of the edges, (n, 2) each; a single corner has an edge of length 0."""
-    if len(corners) < 3:
-        return corners[:1], corners[-1:] - corners[:1]
-    return corners, np.roll(corners, -1, axis=0) - corners
-
-
-def _closest(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the point on the edges of a hull that is closest to each of the given points, (K, 2)."""
-    start, along = _edges(corners)
-    offset = points[:, None] - start[None]
-    t = np.clip((offset * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
-    foot = start + t[..., None] * along
-    best = np.argmin(((points[:, None] - foot) ** 2).sum(-1), axis=1)
-    return np.asarray(foot[np.arange(len(points)), best])
-
-
-def _separation(a: FloatArray, b: FloatArray) -> float:
-    """Return the largest separation of two hulls of radius 0 along an edge normal; negative if they overlap.
-
-    Separating axis theorem. Two single corners have no edges: −inf.
-    """
-    best = -math.inf
-    for hull, other in ((a, b), (b, a)):
-        start, along = _edges(hull)
-        length = np.hypot(along[:, 0], along[:, 1])
-        normal = (np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(length, 1e-300)[:, None])[length > 0.0]
-        if not len(normal):
-            continue
-        if len(hull) == 2:
-            normal, start = np.vstack((normal, -normal)), np.vstack((start, start))
-        elif _area(hull) < 0.0:
-            normal = -normal
-        best = max(best, float(((other[None] - start[:, None]) * normal[:, None]).sum(-1).min(axis=1).max()))
-    return best
+def _offsets(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the shortest offset of each point, (K, 2), from the edges of a hull."""
+    offset = offset_from_segment(points[:, None], corners, np.roll(corners, -1, axis=0) - corners)
+    return np.asarray(offset[np.arange(len(points)), np.argmin((offset**2).sum(-1), axis=1)])
 
 
 def pick_body(bodies: Bodies, frame: Frame, point: tuple[float, float], reach: float = 0.0) -> int | None:

@@ -14,8 +14,8 @@ from sandbox.trajectory import Contacts, Frame
 from sandbox.window.camera import Camera
 from sandbox.window.hit_test import (
     Hull,
+    distance_from_hull,
     hull_area,
-    hull_distance,
     hull_gap,
     overlapping_bodies,
     pick_body,
@@ -100,7 +100,7 @@ def test_overlap_is_computed_from_outlines(tables: dict[str, Any], expected: lis
 @pytest.mark.fail_slow(60)  # takes over half a second
 @pytest.mark.parametrize("count", [1, 2, 3, 5])
 @pytest.mark.parametrize("radius", [0.0, 0.4])
-def test_hull_distance_equals_the_distance_to_a_sampled_outline(count: int, radius: float) -> None:
+def test_distance_from_hull_equals_the_distance_to_a_sampled_outline(count: int, radius: float) -> None:
     if count == 1 and radius == 0.0:
         radius = 1e-9
     angles = np.arange(count) * 2.0 * math.pi / max(count, 3) + 0.2
@@ -111,7 +111,7 @@ def test_hull_distance_equals_the_distance_to_a_sampled_outline(count: int, radi
     fraction = np.linspace(0.0, 1.0, 200)[:, None, None]
     fine = (outline * (1.0 - fraction) + np.roll(outline, -1, axis=0) * fraction).reshape(-1, 2)
     points = np.random.default_rng(count).uniform(-3.0, 3.0, (200, 2))
-    found = hull_distance(hull)(points[:, 0], points[:, 1])
+    found = distance_from_hull(hull)(points[:, 0], points[:, 1])
     nearest = np.sqrt(((points[:, None] - fine) ** 2).sum(-1)).min(axis=1)
     assert np.abs(found) == pytest.approx(nearest, abs=0.02)  # points on the outline are up to 0.01 apart
 

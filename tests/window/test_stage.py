@@ -13,7 +13,7 @@ from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app_state import AppState
 from sandbox.window.playback import live as live_module
 from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.parameters import SessionParameters, turned
+from sandbox.window.playback.parameters import SessionParameters, parameter_actions
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
 from tests.toml_text import toml
@@ -381,13 +381,13 @@ def test_parameter_of_one_ball_changes_only_that_ball_for_any_name(names: list[s
     scene = from_document({"ball": [*balls, {"position": [9.0, 0.0], "radius": 1}]})
     for picked in range(3):
         view = LiveView(Session(scene))
-        for action in turned(view, "friction", 0.5, picked):
+        for action in parameter_actions(view, "friction", 0.5, picked):
             assert isinstance(action, SetParameter)
             view.apply(action)
         assert [each.friction for each in view.scene.balls] == [0.5 if k == picked else None for k in range(3)]
         assert parameter(view, "friction", picked).value == 0.5
     view = LiveView(Session(scene))
-    for action in turned(view, "restitution", 0.5, None):
+    for action in parameter_actions(view, "restitution", 0.5, None):
         view.apply(action)
     assert [each.restitution for each in view.scene.balls] == [0.5] * 3
 
@@ -400,7 +400,7 @@ def test_parameter_of_a_generated_ball_changes_its_whole_generator() -> None:
         }
     )
     view = LiveView(Session(scene))
-    for action in turned(view, "restitution", 0.5, 4):
+    for action in parameter_actions(view, "restitution", 0.5, 4):
         view.apply(action)
     assert [each.restitution for each in view.scene.body_sources] == [None, None, 0.5]
 
@@ -408,7 +408,7 @@ def test_parameter_of_a_generated_ball_changes_its_whole_generator() -> None:
 def test_parameters_without_balls_or_of_an_unspawned_ball_are_safe() -> None:
     view = LiveView(Session(from_document({"title": "t"})))
     assert not parameter(view, "restitution").enabled
-    assert turned(view, "restitution", 0.5, None) == []
+    assert parameter_actions(view, "restitution", 0.5, None) == []
     assert not parameter(view, "friction", 7).enabled
     view = LiveView(Session(from_document({"ball": [{"position": [0, 0], "radius": 1}]})))
     assert parameter(view, "friction", 7).label == "friction"

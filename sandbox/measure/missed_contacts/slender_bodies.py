@@ -12,11 +12,11 @@ from itertools import combinations
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.measure.metrics.clearance import offset_from_segment
 from sandbox.measure.missed_contacts.swept_geometry import CLEAR, cross, dot
 from sandbox.measure.missed_contacts.verlet_list import CanCollide
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.geometry.shapes import Piece, geometry_of
+from sandbox.scene.geometry.vectors import offset_from_segment
 from sandbox.trajectory import Trajectory
 
 SLENDER = 4.0

@@ -7,7 +7,6 @@ from typing import Self
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.measure.metrics.clearance import offset_from_segment
 from sandbox.measure.missed_contacts.contact_history import ContactHistory
 from sandbox.measure.missed_contacts.swept_geometry import (
     CLEAR,
@@ -22,6 +21,7 @@ from sandbox.scene.compile.filters import FilterTable, fixed_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.geometry.vectors import offset_from_segment
 
 PLANE_ROUNDING = 1e-11
 """m: smallest tolerance at planes. Engines build planes from shapes of kilometres, whose rounding is 3e-13 m."""

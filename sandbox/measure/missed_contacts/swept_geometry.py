@@ -7,7 +7,7 @@ with the radii added up. All functions take K rows and return new arrays.
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.measure.metrics.clearance import offset_from_segment
+from sandbox.scene.geometry.vectors import offset_from_segment
 
 TOLERANCE = 5e-3
 """Depth as a fraction of the contact distance up to which a contact does not count: between equal balls 1 % of a

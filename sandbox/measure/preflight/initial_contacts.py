@@ -8,7 +8,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.solver_settings import SLOP_PER_RADIUS
 from sandbox.formatting import format_plural
-from sandbox.measure.metrics.clearance import bounding_clearances, clearance, hull_distance, posed_pieces
+from sandbox.measure.metrics.clearance import bounding_clearances, clearance, posed_pieces
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.tunnelling import collide_with_all
 from sandbox.scene.compile.bodies import Bodies
@@ -18,6 +18,7 @@ from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.geometry.hulls import hull_distance
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.validate.bodies import OVERLAP_BUDGET
 

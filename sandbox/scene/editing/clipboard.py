@@ -21,7 +21,7 @@ from sandbox.scene.editing.elements import (
     table_values,
     unique_name,
 )
-from sandbox.scene.editing.transforms import Similarity, plain_value, transformed
+from sandbox.scene.editing.transforms import Similarity, plain_value, transform_element
 from sandbox.scene.files.toml_changes import AddElement, Change
 
 
@@ -37,7 +37,7 @@ class CopiedElement:
     """names of its bodies"""
 
 
-def copied(scene: Scene, keys: Collection[ElementKey]) -> tuple[CopiedElement, ...]:
+def copy_elements(scene: Scene, keys: Collection[ElementKey]) -> tuple[CopiedElement, ...]:
     """Return copies of elements, and of the joints, thrusts and drives that refer to their bodies only."""
     names = {name for key in keys for name in body_names(scene, key)}
     chosen = dict.fromkeys(sorted(keys))
@@ -56,7 +56,9 @@ def copied(scene: Scene, keys: Collection[ElementKey]) -> tuple[CopiedElement, .
     )
 
 
-def pasting(scene: Scene, elements: Sequence[CopiedElement], by: Similarity) -> tuple[list[Change], list[ElementKey]]:
+def paste_elements(
+    scene: Scene, elements: Sequence[CopiedElement], by: Similarity
+) -> tuple[list[Change], list[ElementKey]]:
     """Return the changes that add copies, transformed, and the addresses that these will have.
 
     Elements that refer to bodies that the scene does not have are left out.
@@ -86,7 +88,7 @@ def pasting(scene: Scene, elements: Sequence[CopiedElement], by: Similarity) -> 
 
 def _world_values(element: Part, by: Similarity) -> dict[str, Any]:
     """Return the values of a copy that a similarity changes; also the points of joints in the world."""
-    values = transformed(element, by)
+    values = transform_element(element, by)
     between = getattr(element, "between", None)
     anchors = getattr(element, "anchors", None)
     if between is not None and len(between) == 1 and anchors is not None:

@@ -93,7 +93,7 @@ def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> 
     return preview
 
 
-def differ_in_places_only(scene: Scene, other: Scene) -> bool:
+def differ_in_poses_only(scene: Scene, other: Scene) -> bool:
     """Return whether two scenes have the same bodies and static elements, but for the places and angles of bodies.
 
     It recognises scenes of `with_moved_bodies`, by identity.
@@ -226,7 +226,7 @@ def _play_references(scene: Scene) -> Iterator[tuple[Location, str]]:
     yield from ((("play", "part", k, "name"), part.name) for k, part in enumerate(scene.play.parts))
 
 
-def removal(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
+def removal_changes(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
     """Return the changes that remove elements, and with their bodies all elements that refer to them."""
     gone = set(keys)
     names = {name for key in keys for name in (*body_names(scene, key), name_of(scene, key))}
@@ -266,7 +266,7 @@ def _has_default_name(scene: Scene, key: ElementKey) -> bool:
     return "name" in type(element).model_fields and getattr(element, "name", None) is None
 
 
-def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
+def renaming_changes(scene: Scene, key: ElementKey, name: str) -> list[Change]:
     """Return the changes that rename an element with its bodies, and the references to them."""
     before, is_material = name_of(scene, key), key.table == "material"
     references = _material_references if is_material else body_references
@@ -279,7 +279,7 @@ def renaming(scene: Scene, key: ElementKey, name: str) -> list[Change]:
     return [*changes, *(SetValue(path, renamed[each]) for path, each in roles if each in renamed)]
 
 
-def naming(scene: Scene, body: int) -> list[Change]:
+def naming_changes(scene: Scene, body: int) -> list[Change]:
     """Return the changes that write the name of the element of a body, for a new reference to the body.
 
     They are empty if the file has the name. Default names change with the order of elements.
@@ -301,7 +301,7 @@ def table_values(element: Part) -> dict[str, Any]:
     return element.model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
 
-def counted(keys: Sequence[ElementKey]) -> str:
+def describe_elements(keys: Sequence[ElementKey]) -> str:
     """Return the number of elements in words: `a ball`, `3 balls`, `4 elements`."""
     tables = {key.table for key in keys}
     word = tables.pop() if len(tables) == 1 else "element"

@@ -19,7 +19,7 @@ class TakeApartError(ValueError):
     """Elements cannot be taken apart; `str()` has the reason."""
 
 
-def taking_apart(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
+def take_apart_changes(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
     """Return the changes that replace generators by their bodies, which keep their names, and divide walls.
 
     Args:

@@ -73,7 +73,7 @@ CANNOT_ROTATE = ("grid", "scatter", "emitter", "cloth", "ragdoll")
 """Generators whose bodies are laid out along the axes: rotated or mirrored, only their place changes."""
 
 
-def transformed(element: Part, by: Similarity, *, is_whole: bool = True) -> dict[str, Any]:
+def transform_element(element: Part, by: Similarity, *, is_whole: bool = True) -> dict[str, Any]:
     """Return the keys of an element that a similarity changes, with their new values.
 
     Args:
@@ -150,7 +150,9 @@ def _part(part: Attached, by: Similarity) -> dict[str, Any]:
     return values
 
 
-def transformation(scene: Scene, keys: Collection[ElementKey], by: Similarity) -> Mapping[ElementKey, dict[str, Any]]:
+def transform_elements(
+    scene: Scene, keys: Collection[ElementKey], by: Similarity
+) -> Mapping[ElementKey, dict[str, Any]]:
     """Return the new values of selected elements, and of the joints that hold only their bodies.
 
     A joint names bodies; its point in the world moves with them if all of its bodies are among them.
@@ -161,10 +163,10 @@ def transformation(scene: Scene, keys: Collection[ElementKey], by: Similarity) -
         element = element_at(scene, key)
         if key.table in ("joint", "drive"):
             continue
-        found[key] = transformed(element, by, is_whole=key.table not in CANNOT_ROTATE or by.scale != 1.0)
+        found[key] = transform_element(element, by, is_whole=key.table not in CANNOT_ROTATE or by.scale != 1.0)
     for index, drive in enumerate(scene.drives):
         if drive.body in moved:
-            found[ElementKey("drive", index)] = transformed(drive, by, is_whole=False)
+            found[ElementKey("drive", index)] = transform_element(drive, by, is_whole=False)
     for index, joint in enumerate(scene.joints):
         key = ElementKey("joint", index)
         found[key] = _joint_values(joint, moved, is_selected=key in keys, by=by)
@@ -191,13 +193,13 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
     return {}
 
 
-def mirroring(box: tuple[Point, Point], *, is_vertical: bool) -> Similarity:
+def mirror_transform(box: tuple[Point, Point], *, is_vertical: bool) -> Similarity:
     """Return the transformation that mirrors a box, given by its corners in m, left and right, or up and down."""
     centre = 0.5 * (box[0][0] + box[1][0]), 0.5 * (box[0][1] + box[1][1])
     return Similarity(centre, angle=math.pi if is_vertical else 0.0, mirrored=True)
 
 
-def alignment(own: tuple[Point, Point], box: tuple[Point, Point], side: AlignmentSide) -> Point:
+def alignment_shift(own: tuple[Point, Point], box: tuple[Point, Point], side: AlignmentSide) -> Point:
     """Return the way that aligns a side of an element's box, given by two corners, with that of another box, m."""
     match side:
         case "left":

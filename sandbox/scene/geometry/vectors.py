@@ -59,6 +59,23 @@ def nearest_on_segment(point: Point, a: Point, b: Point) -> tuple[float, float]:
     return fraction, math.hypot(point[0] - a[0] - fraction * x, point[1] - a[1] - fraction * y)
 
 
+def offset_from_segment(point: FloatArray, tail: FloatArray, along: FloatArray) -> FloatArray:
+    """Return the shortest offsets from segments, tail to tail + along, to points, (…, 2) m.
+
+    A segment of length 0 is its tail. The arguments are broadcast.
+
+    Args:
+        point: (…, 2) m.
+        tail: (…, 2) m.
+        along: (…, 2) m.
+    """
+    offset = point - tail
+    squared = along[..., 0] * along[..., 0] + along[..., 1] * along[..., 1]
+    projection = offset[..., 0] * along[..., 0] + offset[..., 1] * along[..., 1]
+    fraction = (projection / np.where(squared > 0.0, squared, 1.0)).clip(0.0, 1.0)
+    return np.asarray(offset - fraction[..., None] * along)
+
+
 def is_left_of_bend(x: float, y: float, in_x: float, in_y: float, out_x: float, out_y: float) -> bool:
     """Return whether a point is to the left of two half-lines that meet in the origin.
 

@@ -107,7 +107,7 @@ class CaptureController:
         try:
             view.session.recording().save(outfile.temporary)
             self._notify(f"session: {outfile.place()}", "info")
-            view.session.mark_saved()
+            view.session.log.saved = view.session.log.all
         except (PictureError, OSError) as error:
             outfile.discard()
             reason = str(error) if isinstance(error, PictureError) else str(unwritable_reason(self._folder, error))

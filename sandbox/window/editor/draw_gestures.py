@@ -3,6 +3,7 @@
 import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, cast
 
 from sandbox.scene.compile.contacts import contact_matrix
@@ -11,17 +12,25 @@ from sandbox.scene.description.base import Part, Point
 from sandbox.scene.description.bodies import Box, Capsule, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
-from sandbox.scene.editing.elements import FIELD_OF, ElementKey, elements_of_table
-from sandbox.scene.editing.outlines import simplified, simplified_loop
+from sandbox.scene.editing.elements import FIELD_OF, ElementKey, all_names, elements_of_table, unique_name
 from sandbox.scene.editing.transforms import plain_value, round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
+from sandbox.scene.geometry.polyline import simplify_loop, simplify_polyline
 from sandbox.window.editor.gestures import Gesture, typed_numbers
-from sandbox.window.editor.snapping import rounded
+from sandbox.window.editor.snapping import REACH, Pointer, rounded
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.draw_context import Canvas
+from sandbox.window.render.lines import draw_dashes, draw_line
+from sandbox.window.render.palette import INK, SKY
 
 BODY_TABLES = ("ball", "box", "capsule", "polygon")
 STATIC_TABLES = ("plane", "wall", "post")
 FRICTION = 0.7071
 """Friction of a new element: two frictions are multiplied, so that it is 0.5 between two new elements"""
+FREEHAND_TOLERANCE = 2.5
+"""px at UI scale 1 by which a freehand outline may be simplified"""
+WALL_THICKNESS = 0.2
+"""of a new wall, as a fraction of the size of an element that is made by a click"""
 
 
 def has_friction(scene: Scene, table: str) -> bool:
@@ -40,23 +49,14 @@ def has_friction(scene: Scene, table: str) -> bool:
 class DrawGesture(Gesture):
     """Draws a new element."""
 
-    def __init__(self, scene: Scene, table: str, name: str, point: Point, default: float) -> None:
-        """Begin to draw.
-
-        Args:
-            scene: the scene.
-            table: heading of the table.
-            name: of the new element.
-            point: of the press, m.
-            default: size of an element that is made by a click, m.
-        """
+    def __init__(self, scene: Scene, table: str, pointer: Pointer) -> None:
+        """Begin to draw an element of a table."""
         super().__init__(scene)
-        self.table, self.name, self.begin, self.end, self.default = table, name, point, point, default
+        self.table, self.name = table, unique_name(table, all_names(scene))
+        self.begin = self.end = self.snap(pointer)
+        self.default = default_size(pointer.view.size)
+        """size of an element that is made by a click, m"""
         self.label = f"add a {table}"
-
-    def move(self, point: Point) -> None:
-        """Draw as far as a point."""
-        self.end = point
 
     @property
     def is_click(self) -> bool:
@@ -219,47 +219,48 @@ class OutlineGesture(DrawGesture):
 
     is_multi_click = True
 
-    def __init__(
-        self, scene: Scene, table: str, name: str, point: Point, default: float, reach: float, thickness: float = 0.0
-    ) -> None:
-        """Begin to draw.
-
-        Args:
-            scene: the scene.
-            table: heading of the table.
-            name: of the new element.
-            point: first corner, m.
-            default: size that elements have on the screen, m.
-            reach: distance from the first corner within which a click closes the outline, m.
-            thickness: of a wall, m.
-        """
-        super().__init__(scene, table, name, point, default)
-        self.corners: list[Point] = [point]
+    def __init__(self, scene: Scene, table: str, pointer: Pointer) -> None:
+        """Begin at the first corner."""
+        super().__init__(scene, table, pointer)
+        self.corners = [self.begin]
         self.is_closed = False
-        self._freehand: list[Point] = []
-        self._reach, self._thickness = reach, thickness
+        self._freehand: list[Point] = []  # drawn with the button held
+        self._reach = pointer.view.metres(REACH)  # of the first corner, within which a click closes the outline
+        self._thickness = WALL_THICKNESS * self.default if table == "wall" else 0.0
 
-    @property
-    def is_freehand(self) -> bool:
-        """Whether the outline is drawn with the button held."""
-        return bool(self._freehand)
+    def drag(self, pointer: Pointer) -> None:
+        """Draw the next side as far as the pointer, or freehand while the button is held."""
+        if pointer.is_dragging:
+            self._draw_freehand(pointer.point, pointer.view.metres(FREEHAND_TOLERANCE))
+        else:
+            super().drag(pointer)
 
-    def draw_freehand(self, point: Point, tolerance: float) -> None:
+    def _draw_freehand(self, point: Point, tolerance: float) -> None:
         """Draw freehand to a point; the line is simplified within a tolerance, m."""
         if not self._freehand:
             if len(self.corners) > 1:
                 return
-            self._freehand = [self.begin]
+            self._freehand, self.is_multi_click = [self.begin], False
         step = 10.0 ** math.floor(math.log10(tolerance))
         self._freehand.append((rounded(point[0], step), rounded(point[1], step)))
         near = math.dist(self._freehand[0], point) <= self._reach and len(self._freehand) > 8
         self.is_closed = near or self.table != "wall"
         points = self._freehand[:-1] if near else self._freehand
-        self.corners = (simplified_loop if self.is_closed else simplified)(points, tolerance)
+        self.corners = (simplify_loop if self.is_closed else simplify_polyline)(points, tolerance)
         self.end = self.corners[-1]
 
-    def click(self, point: Point) -> bool:
+    def click(self, pointer: Pointer) -> bool:
         """Add a corner; return whether the outline is finished, at its first or its last corner."""
+        return self._add_corner(self.snap(pointer))
+
+    def confirm(self) -> bool:
+        """Add the corner that is typed; without one, the outline is finished."""
+        if not self.typed:
+            return True
+        self._add_corner(self.end)
+        return False
+
+    def _add_corner(self, point: Point) -> bool:
         numbers = typed_numbers(self.typed)
         if numbers:
             point, self.typed = self._typed_corner(numbers), ""
@@ -277,11 +278,6 @@ class OutlineGesture(DrawGesture):
         x, y = self.corners[-1]
         angle = math.atan2(self.end[1] - y, self.end[0] - x) if len(numbers) < 2 else math.radians(numbers[1])
         return round_value(x + numbers[0] * math.cos(angle)), round_value(y + numbers[0] * math.sin(angle))
-
-    def remove_corner(self) -> bool:
-        """Remove the last corner; return whether any is left."""
-        self.corners.pop()
-        return bool(self.corners)
 
     def values(self) -> dict[str, Any] | None:
         """Return the corners; None if there are too few."""
@@ -301,15 +297,11 @@ class OutlineGesture(DrawGesture):
             return {"position": (x, y), "points": [(round_value(a - x), round_value(b - y)) for a, b in points]}
         return {"points": points}
 
-    _follows = True
-
-    def finish(self) -> None:
-        """End the outline at its last corner, without the point of the pointer."""
-        self._follows = False
+    _follows = True  # whether the point of the pointer is a corner, too
 
     def changes(self) -> list[Change]:
         """Return the change that adds the element, without the point of the pointer."""
-        self.finish()
+        self._follows = False
         return super().changes()
 
     def dimensions(self) -> str:
@@ -319,6 +311,18 @@ class OutlineGesture(DrawGesture):
         end = self._typed_corner(numbers) if numbers else self.end
         angle = math.degrees(math.atan2(end[1] - y, end[0] - x))
         return f"{math.dist(self.corners[-1], end):.4g} m, {angle:.4g}°"
+
+    def draw(self, canvas: Canvas) -> None:
+        """Draw the sides, the side that would close the outline, and the corners."""
+        surface, unit = canvas.surface, canvas.ui_scale
+        *corners, end = canvas.pixels((*self.corners, self.end))
+        for a, b in pairwise((*corners, end)):
+            draw_line(surface, a, b, SKY, 1.6 * unit)
+        if len(corners) > 2:
+            draw_dashes(surface, [(end, corners[0])], SKY, 5 * unit)
+        for corner in corners:
+            draw_disc(surface, corner, 4 * unit, SKY)
+        draw_disc(surface, corners[0], 6 * unit, INK, 4 * unit)
 
 
 def default_size(view_size: float) -> float:

@@ -12,25 +12,23 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.autosave import Autosave, RecoveredText, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import differ_in_places_only
+from sandbox.scene.editing.elements import differ_in_poses_only
 from sandbox.scene.errors import SceneError
 from sandbox.window.context import WindowContext
 from sandbox.window.editor.check_marks import CheckMarks
-from sandbox.window.editor.draw_gestures import OutlineGesture
-from sandbox.window.editor.edit_keys import ALIGNMENTS, ARROWS, DELEGATED, DELEGATED_WITH_CONTROL, KEPT_IN_FIELDS, TYPED
 from sandbox.window.editor.editor import Editor
 from sandbox.window.editor.element_properties import location_of, property_sections
-from sandbox.window.editor.gestures import ViewScale
 from sandbox.window.editor.ghost_path import GhostPredictor
 from sandbox.window.editor.live_check import LiveCheck
 from sandbox.window.editor.overlay import draw_ghost_path, draw_overlay
 from sandbox.window.editor.path_prompt import PathPrompt
 from sandbox.window.editor.picking import start_frame
 from sandbox.window.editor.property_panel import PropertyPanel
-from sandbox.window.editor.snapping import grid_step
+from sandbox.window.editor.snapping import ViewScale
 from sandbox.window.editor.toolbar import TOOLS, EditTool, Toolbar
-from sandbox.window.input.keymap import Command, latin_key
+from sandbox.window.input.keymap import Command
 from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.palette import FAINT, INK, ORANGE
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
@@ -42,8 +40,8 @@ ACTIONS = (
     EditTool("redo", "Ctrl+Shift+Z", "redo"),
     EditTool("save", "Ctrl+S", "save the scene file"),
 )
-
-
+TYPED = "0123456789.,-x "
+"""Characters that are typed into the dimensions of a gesture"""
 HANDLE_CURSORS = {
     ("scale", 0): pygame.SYSTEM_CURSOR_SIZENESW,
     ("scale", 1): pygame.SYSTEM_CURSOR_SIZENWSE,
@@ -70,7 +68,7 @@ class EditView:
         run_command: Callable[[Command], None],
         folder: Path | None = None,
     ) -> None:
-        self._context, self._leave, self._run_command = context, leave, run_command
+        self._context, self.leave, self._run_command = context, leave, run_command
         self.editor = Editor(draft, context.app_state.messages.add)
         self.toolbar, self.actions = Toolbar(TOOLS), Toolbar(ACTIONS)
         self.panel = PropertyPanel(context.surface.get_size(), context.gui.ui_scale)
@@ -100,7 +98,7 @@ class EditView:
     # --- Events --------------------------------------------------------------------------------------------------
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Process an event; return whether it was consumed. Wheel, panning and window events are left to others."""
+        """Process an event; return whether it was consumed. Keys, wheel and window events are left to others."""
         if self.recovered is not None and event.type in (pygame.KEYDOWN, pygame.TEXTINPUT, pygame.MOUSEBUTTONDOWN):
             self._answer_recovery(self.recovered, event)
             return True
@@ -113,8 +111,6 @@ class EditView:
                 return True
         if self._use_check_marks(event):
             return True
-        if event.type == pygame.KEYDOWN:
-            return self._press_key(event)
         if event.type == pygame.TEXTINPUT:
             return self._type(event.text)
         if event.type in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP, pygame.MOUSEMOTION):
@@ -142,7 +138,7 @@ class EditView:
         if remedy is not None:
             self.panel.commit()
             self.editor.apply(list(remedy.changes), f"set {remedy.label}")
-            self._note_unsaved()
+            self.note_unsaved()
         return used
 
     def _mouse(self, event: pygame.event.Event) -> bool:
@@ -172,102 +168,24 @@ class EditView:
                 self.editor.hover(point, view)
         return False
 
-    def _press_key(self, event: pygame.event.Event) -> bool:
-        if event.mod & (pygame.KMOD_ALT | pygame.KMOD_META | pygame.KMOD_MODE):
-            return True  # Ctrl+Alt may be AltGr, which types characters
-        key = latin_key(event)
-        control, shift = bool(event.mod & pygame.KMOD_CTRL), bool(event.mod & pygame.KMOD_SHIFT)
-        if control:
-            self._press_control(key, shift)
-            return True
-        gesture = self.editor.gesture
-        if gesture is not None and self._press_in_gesture(key):
-            return True
-        if key == pygame.K_ESCAPE:
-            return self.editor.cancel()  # otherwise the window asks whether to quit
-        if key in DELEGATED:
-            if DELEGATED[key] is Command.HELP and not (gesture is not None and gesture.is_multi_click):
-                self.drop_gesture()  # the help page receives the release
-            self._run_command(DELEGATED[key])
-        elif key in (pygame.K_SPACE, pygame.K_p):
-            self._leave()
-        elif key in ARROWS:
-            step = grid_step(self.view_scale.scale, self.view_scale.ui_scale) * (10.0 if shift else 1.0)
-            x, y = ARROWS[key]
-            self.editor.nudge((x * step, y * step))
-        elif key in (pygame.K_DELETE, pygame.K_BACKSPACE):
-            self.editor.delete()
-        elif key in (pygame.K_PAGEUP, pygame.K_PAGEDOWN):
-            self.editor.reorder(1 if key == pygame.K_PAGEUP else -1)
-        elif key == pygame.K_m:
-            self.editor.mirror(is_vertical=shift)
-        else:
-            name = next((tool.name for tool in TOOLS if pygame.key.name(key) == tool.key), None)
-            if name is not None:
-                self.editor.choose_tool(name)
-        return True
-
-    def _press_in_gesture(self, key: int) -> bool:
-        """Process a key during a gesture; return whether the gesture uses it."""
-        gesture = self.editor.gesture
-        assert gesture is not None
-        if key in (pygame.K_RETURN, pygame.K_KP_ENTER):
-            if isinstance(gesture, OutlineGesture) and gesture.typed:
-                gesture.click(gesture.end)
-            else:
-                self.editor.finish()
-            return True
-        if key == pygame.K_BACKSPACE and gesture.typed:
-            self.editor.type_text(gesture.typed[:-1])
-            return True
-        if key == pygame.K_BACKSPACE and isinstance(gesture, OutlineGesture):
-            if not gesture.remove_corner():
-                self.editor.cancel()
-            return True
-        name = pygame.key.name(key)
-        return key == pygame.K_SPACE or (len(name) == 1 and name in TYPED)  # comes as text, too
-
     def _type(self, text: str) -> bool:
         gesture = self.editor.gesture
         if gesture is not None and text and all(letter in TYPED for letter in text):
             self.editor.type_text((gesture.typed + text).lstrip())
         return True
 
-    def _press_control(self, key: int, shift: bool) -> None:
-        if self.panel.has_focus and key not in KEPT_IN_FIELDS:
-            return
-        editor, view = self.editor, self.view_scale
-        self.panel.commit()
-        if key == pygame.K_e:
-            self._leave()
-        elif key == pygame.K_s:
-            self.save(is_new=shift)
-        elif key == pygame.K_z:
-            (editor.redo if shift else editor.undo)()
-        elif key == pygame.K_y:
-            editor.redo()
-        elif key == pygame.K_x:
-            (editor.take_apart if shift else editor.cut)()
-        elif key == pygame.K_c:
-            editor.copy()
-        elif key == pygame.K_v:
-            editor.paste(view)
-        elif key == pygame.K_d:
-            editor.duplicate(view)
-        elif key == pygame.K_a:
-            editor.select_all()
-        elif key in ALIGNMENTS:
-            is_height = key in (pygame.K_UP, pygame.K_DOWN)
-            editor.align(("middle" if is_height else "centre") if shift else ALIGNMENTS[key])
-        elif key in DELEGATED_WITH_CONTROL:
-            if key == pygame.K_o:
-                self.drop_gesture()
-            self._run_command(DELEGATED_WITH_CONTROL[key])
-        self._note_unsaved()
+    def run(self, command: Command) -> None:
+        """Run a command of the window, some of which cover the scene and receive the release of the button."""
+        gesture = self.editor.gesture
+        if command is Command.PICKER or (
+            command is Command.HELP and not (gesture is not None and gesture.is_multi_click)
+        ):
+            self.drop_gesture()
+        self._run_command(command)
 
     def _use_action(self, name: str) -> None:
         actions: dict[str, Callable[[], object]] = {
-            "play": self._leave,
+            "play": self.leave,
             "undo": self.editor.undo,
             "redo": self.editor.redo,
             "save": self.save,
@@ -304,17 +222,18 @@ class EditView:
             self._context.app_state.messages.add(f"{path.name}: {message}", "error")
             return False
         self._context.notify(f"saved: {path}")
-        self._note_unsaved()
+        self.note_unsaved()
         return True
 
-    def _note_unsaved(self) -> None:
+    def note_unsaved(self) -> None:
+        """Note whether the scene has unsaved changes, for the window."""
         self._context.app_state.has_unsaved_draft = self.draft.is_changed
 
     # --- Autosave ------------------------------------------------------------------------------------------------
 
     def update(self) -> None:
         """Write unsaved changes to the autosave; called every frame, also while the scene runs."""
-        self._note_unsaved()
+        self.note_unsaved()
         message = self.autosave.update(monotonic())
         if message is not None:
             self._context.app_state.messages.add(message, "warning")
@@ -366,16 +285,16 @@ class EditView:
             found = self.editor.set_property([key for key in self.editor.selection if key.table == which], field, value)
         else:
             found = self.editor.set_value(location_of(section), field, value)
-        self._note_unsaved()
+        self.note_unsaved()
         return found
 
     def _remove_section(self, section: str) -> None:
         self.editor.remove_table(location_of(section))
-        self._note_unsaved()
+        self.note_unsaved()
 
     def _add_section(self, section: str) -> None:
         self.editor.add_material() if section == "material" else self.editor.add_pair()
-        self._note_unsaved()
+        self.note_unsaved()
 
     # --- Drawing -------------------------------------------------------------------------------------------------
 
@@ -409,11 +328,11 @@ class EditView:
         scene = editor.scene
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
         # While bodies are dragged, only the frame differs, so that the renderer need not prepare the scene again.
-        drawn = self.draft.scene if differ_in_places_only(scene, self.draft.scene) else scene
+        drawn = self.draft.scene if differ_in_poses_only(scene, self.draft.scene) else scene
         snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)
-        draw_overlay(surface, context.camera, editor, self.view_scale)
+        draw_overlay(Canvas(surface, context.camera, gui.ui_scale), editor, self.view_scale)
         area = gui.area
         self.toolbar.layout(area, gui.ui_scale)
         self._draw_check(surface, scene, area)
@@ -451,7 +370,7 @@ class EditView:
         body = None if self.editor.is_locked else self.editor.single_body
         self._ghost.submit(scene, body)
         if self._ghost.path is not None:
-            draw_ghost_path(surface, self._context.camera, self._ghost.path, self._context.gui.ui_scale)
+            draw_ghost_path(Canvas(surface, self._context.camera, self._context.gui.ui_scale), self._ghost.path)
         if self._ghost.fault is not None:
             self._context.app_state.messages.add(self._ghost.fault, "warning")
             self._ghost.fault = None
@@ -469,7 +388,7 @@ class EditView:
         if editor.is_locked:
             note = f"[{self.draft.preset}] makes this scene. Ctrl+Shift+X replaces it by its elements, to edit them."
         self.panel.show(property_sections(self.draft, editor.selection), note)
-        self._note_unsaved()
+        self.note_unsaved()
 
     def _draw_status(self, surface: pygame.Surface, area: pygame.Rect) -> None:
         """Draw the plate with the file, its state and the buttons of actions."""
@@ -477,9 +396,8 @@ class EditView:
         size, pad = 13.0 * ui_scale, round(6 * ui_scale)
         path = self.draft.path
         name = ("new scene" if path is None else path.name) + (" ●" if self.draft.is_changed else "")
-        grid = grid_step(self.view_scale.scale, ui_scale)
         ghost = self._ghost.path
-        detail = f"grid {grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
+        detail = f"grid {self.view_scale.grid:g} m" + ("" if ghost is None else f" · path: {ghost.engine}")
         left, top = self.toolbar.rect.right + pad, self.toolbar.rect.top
         self.actions.layout_row((left, top), ui_scale)
         x = self.actions.rect.right + pad

@@ -1,28 +1,31 @@
 """Editor: the draft of a scene, the selection and the tools, in world coordinates, m. No drawing and no events."""
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Literal
 
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.clipboard import CopiedElement, copied, paste_shift, pasting
+from sandbox.scene.editing.clipboard import CopiedElement, copy_elements, paste_elements, paste_shift
 from sandbox.scene.editing.draft import SceneDraft
 from sandbox.scene.editing.elements import (
     ElementKey,
     all_elements,
-    all_names,
     bodies_of,
-    counted,
-    element_of_body,
+    describe_elements,
     exists,
     name_of,
-    removal,
-    unique_name,
+    removal_changes,
 )
-from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
-from sandbox.scene.editing.transforms import AlignmentSide, Similarity, alignment, mirroring, transformation
+from sandbox.scene.editing.take_apart import TakeApartError, take_apart_changes
+from sandbox.scene.editing.transforms import (
+    AlignmentSide,
+    Similarity,
+    alignment_shift,
+    mirror_transform,
+    transform_elements,
+)
 from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import (
     AddElement,
@@ -34,24 +37,13 @@ from sandbox.window.editor.draw_gestures import (
     BoxGesture,
     CapsuleGesture,
     DiscGesture,
-    DrawGesture,
     OutlineGesture,
     PlaneGesture,
-    default_size,
 )
-from sandbox.window.editor.drive_tools import PlungerGesture, flipper_changes
-from sandbox.window.editor.force_tools import ThrustGesture, attraction_changes
-from sandbox.window.editor.gestures import (
-    Gesture,
-    MoveGesture,
-    RotateGesture,
-    SelectGesture,
-    VelocityGesture,
-    ViewScale,
-    set_values,
-)
+from sandbox.window.editor.force_tools import AttractionGesture, FlipperGesture, PlungerGesture, ThrustGesture
+from sandbox.window.editor.gestures import Gesture, MoveGesture, SelectGesture, set_values
 from sandbox.window.editor.handles import EditHandle, gesture_of_handle, handle_at, handles_of
-from sandbox.window.editor.joint_tools import JOINT_KINDS, ONE_CLICK, JointEnd, JointGesture, PlacementError
+from sandbox.window.editor.joint_tools import JOINT_KINDS, JointGesture, PlacementError
 from sandbox.window.editor.picking import bounds_of, bounds_of_elements, elements_at, pick_element
 from sandbox.window.editor.property_changes import (
     element_changes,
@@ -61,16 +53,25 @@ from sandbox.window.editor.property_changes import (
     table_changes,
     table_removal,
 )
-from sandbox.window.editor.snapping import REACH, anchor_of, grid_step, snap_point, surface_shift
+from sandbox.window.editor.snapping import PICK_REACH, Pointer, ViewScale
 
 MessageCallback = Callable[[str, str], None]
 """Callback with a text and a level, `info`, `warning` or `error`."""
-PICK_REACH = 6.0
-"""px at UI scale 1 beside an element within which it is picked"""
-FREEHAND_TOLERANCE = 2.5
-"""px at UI scale 1 by which a freehand outline may be simplified"""
 DRAG_REACH = 4.0
 """px at UI scale 1 that the pointer moves before a press becomes a drag"""
+GESTURES: Mapping[str, Callable[[Scene, str, Pointer], Gesture]] = {
+    **dict.fromkeys(("ball", "post"), DiscGesture),
+    "box": BoxGesture,
+    "capsule": CapsuleGesture,
+    "plane": PlaneGesture,
+    **dict.fromkeys(("polygon", "wall", "zone"), OutlineGesture),
+    **dict.fromkeys(JOINT_KINDS, JointGesture),
+    "flipper": FlipperGesture,
+    "plunger": PlungerGesture,
+    "thrust": ThrustGesture,
+    "attraction": AttractionGesture,
+}
+"""Gestures that a press of a tool begins, by its name; `select` and `eraser` act on the elements that there are"""
 
 
 class Editor:
@@ -99,8 +100,6 @@ class Editor:
         self._clip: tuple[CopiedElement, ...] = ()
         self._pastes = 0
         self._preview: tuple[Gesture, Scene] | None = None  # until the gesture changes
-        self.snapped: tuple[Point, str] | None = None
-        """point and kind to which the pointer has snapped"""
         self.pointer: Point | None = None
 
     # --- State ---------------------------------------------------------------------------------------------------
@@ -148,7 +147,7 @@ class Editor:
     def handles(self, view: ViewScale) -> list[EditHandle]:
         """Return the handles of the selection."""
         scene = self.scene
-        if self.tool != "select" or not self.selection or isinstance(self.gesture, SelectGesture):
+        if self.tool != "select" or not self.selection or (self.gesture is not None and not self.gesture.edits):
             return []
         return handles_of(scene, self.selection, view)
 
@@ -175,56 +174,37 @@ class Editor:
     def press(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
         """Press the left button at a point."""
         self.fault = self._preview = None
+        pointer = Pointer(point, view, is_free=control)
         if self.is_locked:
             self._notify_locked()
             return
         if self.gesture is not None and self.gesture.is_multi_click:
-            self._click_again(point, view, control)
+            if self.gesture.click(pointer):
+                self.finish()
             return
-        self.is_dragging, self._pressed = False, point
+        self.is_dragging, self._pressed, self._pressed_key = False, point, None
         if self.tool == "select":
             self._press_select(point, view, shift)
         elif self.tool == "eraser":
             self._erase(point, view)
-        elif self.tool == "attraction":
-            self._add_attraction(point, view, control)
-        elif self.tool == "flipper":
-            self._add_flipper(point, view, control)
         else:
-            try:
-                self.gesture = self._new_gesture(point, view, control)
-            except PlacementError as error:
-                self._notify(str(error), "warning")
-            if isinstance(self.gesture, JointGesture) and self.tool in ONE_CLICK:
-                self.finish()
+            self._begin(pointer)
+
+    def _begin(self, pointer: Pointer) -> None:
+        """Begin the gesture of the tool, and finish it if the press is all that it needs."""
+        try:
+            self.gesture = GESTURES[self.tool](self.draft.scene, self.tool, pointer)
+        except PlacementError as error:
+            self._pressed = None
+            self._notify(str(error), "warning")
+        if self.gesture is not None and self.gesture.is_one_click:
+            self.finish()
 
     def _notify_locked(self) -> None:
         self._notify(f"[{self.draft.preset}] makes this scene; Ctrl+Shift+X takes it apart", "warning")
 
-    def _add_attraction(self, point: Point, view: ViewScale, control: bool) -> None:
-        scene = self.draft.scene
-        name, at = unique_name("attraction", all_names(scene)), self._snap(point, view, control)
-        count = len(scene.attractions)
-        if self.apply(attraction_changes(scene, name, at, point, view.size), "add an attraction"):
-            self.selection = [ElementKey("attraction", count)]
-        self._pressed = self.snapped = None
-
-    def _add_flipper(self, point: Point, view: ViewScale, control: bool) -> None:
-        scene, tolerance = self.draft.scene, view.metres(PICK_REACH)
-        name, hinge = unique_name("flipper", all_names(scene)), self._snap(point, view, control)
-        if self._apply_or_notify(lambda scene: flipper_changes(scene, name, hinge, point, tolerance), "add a flipper"):
-            self._select_driven(name)
-        self._pressed = self.snapped = None
-
-    def _select_driven(self, drive: str) -> None:
-        """Select the body of a drive, whose properties then show both."""
-        scene = self.draft.scene
-        body = next(each.body for each in scene.drives if each.name == drive)
-        self.selection = [element_of_body(scene, scene.bodies.number_of[body])]
-
     def _press_select(self, point: Point, view: ViewScale, shift: bool) -> None:
         scene, handle = self.draft.scene, self.handle_at(point, view)
-        self._pressed_key = None
         if handle is not None:
             self.gesture = gesture_of_handle(scene, self.selection, handle)
             return
@@ -241,32 +221,6 @@ class Editor:
         elif key not in self.selection:
             self.selection = [key]
 
-    def _new_gesture(self, point: Point, view: ViewScale, control: bool) -> Gesture:
-        """Return the gesture that a press of a drawing tool begins."""
-        scene, tool = self.draft.scene, self.tool
-        tolerance = view.metres(PICK_REACH)
-        if tool in JOINT_KINDS:
-            end = self._joint_end(point, view, control)
-            return JointGesture(scene, tool, unique_name(tool, all_names(scene)), end, tolerance)
-        if tool == "plunger":
-            start = self._snap(point, view, control)
-            return PlungerGesture(scene, unique_name(tool, all_names(scene)), point, start, tolerance)
-        if tool == "thrust":
-            return ThrustGesture(scene, unique_name(tool, all_names(scene)), point, tolerance)
-        point = self._snap(point, view, control)
-        name, size = unique_name(tool, all_names(scene)), default_size(view.size)
-        kinds: dict[str, type[DrawGesture]] = {
-            "ball": DiscGesture,
-            "post": DiscGesture,
-            "box": BoxGesture,
-            "capsule": CapsuleGesture,
-            "plane": PlaneGesture,
-        }
-        if tool in kinds:
-            return kinds[tool](scene, tool, name, point, size)
-        thickness = 0.2 * size if tool == "wall" else 0.0
-        return OutlineGesture(scene, tool, name, point, size, view.metres(REACH), thickness)
-
     def move(self, point: Point, view: ViewScale, *, control: bool = False) -> None:
         """Move the pointer to a point while the button is down, or between clicks."""
         self.pointer, self._preview = point, None
@@ -279,67 +233,18 @@ class Editor:
         gesture = self.gesture
         if gesture is None or gesture.typed or not (self.is_dragging or gesture.is_multi_click):
             return
-        if isinstance(gesture, MoveGesture):
-            self._drag(gesture, point, view, control)
-        elif isinstance(gesture, RotateGesture):
-            gesture.is_snapped = not control
-            gesture.move(point)
-        elif isinstance(gesture, JointGesture):
-            gesture.move_end(self._joint_end(point, view, control))
-        elif isinstance(gesture, OutlineGesture) and self._pressed is not None and self.is_dragging:
-            gesture.draw_freehand(point, view.metres(FREEHAND_TOLERANCE))
-        elif isinstance(gesture, SelectGesture | VelocityGesture | ThrustGesture):
-            gesture.move(point)
-        else:
-            gesture.move(self._snap(point, view, control))
-
-    def _drag(self, gesture: MoveGesture, point: Point, view: ViewScale, control: bool) -> None:
-        """Move elements so that the first one lies on the grid, or touches a plane that is near."""
-        assert self._pressed is not None
-        way = point[0] - self._pressed[0], point[1] - self._pressed[1]
-        gesture.shift_by(way)
-        self.snapped = None
-        if control:
-            return
-        anchor = anchor_of(self.draft.scene, gesture.keys[0])
-        if anchor is not None:
-            target = anchor[0] + way[0], anchor[1] + way[1]
-            found = snap_point(self.draft.scene, target, view.scale, view.ui_scale, gesture.keys)
-            gesture.shift_by((found.point[0] - anchor[0], found.point[1] - anchor[1]))
-            self.snapped = (found.point, found.to) if found.to != "grid" else None
-        contact = surface_shift(gesture.preview(), gesture.keys, view.scale, view.ui_scale)
-        if contact is not None:
-            x, y = gesture.by.shift
-            gesture.shift_by((x + contact[0], y + contact[1]))
-
-    def _snap(self, point: Point, view: ViewScale, control: bool) -> Point:
-        if control:
-            self.snapped = None
-            return point
-        found = snap_point(self.draft.scene, point, view.scale, view.ui_scale)
-        self.snapped = (found.point, found.to) if found.to != "grid" else None
-        return found.point
-
-    def _joint_end(self, point: Point, view: ViewScale, control: bool) -> JointEnd:
-        anchor = self._snap(point, view, control)
-        return JointEnd(point, anchor, is_snapped=self.snapped is not None, is_free=control)
+        gesture.drag(Pointer(point, view, control, self._pressed is not None and self.is_dragging))
 
     def release(self, point: Point, view: ViewScale, *, shift: bool = False, control: bool = False) -> None:
         """Release the left button at a point."""
-        gesture = self.gesture
         self.move(point, view, control=control)
-        pressed, dragged = self._pressed, self.is_dragging
+        pressed, is_dragged = self._pressed, self.is_dragging
         self._pressed, self.is_dragging = None, False
-        if gesture is None and self.gesture is None:
-            if self._pressed_key is not None and not dragged and not shift and pressed is not None:
+        if self.gesture is None:
+            if self._pressed_key is not None and not is_dragged and not shift and pressed is not None:
                 self.selection = [self._next_at(pressed, view)]
-            return
-        gesture = self.gesture
-        assert gesture is not None
-        is_freehand = isinstance(gesture, OutlineGesture) and gesture.is_freehand
-        if gesture.is_multi_click and not is_freehand and not (isinstance(gesture, JointGesture) and dragged):
-            return
-        self.finish()
+        elif not self.gesture.is_multi_click:
+            self.finish()
 
     def _next_at(self, point: Point, view: ViewScale) -> ElementKey:
         """Return the element that a click selects: the topmost one, or the one below the one that was selected."""
@@ -349,18 +254,9 @@ class Editor:
             return self._pressed_key
         return found[(found.index(self._pressed_key) + 1) % len(found)]
 
-    def _click_again(self, point: Point, view: ViewScale, control: bool) -> None:
-        gesture = self.gesture
-        assert gesture is not None
-        if isinstance(gesture, JointGesture):
-            gesture.move_end(self._joint_end(point, view, control))
-            self.finish()
-        elif gesture.click(self._snap(point, view, control)):
-            self.finish()
-
     def finish(self) -> bool:
         """Finish the gesture, and apply its changes; return whether that succeeded."""
-        gesture, self.gesture, self.snapped = self.gesture, None, None
+        gesture, self.gesture = self.gesture, None
         self._pressed, self.is_dragging = None, False
         if gesture is None:
             return False
@@ -370,22 +266,37 @@ class Editor:
             self._notify(str(error), "warning")
             return False
         selects = gesture.selects
-        if isinstance(gesture, SelectGesture):
-            self.selection = list(selects or ())
-            return True
-        if not changes or not self.apply(changes, gesture.label):
+        if gesture.edits and (not changes or not self.apply(changes, gesture.label)):
             return False
-        if isinstance(gesture, PlungerGesture):
-            self._select_driven(gesture.name)
-        if isinstance(gesture, JointGesture) and gesture.note:
+        if gesture.note:
             self._notify(gesture.note, "info")
         if selects is not None:
             self.selection = [key for key in selects if exists(self.draft.scene, key)]
         return True
 
+    def confirm(self) -> None:
+        """Take the key Enter during a gesture: finish it, or add the corner that was typed."""
+        self._preview = None
+        if self.gesture is not None and self.gesture.confirm():
+            self.finish()
+
+    def take_back(self) -> bool:
+        """Remove the last typed character of a gesture, else its last corner; return whether there was one."""
+        gesture = self.gesture
+        if gesture is None or not (gesture.typed or gesture.corners):
+            return False
+        if gesture.typed:
+            self.type_text(gesture.typed[:-1])
+            return True
+        self._preview = None
+        gesture.corners.pop()
+        if not gesture.corners:
+            self.cancel()
+        return True
+
     def cancel(self) -> bool:
         """Cancel the gesture, else clear the selection, else choose the select tool; return whether any applied."""
-        self.snapped, self._pressed, self.is_dragging = None, None, False
+        self._pressed, self.is_dragging = None, False
         if self.gesture is not None:
             self.gesture = None
             return True
@@ -401,7 +312,7 @@ class Editor:
         key = pick_element(self.draft.scene, point, view.metres(PICK_REACH))
         if key is not None and (self.is_dragging is False or key.table != "plane"):
             self.selection = []
-            self.apply(removal(self.draft.scene, [key]), f"erase {name_of(self.draft.scene, key)}")
+            self.apply(removal_changes(self.draft.scene, [key]), f"erase {name_of(self.draft.scene, key)}")
             self.hovered = None
 
     # --- Operations ----------------------------------------------------------------------------------------------
@@ -425,14 +336,14 @@ class Editor:
 
     def _drop_gesture(self) -> None:
         """Cancel the gesture and the click under way when the draft changes: they refer to its old elements."""
-        self.gesture = self.snapped = self._pressed_key = None
+        self.gesture = self._pressed_key = None
 
     def delete(self) -> None:
         """Delete the selection, and the joints and forces of its bodies."""
         keys = self._selection_or_note()
         if keys:
             self.selection = []
-            if not self.apply(removal(self.draft.scene, keys), f"delete {counted(keys)}"):
+            if not self.apply(removal_changes(self.draft.scene, keys), f"delete {describe_elements(keys)}"):
                 self.selection = keys
 
     def select_all(self) -> None:
@@ -447,7 +358,7 @@ class Editor:
         """Copy the selection."""
         keys = self._selection_or_note()
         if keys:
-            self._clip, self._pastes = copied(self.draft.scene, keys), 0
+            self._clip, self._pastes = copy_elements(self.draft.scene, keys), 0
 
     def cut(self) -> None:
         """Copy and delete the selection."""
@@ -461,34 +372,34 @@ class Editor:
             self._notify("nothing was copied; Ctrl+C copies the selection", "warning")
             return
         self._pastes += 1
-        self._add_copies(self._clip, paste_shift(grid_step(view.scale, view.ui_scale), self._pastes), "paste")
+        self._add_copies(self._clip, paste_shift(view.grid, self._pastes), "paste")
 
     def duplicate(self, view: ViewScale) -> None:
         """Add copies of the selection beside it, and select them."""
         keys = self._selection_or_note()
         if keys:
-            shift = paste_shift(grid_step(view.scale, view.ui_scale), 1)
-            self._add_copies(copied(self.draft.scene, keys), shift, "duplicate")
+            shift = paste_shift(view.grid, 1)
+            self._add_copies(copy_elements(self.draft.scene, keys), shift, "duplicate")
 
     def _add_copies(self, elements: tuple[CopiedElement, ...], shift: Point, label: str) -> None:
-        changes, keys = pasting(self.draft.scene, elements, Similarity(shift=shift))
-        if changes and self.apply(changes, f"{label} {counted(keys)}"):
+        changes, keys = paste_elements(self.draft.scene, elements, Similarity(shift=shift))
+        if changes and self.apply(changes, f"{label} {describe_elements(keys)}"):
             self.tool = "select"
             self.selection = [key for key in keys if key.table not in ("drive",)]
 
     def nudge(self, shift: Point) -> None:
         """Move the selection by a vector, m."""
         if self.selection:
-            values = transformation(self.draft.scene, self.selection, Similarity(shift=shift))
-            self.apply(set_values(values), f"move {counted(self.selection)}", "nudge")
+            values = transform_elements(self.draft.scene, self.selection, Similarity(shift=shift))
+            self.apply(set_values(values), f"move {describe_elements(self.selection)}", "nudge")
 
     def mirror(self, *, is_vertical: bool = False) -> None:
         """Mirror the selection about the middle of its box, left and right or up and down."""
         box = self.selection_bounds(self.draft.scene)
         if box is None or not self._selection_or_note():
             return
-        values = transformation(self.draft.scene, self.selection, mirroring(box, is_vertical=is_vertical))
-        self.apply(set_values(values), f"mirror {counted(self.selection)}")
+        values = transform_elements(self.draft.scene, self.selection, mirror_transform(box, is_vertical=is_vertical))
+        self.apply(set_values(values), f"mirror {describe_elements(self.selection)}")
 
     def align(self, side: AlignmentSide) -> None:
         """Align the selected elements by a side of their boxes, with the box of all of them."""
@@ -500,8 +411,8 @@ class Editor:
         for key in self.selection:
             own = bounds_of(self.draft.scene, key)
             if own is not None:
-                values |= transformation(self.draft.scene, [key], Similarity(shift=alignment(own, box, side)))
-        self.apply(set_values(values), f"align {counted(self.selection)}")
+                values |= transform_elements(self.draft.scene, [key], Similarity(shift=alignment_shift(own, box, side)))
+        self.apply(set_values(values), f"align {describe_elements(self.selection)}")
 
     def reorder(self, step: Literal[-1, 1]) -> None:
         """Exchange the selected element with the next (1) or the previous one (−1) of its table.
@@ -558,12 +469,12 @@ class Editor:
     def _take_elements_apart(self) -> None:
         keys = self._selection_or_note()
         try:
-            changes = taking_apart(self.draft.scene, keys)
+            changes = take_apart_changes(self.draft.scene, keys)
         except TakeApartError as error:
             self._notify(str(error), "warning")
             return
-        are_walls = all(key.table == "wall" for key in keys)
-        if keys and self.apply(changes, f"divide {counted(keys)}" if are_walls else f"take {counted(keys)} apart"):
+        are_walls, described = all(key.table == "wall" for key in keys), describe_elements(keys)
+        if keys and self.apply(changes, f"divide {described}" if are_walls else f"take {described} apart"):
             self.selection = []
             parts = sum(isinstance(change, AddElement) for change in changes)
             walls = f"divided into {parts + len(keys)} walls of two points"
@@ -579,7 +490,7 @@ class Editor:
     def set_property(self, keys: Collection[ElementKey], name: str, value: Any) -> str | None:
         """Set a key of elements, as `element_changes` does; return the message of a fault, or None."""
         changes = element_changes(self.draft.scene, self.draft.document, keys, name, value)
-        return self._change_property(changes, f"set {name} of {counted(list(keys))}", name)
+        return self._change_property(changes, f"set {name} of {describe_elements(list(keys))}", name)
 
     def set_value(self, location: Location, name: str, value: Any) -> str | None:
         """Set a key of a table at a location, as `table_changes` does; return the message of a fault, or None."""

@@ -1,13 +1,15 @@
 """Gestures: what happens between the press and the release of the mouse, or between the clicks, of an editor tool.
 
-A gesture previews its effect as a scene that is not validated, states dimensions for the overlay, and ends in changes
-of the draft. Positions are snapped by the editor before they come here, m. Numbers that are typed replace dimensions.
+A gesture follows the pointer, previews its effect as a scene that is not validated, states dimensions for the overlay,
+and ends in changes of the draft. Numbers that are typed replace dimensions. Positions are in m.
 """
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
+
+import pygame
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
@@ -17,23 +19,13 @@ from sandbox.scene.editing.elements import (
     with_elements,
     with_moved_bodies,
 )
-from sandbox.scene.editing.transforms import Similarity, plain_value, round_value, transformation
+from sandbox.scene.editing.transforms import Similarity, plain_value, round_value, transform_elements
 from sandbox.scene.files.toml_changes import Change, SetValue
 from sandbox.window.editor.picking import elements_within
-
-
-class ViewScale(NamedTuple):
-    """What gestures need to know of the camera."""
-
-    scale: float
-    """px/m"""
-    ui_scale: float
-    size: float
-    """m, shorter side of the visible area"""
-
-    def metres(self, pixels: float) -> float:
-        """Return a length of pixels at UI scale 1, m."""
-        return pixels * self.ui_scale / self.scale
+from sandbox.window.editor.snapping import Pointer, SnappedPoint, anchor_of, snap_point, surface_shift
+from sandbox.window.render.draw_context import FARTHEST, Canvas
+from sandbox.window.render.palette import SKY
+from sandbox.window.render.text import draw_box
 
 
 class Gesture(ABC):
@@ -41,21 +33,63 @@ class Gesture(ABC):
 
     label = ""
     """what it does, for the menu of undo"""
+    snaps = True
+    """whether the pointer snaps to the grid, to centres and to corners"""
+    edits = True
+    """whether it changes the draft; otherwise only the selection"""
+    is_one_click = False
+    """whether the press of the button finishes it"""
     is_multi_click = False
-    """whether it continues after the release of the button, until it is finished"""
+    """whether it continues after the release of the button, with further clicks"""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, begin: Point = (0.0, 0.0)) -> None:
+        self.scene, self.begin, self.end = scene, begin, begin
         self.typed = ""
         """numbers that were typed"""
+        self.corners: list[Point] = []
+        """corners that were set one by one; Backspace removes the last one"""
+        self.snapped: SnappedPoint | None = None
+        """where the pointer has snapped"""
 
-    @abstractmethod
     def move(self, point: Point) -> None:
-        """Move the pointer to a point, m."""
+        """Follow the pointer to a point, m."""
+        self.end = point
+
+    def drag(self, pointer: Pointer) -> None:
+        """Follow the pointer."""
+        self.move(self.snap(pointer) if self.snaps else pointer.point)
+
+    def snap(self, pointer: Pointer) -> Point:
+        """Return the point to which the pointer snaps, m."""
+        self.snapped = None if pointer.is_free else snap_point(self.scene, pointer.point, pointer.view)
+        return pointer.point if self.snapped is None else self.snapped.point
+
+    def click(self, pointer: Pointer) -> bool:
+        """Take a further click; return whether the gesture is finished."""
+        self.drag(pointer)
+        return True
+
+    def confirm(self) -> bool:
+        """Take the key Enter; return whether the gesture is finished."""
+        return True
+
+    def type_text(self, text: str) -> None:
+        """Replace dimensions by typed numbers."""
+        self.typed = text
 
     @abstractmethod
     def changes(self) -> Sequence[Change]:
         """Return the changes of the draft; empty if there are none."""
+
+    @property
+    def selects(self) -> list[ElementKey] | None:
+        """The elements that are selected afterwards; None to keep the selection."""
+        return None
+
+    @property
+    def note(self) -> str:
+        """Message after the changes; empty without one."""
+        return ""
 
     def preview(self) -> Scene:
         """Return the scene as it will be, not validated."""
@@ -65,19 +99,8 @@ class Gesture(ABC):
         """Return the present dimensions, such as `r 0.35 m`."""
         return ""
 
-    def type_text(self, text: str) -> None:
-        """Replace dimensions by typed numbers."""
-        self.typed = text
-
-    def click(self, point: Point) -> bool:
-        """Take a further click; return whether the gesture is finished."""
-        self.move(point)
-        return True
-
-    @property
-    def selects(self) -> list[ElementKey] | None:
-        """The elements that are selected afterwards; None to keep the selection."""
-        return None
+    def draw(self, canvas: Canvas) -> None:  # noqa: B027, most gestures show no more than their preview
+        """Draw what the preview does not show."""
 
 
 def typed_numbers(text: str) -> list[float]:
@@ -96,14 +119,14 @@ def typed_numbers(text: str) -> list[float]:
 class TransformGesture(Gesture):
     """Moves, rotates or scales elements."""
 
-    def __init__(self, scene: Scene, keys: Collection[ElementKey]) -> None:
-        super().__init__(scene)
+    def __init__(self, scene: Scene, keys: Collection[ElementKey], begin: Point) -> None:
+        super().__init__(scene, begin)
         self.keys = tuple(keys)
         self.by = Similarity()
 
     def values(self) -> Mapping[ElementKey, dict[str, Any]]:
         """Return the new values of each element."""
-        return transformation(self.scene, self.keys, self.by)
+        return transform_elements(self.scene, self.keys, self.by)
 
     def preview(self) -> Scene:
         """Return the scene with the elements transformed."""
@@ -142,13 +165,25 @@ class MoveGesture(TransformGesture):
 
     label = "move"
 
-    def __init__(self, scene: Scene, keys: Collection[ElementKey], begin: Point) -> None:
-        super().__init__(scene, keys)
-        self._begin = begin
-
     def move(self, point: Point) -> None:
         """Move the elements by the way from the press to a point."""
-        self.shift_by((point[0] - self._begin[0], point[1] - self._begin[1]))
+        self.shift_by((point[0] - self.begin[0], point[1] - self.begin[1]))
+
+    def drag(self, pointer: Pointer) -> None:
+        """Move the elements so that the first one lies on the grid, or touches a surface that is near."""
+        self.move(pointer.point)
+        self.snapped = None
+        if pointer.is_free:
+            return
+        anchor, (x, y) = anchor_of(self.scene, self.keys[0]), pointer.point
+        if anchor is not None:
+            target = anchor[0] + (x - self.begin[0]), anchor[1] + (y - self.begin[1])
+            self.snapped = snap_point(self.scene, target, pointer.view, self.keys)
+            self.shift_by((self.snapped.point[0] - anchor[0], self.snapped.point[1] - anchor[1]))
+        contact = surface_shift(self.preview(), self.keys, pointer.view)
+        if contact is not None:
+            x, y = self.by.shift
+            self.shift_by((x + contact[0], y + contact[1]))
 
     def shift_by(self, shift: Point) -> None:
         """Move the elements by a vector, m."""
@@ -174,15 +209,20 @@ class RotateGesture(TransformGesture):
     STEP = math.radians(15.0)
 
     def __init__(self, scene: Scene, keys: Collection[ElementKey], centre: Point, begin: Point) -> None:
-        super().__init__(scene, keys)
-        self.centre, self._begin = centre, math.atan2(begin[1] - centre[1], begin[0] - centre[0])
-        self.is_snapped = True
+        super().__init__(scene, keys, begin)
+        self.centre, self._begin_angle = centre, math.atan2(begin[1] - centre[1], begin[0] - centre[0])
+        self._is_free = False
+
+    def drag(self, pointer: Pointer) -> None:
+        """Turn the elements towards the pointer."""
+        self._is_free = pointer.is_free
+        self.move(pointer.point)
 
     def move(self, point: Point) -> None:
         """Turn the elements towards a point."""
-        angle = math.atan2(point[1] - self.centre[1], point[0] - self.centre[0]) - self._begin
+        angle = math.atan2(point[1] - self.centre[1], point[0] - self.centre[0]) - self._begin_angle
         angle = math.remainder(angle, math.tau)
-        if self.is_snapped:
+        if not self._is_free:
             angle = round(angle / self.STEP) * self.STEP
         self.by = Similarity(self.centre, angle)
 
@@ -205,12 +245,12 @@ class ScaleGesture(TransformGesture):
     SMALLEST = 1e-3
 
     def __init__(self, scene: Scene, keys: Collection[ElementKey], fixed: Point, begin: Point) -> None:
-        super().__init__(scene, keys)
-        self._fixed, self._begin = fixed, begin
+        super().__init__(scene, keys, begin)
+        self._fixed = fixed
 
     def move(self, point: Point) -> None:
         """Scale so that the corner follows a point."""
-        before = self._begin[0] - self._fixed[0], self._begin[1] - self._fixed[1]
+        before = self.begin[0] - self._fixed[0], self.begin[1] - self._fixed[1]
         squared = before[0] ** 2 + before[1] ** 2
         along = (point[0] - self._fixed[0]) * before[0] + (point[1] - self._fixed[1]) * before[1]
         factor = max(along / squared if squared else 1.0, self.SMALLEST)
@@ -279,6 +319,7 @@ class VelocityGesture(Gesture):
     """Sets the velocity of a body by the tip of its arrow."""
 
     label = "set a velocity"
+    snaps = False
 
     def __init__(self, scene: Scene, key: ElementKey, body: int, time: float) -> None:
         """Begin to set a velocity.
@@ -328,14 +369,11 @@ class SelectGesture(Gesture):
     """Rubber band: selects the elements that are wholly within a rectangle."""
 
     label = "select"
+    snaps = edits = False
 
     def __init__(self, scene: Scene, begin: Point, kept: Sequence[ElementKey] = ()) -> None:
-        super().__init__(scene)
-        self.begin, self.end, self.kept = begin, begin, tuple(kept)
-
-    def move(self, point: Point) -> None:
-        """Draw the rectangle as far as a point."""
-        self.end = point
+        super().__init__(scene, begin)
+        self.kept = tuple(kept)
 
     def changes(self) -> list[Change]:
         """Return no changes: only the selection changes."""
@@ -346,3 +384,9 @@ class SelectGesture(Gesture):
         """The elements within, and those that were selected before if Shift is held."""
         found = elements_within(self.scene, self.begin, self.end)
         return [*self.kept, *(key for key in found if key not in self.kept)]
+
+    def draw(self, canvas: Canvas) -> None:
+        """Draw the rectangle."""
+        (ax, ay), (bx, by) = canvas.pixels((self.begin, self.end), FARTHEST)
+        rect = pygame.Rect(round(min(ax, bx)), round(min(ay, by)), round(abs(ax - bx)), round(abs(ay - by)))
+        draw_box(canvas.surface, rect, 0, SKY, 40, SKY)

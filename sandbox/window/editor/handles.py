@@ -15,9 +15,9 @@ from sandbox.window.editor.gestures import (
     ScaleGesture,
     VelocityGesture,
     VertexGesture,
-    ViewScale,
 )
 from sandbox.window.editor.picking import bounds_of_elements
+from sandbox.window.editor.snapping import ViewScale
 
 HandleKind = Literal["scale", "rotate", "vertex", "velocity"]
 ROTATE_DISTANCE = 26.0

@@ -8,12 +8,17 @@ import numpy as np
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.editing.elements import all_names, naming, unique_name
+from sandbox.scene.editing.elements import all_names, naming_changes, unique_name
 from sandbox.scene.editing.transforms import round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.window.editor.gestures import Gesture
 from sandbox.window.editor.picking import bodies_at, start_frame, to_body
+from sandbox.window.editor.snapping import Pointer
 from sandbox.window.hit_test import hulls_of, signed_distance
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.draw_context import Canvas
+from sandbox.window.render.lines import draw_line
+from sandbox.window.render.palette import SKY
 
 JOINT_KINDS = ("rod", "pivot", "rope", "spring", "motor", "slide", "groove", "gear")
 """Joints that have a tool; a rope is a `slide` whose lower limit is 0"""
@@ -194,7 +199,7 @@ def _names(scene: Scene, bodies: list[int]) -> tuple[list[str], list[Change]]:
     names, changes = [], list[Change]()
     for body in bodies:
         names.append(scene.bodies.names[body])
-        changes += [change for change in naming(scene, body) if change not in changes]
+        changes += [change for change in naming_changes(scene, body) if change not in changes]
     return names, changes
 
 
@@ -210,29 +215,22 @@ class JointGesture(Gesture):
 
     is_multi_click = True
 
-    def __init__(self, scene: Scene, kind: str, name: str, end: JointEnd, tolerance: float) -> None:
+    def __init__(self, scene: Scene, kind: str, pointer: Pointer) -> None:
         super().__init__(scene)
-        self.kind, self.name, self._tolerance = kind, name, tolerance
-        self._first = self._second = end
-        self.label = f"add a {kind}"
+        self.kind, self.name, self._tolerance = kind, unique_name(kind, all_names(scene)), pointer.pick_reach
+        self._first = self._second = self._joint_end(pointer)
+        self.begin = self.end = self._first.anchor
+        self.label, self.is_one_click = f"add a {kind}", kind in ONE_CLICK
 
-    @property
-    def begin(self) -> Point:
-        """First anchor, m."""
-        return self._first.anchor
+    def _joint_end(self, pointer: Pointer) -> JointEnd:
+        anchor = self.snap(pointer)
+        is_snapped = self.snapped is not None and self.snapped.to != "grid"
+        return JointEnd(pointer.point, anchor, is_snapped, pointer.is_free)
 
-    @property
-    def end(self) -> Point:
-        """Second anchor, m."""
-        return self._second.anchor
-
-    def move(self, point: Point) -> None:
-        """Draw the joint as far as a point."""
-        self.move_end(JointEnd(point, point))
-
-    def move_end(self, end: JointEnd) -> None:
-        """Draw the joint as far as an end."""
-        self._second = end
+    def drag(self, pointer: Pointer) -> None:
+        """Draw the joint as far as the pointer."""
+        self._second = self._joint_end(pointer)
+        self.end, self.is_multi_click = self._second.anchor, not pointer.is_dragging
 
     def changes(self) -> list[Change]:
         """Return the changes that add the joint.
@@ -244,7 +242,7 @@ class JointGesture(Gesture):
 
     @property
     def note(self) -> str:
-        """What is to be said when the joint is made: that it joins a body to the world, where two may be meant."""
+        """Message that the joint joins a body to the world, where two bodies may be meant."""
         if self.kind not in ONE_CLICK:
             return ""
         found = bodies_of_pivot(self.scene, self._first, self._tolerance)
@@ -256,3 +254,10 @@ class JointGesture(Gesture):
     def dimensions(self) -> str:
         """Return the length."""
         return "" if self.kind in ONE_CLICK else f"{math.dist(self.begin, self.end):.4g} m"
+
+    def draw(self, canvas: Canvas) -> None:
+        """Draw a line between the ends."""
+        a, b = canvas.pixels((self.begin, self.end))
+        draw_line(canvas.surface, a, b, SKY, 2.0 * canvas.ui_scale)
+        for end in (a, b):
+            draw_disc(canvas.surface, end, 4 * canvas.ui_scale, SKY)

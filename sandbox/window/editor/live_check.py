@@ -34,7 +34,7 @@ from sandbox.scene.editing.elements import (
     element_of_body,
     elements_of_table,
 )
-from sandbox.scene.editing.transforms import Similarity, transformed
+from sandbox.scene.editing.transforms import Similarity, transform_element
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.toml_changes import Change, RemoveValue, SetValue
 from sandbox.window.editor.latest_job import LatestJob
@@ -301,7 +301,7 @@ def _separation(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
         shift = normal[0] * depth, normal[1] * depth
         if not _is_free_at(scene, name, shift):
             continue
-        position = transformed(element_at(scene, key), Similarity(shift=shift)).get("position")
+        position = transform_element(element_at(scene, key), Similarity(shift=shift)).get("position")
         if position is not None:
             value: Any = [round(each, 9) for each in position]
             yield Remedy(f"move {name!r} by {depth:.3g} m", (SetValue((*key.location, "position"), value),))

@@ -5,7 +5,15 @@ from itertools import combinations_with_replacement
 from typing import Any
 
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.editing.elements import ElementKey, all_names, exists, material_users, name_of, renaming, unique_name
+from sandbox.scene.editing.elements import (
+    ElementKey,
+    all_names,
+    exists,
+    material_users,
+    name_of,
+    renaming_changes,
+    unique_name,
+)
 from sandbox.scene.errors import Location, SceneError
 from sandbox.scene.files.toml_changes import AddElement, Change, RemoveElement, RemoveValue, SetValue
 from sandbox.window.editor.joint_tools import PlacementError
@@ -28,7 +36,7 @@ def element_changes(
         if name == "name" and value is not None:
             own = value if len(keys) == 1 else unique_name(value, taken)
             taken.add(own)
-            changes += renaming(scene, key, own)
+            changes += renaming_changes(scene, key, own)
         else:
             changes.append(_setting(document, key.location, name, value))
     return changes

@@ -1,9 +1,9 @@
-"""Snapping of points in the editor: to a grid that depends on the zoom, to centres and corners, and to surfaces."""
+"""The pointer of the editor, which snaps to a grid that depends on the zoom, to centres, corners and surfaces."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at
-from sandbox.scene.geometry.vectors import nearest_fraction
+from sandbox.scene.geometry.vectors import offset_from_segment
 from sandbox.window.editor.picking import bounds_of, start_frame
 from sandbox.window.hit_test import hulls_of
 
@@ -19,6 +19,44 @@ MIN_GRID = 6.0
 """px at UI scale 1: smallest distance of grid points"""
 REACH = 8.0
 """px at UI scale 1: distance within which a point snaps"""
+PICK_REACH = 6.0
+"""px at UI scale 1 beside an element within which it is picked"""
+
+
+class ViewScale(NamedTuple):
+    """Scale and size of the view of the editor."""
+
+    scale: float
+    """px/m"""
+    ui_scale: float
+    size: float
+    """m, shorter side of the visible area"""
+
+    def metres(self, pixels: float) -> float:
+        """Return a length of pixels at UI scale 1, m."""
+        return pixels * self.ui_scale / self.scale
+
+    @property
+    def grid(self) -> float:
+        """Step of the grid, m."""
+        return grid_step(self.scale, self.ui_scale)
+
+
+class Pointer(NamedTuple):
+    """The pointer of the mouse."""
+
+    point: Point
+    """m"""
+    view: ViewScale
+    is_free: bool = False
+    """whether Ctrl is held, so that it does not snap"""
+    is_dragging: bool = False
+    """whether the button is held and the pointer has been moved since the press"""
+
+    @property
+    def pick_reach(self) -> float:
+        """Distance beside an element within which it is picked, m."""
+        return self.view.metres(PICK_REACH)
 
 
 @dataclass(frozen=True)
@@ -44,27 +82,23 @@ def rounded(value: float, step: float) -> float:
     return round(round(value / step) * step, min(digits, 15)) + 0.0
 
 
-def snap_point(
-    scene: Scene, point: Point, scale: float, ui_scale: float = 1.0, without: Collection[ElementKey] = ()
-) -> SnappedPoint:
+def snap_point(scene: Scene, point: Point, view: ViewScale, without: Collection[ElementKey] = ()) -> SnappedPoint:
     """Return a point snapped to the nearest centre, corner or end within reach, else to the grid.
 
     Args:
         scene: the scene.
         point: m.
-        scale: of the camera, px/m.
-        ui_scale: UI scale.
+        view: scale of the view.
         without: elements that are being moved, to which nothing snaps.
     """
-    reach = REACH * ui_scale / scale
     targets = _targets(scene, without)
     if len(targets[0]):
         distance = np.hypot(*(targets[0] - np.asarray(point)).T)
         nearest = int(np.argmin(distance))
-        if distance[nearest] <= reach:
+        if distance[nearest] <= view.metres(REACH):
             x, y = targets[0][nearest].tolist()
             return SnappedPoint((x, y), targets[1][nearest])
-    step = grid_step(scale, ui_scale)
+    step = view.grid
     return SnappedPoint((rounded(point[0], step), rounded(point[1], step)), "grid")
 
 
@@ -96,7 +130,7 @@ def _targets(scene: Scene, without: Collection[ElementKey]) -> tuple[FloatArray,
     return np.asarray(points, np.float64).reshape(-1, 2), kinds
 
 
-def surface_shift(scene: Scene, keys: Collection[ElementKey], scale: float, ui_scale: float = 1.0) -> Point | None:
+def surface_shift(scene: Scene, keys: Collection[ElementKey], view: ViewScale) -> Point | None:
     """Return the shift, m, that makes moved bodies touch the nearest surface within reach; None without one.
 
     All bodies snap to planes, balls also to walls, posts and other balls.
@@ -104,10 +138,9 @@ def surface_shift(scene: Scene, keys: Collection[ElementKey], scale: float, ui_s
     Args:
         scene: the scene, with the bodies at their present places.
         keys: the elements that are moved.
-        scale: of the camera, px/m.
-        ui_scale: UI scale.
+        view: scale of the view.
     """
-    reach = REACH * ui_scale / scale
+    reach = view.metres(REACH)
     moved = [body for key in keys for body in bodies_of(scene, key)]
     gaps = list(_plane_gaps(scene, keys, moved))
     if len(moved) == 1 and scene.bodies.round[moved[0]]:
@@ -138,29 +171,21 @@ def _ball_gaps(scene: Scene, keys: Collection[ElementKey], ball: int) -> Iterato
     """Yield the gap of a ball to each wall, post and other ball, m, and the direction from there to the ball."""
     bodies = scene.bodies
     centre, radius = bodies.position[ball], float(bodies.radius[ball])
-    nearest: list[tuple[FloatArray, float]] = []
+    offsets: list[tuple[FloatArray, float]] = []
     for k, wall in enumerate(scene.walls):
         if ElementKey("wall", k) not in keys:
-            ends = (*wall.points[1:], wall.points[0]) if wall.closed else wall.points[1:]
-            nearest += [
-                (_nearest_on_segment(np.asarray(a), np.asarray(b), centre), 0.5 * wall.thickness)
-                for a, b in zip(wall.points, ends, strict=False)
-            ]
-    nearest += [
-        (np.asarray(post.position), post.radius)
+            points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
+            sides = offset_from_segment(centre, points[:-1], np.diff(points, axis=0))
+            offsets += [(offset, 0.5 * wall.thickness) for offset in sides]
+    offsets += [
+        (centre - np.asarray(post.position), post.radius)
         for k, post in enumerate(scene.posts)
         if ElementKey("post", k) not in keys
     ]
     others = np.flatnonzero(bodies.round & (np.hypot(*(bodies.position - centre).T) <= 2.0 * radius + bodies.radius))
-    nearest += [(bodies.position[k], float(bodies.radius[k])) for k in others.tolist() if k != ball]
-    for point, margin in nearest:
-        offset = centre - point
+    offsets += [(centre - bodies.position[k], float(bodies.radius[k])) for k in others.tolist() if k != ball]
+    for offset, margin in offsets:
         distance = float(np.hypot(*offset))
         if distance > 0.0:
             x, y = (offset / distance).tolist()
             yield distance - radius - margin, (x, y)
-
-
-def _nearest_on_segment(a: FloatArray, b: FloatArray, point: FloatArray) -> FloatArray:
-    """Return the point of a segment that is nearest to another, (2,) m."""
-    return np.asarray(a + nearest_fraction(*a.tolist(), *b.tolist(), *point.tolist()) * (b - a))

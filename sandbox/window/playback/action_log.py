@@ -49,15 +49,11 @@ class ActionLog:
         del self._actions[index:]
         self.done = min(self.done, index)
 
-    def due(self, simulation: SwitchableSimulation) -> list[Action]:
+    def due(self, simulation: SwitchableSimulation) -> Sequence[Action]:
         """Return the actions up to the present time that are not applied yet."""
-        latest = simulation.time + TIME_ROUNDING * simulation.settings.dt
-        end = self.done
-        while end < len(self._actions) and self._actions[end].time <= latest:
-            end += 1
-        return self._actions[self.done : end]
+        return due_actions(simulation, self._actions, self.done)
 
-    def replay_due(self, simulation: SwitchableSimulation) -> list[Action]:
+    def replay_due(self, simulation: SwitchableSimulation) -> Sequence[Action]:
         """Apply the due actions and return them.
 
         Raises:
@@ -100,6 +96,14 @@ class ActionLog:
         self._actions = [*insert_switch(tuple(self._actions), index, time)]
         self.done += len(self._actions) - before
         return len(self._actions) > before
+
+
+def due_actions(simulation: SwitchableSimulation, actions: Sequence[Action], done: int) -> Sequence[Action]:
+    """Return the actions up to the present time after the first `done` ones."""
+    latest, end = simulation.time + TIME_ROUNDING * simulation.settings.dt, done
+    while end < len(actions) and actions[end].time <= latest:
+        end += 1
+    return actions[done:end]
 
 
 def insert_switch(actions: tuple[Action, ...], index: int, time: float) -> tuple[Action, ...]:

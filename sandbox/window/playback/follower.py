@@ -17,7 +17,7 @@ from sandbox.games.contract import Press
 from sandbox.games.session import GameSession
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.window.playback.action_log import TIME_ROUNDING
+from sandbox.window.playback.action_log import due_actions
 from sandbox.window.playback.history import Keyframe
 
 MAX_DELAY = 0.05
@@ -144,14 +144,6 @@ def advance_batch(simulation: SwitchableSimulation, steps: int, before: float | 
 def next_action_time(actions: Sequence[Action], done: int) -> float | None:
     """Return the time, s, of the first action that is not applied yet; None if there is none."""
     return actions[done].time if done < len(actions) else None
-
-
-def due_actions(simulation: SwitchableSimulation, actions: Sequence[Action], done: int) -> Sequence[Action]:
-    """Return the actions up to the present time after the first `done` ones."""
-    latest, end = simulation.time + TIME_ROUNDING * simulation.settings.dt, done
-    while end < len(actions) and actions[end].time <= latest:
-        end += 1
-    return actions[done:end]
 
 
 class FollowerSlot:

@@ -1,8 +1,9 @@
-"""Stored states and checkpoints of a session, break times of its joints, and the position history of trails."""
+"""Stored states and checkpoints of a session, and its replay; break times of joints, and trails of positions."""
 
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from sandbox.engines.contract import SnapshotError, StateSnapshot
 from sandbox.engines.segment import Checkpoint
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.session import GameSession
+from sandbox.recording import Recording
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
@@ -211,6 +213,60 @@ class History:
 
 def _bytes(frame: Frame) -> int:
     return len(frame.position) * BYTES_PER_BODY + BYTES_PER_FRAME
+
+
+@dataclass
+class Replay:
+    """How the present state of a session came about, and what the session holds after it.
+
+    The state is one of three:
+
+    - exact: reached by steps, or by a replay from the start or from a snapshot, which leads to it bit for bit.
+    - resumed: replayed from a checkpoint, `origin`. States that were seen before are equal; those that were not are
+      `unconfirmed` until a later one is equal.
+    - off track: not a state of the session, because a replay led to another state than before, or because actions
+      before it were removed.
+
+    A seek backwards, and every seek from a state off track, restores an earlier state: `begin` makes it exact or
+    resumed. An equal state confirms those before it; a different one leads off track (`leave`). With the first new step
+    or action, a resumed state becomes exact (`commit`): restoring its checkpoint is then an action of the session.
+    """
+
+    recorded_until: float
+    """s, end of a recording: up to there the actions of the rules are among the logged ones, and compared with them"""
+    origin: Keyframe | None = None
+    """checkpoint of a resumed state"""
+    unconfirmed: list[int] = field(default_factory=list)
+    """steps that are first seen in a replay from a checkpoint: a replay from the start may differ in the last digits"""
+    is_off_track: bool = False
+    whole: tuple[int, Recording] | None = None
+    """last step and recording of the session, before a seek backwards"""
+
+    def begin(self, origin: Keyframe | None) -> None:
+        """Start from a state that was restored; `origin` is its checkpoint, if the state is not exact."""
+        self.origin, self.is_off_track = origin, False
+        self.unconfirmed.clear()
+
+    def leave(self) -> list[int]:
+        """Lead off track; return the steps whose states were not confirmed."""
+        found, self.unconfirmed, self.is_off_track = self.unconfirmed, [], True
+        return found
+
+    def commit(self) -> Keyframe | None:
+        """Make the state exact; return the checkpoint that must be restored for that, if any."""
+        origin, self.origin = self.origin, None
+        self.unconfirmed.clear()
+        return origin
+
+    def branch(self, step: int, time: float) -> Recording | None:
+        """Discard what the session holds after a step and its time, s; return the recording of all of it, if any."""
+        found = self.recording_beyond(step)
+        self.whole, self.recorded_until = None, min(self.recorded_until, time)
+        return found
+
+    def recording_beyond(self, step: int) -> Recording | None:
+        """Return the recording of the whole session if it has later steps than this one."""
+        return self.whole[1] if self.whole is not None and step < self.whole[0] else None
 
 
 class BreakTimes:

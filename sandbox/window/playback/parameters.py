@@ -212,7 +212,7 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
         return Parameter(key, label, 0.0, high, value, default=default)
     if index < len(file.body_sources):
         default = _stated(file, file.body_sources[index], key)
-    return Parameter(key, label, 0.0, high, acting(scene, disc, key), default=default)
+    return Parameter(key, label, 0.0, high, acting_coefficient(scene, disc, key), default=default)
 
 
 def _source_index(live: LiveView, picked: int | None) -> int:
@@ -233,7 +233,7 @@ def _stated(scene: Scene, element: HasMaterial, key: str) -> float | None:
     return own
 
 
-def acting(scene: Scene, body: BodySource, key: str) -> float:
+def acting_coefficient(scene: Scene, body: BodySource, key: str) -> float:
     """Return the restitution or friction of a body that its contacts with static objects have.
 
     Where neither the body nor its material states one, it is that of the other side: the largest of planes, walls and
@@ -247,7 +247,7 @@ def acting(scene: Scene, body: BodySource, key: str) -> float:
     )
 
 
-def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) -> list[Action]:
+def parameter_actions(live: LiveView, key: str, value: ParameterValue, picked: int | None) -> list[Action]:
     """Return the actions that set a parameter; switching the engine is handled by `AppState.switch_engine`."""
     if key == "gravity":
         return [SetParameter(time=0.0, path="world.gravity", value=[live.scene.world.gravity[0], float(value)])]

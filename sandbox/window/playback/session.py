@@ -28,8 +28,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
-from sandbox.window.playback.follower import Follower, FollowerSlot, advance_batch, next_action_time
-from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe, keyframe_state
+from sandbox.window.playback.follower import FollowerSlot, advance_batch, next_action_time
+from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe, Replay, keyframe_state
 
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
@@ -89,33 +89,32 @@ class Session:
         """
         self._start = scene, engine, settings
         self._source: Recording | None = None
+        self.simulation: SwitchableSimulation
+        """the engine, with switches between engines"""
+        self._step = 0
         self.ended: str | None = None
         """reason why no step can follow: divergence, exhaustion, or a logged action that the engine refuses"""
-        self._exhausted = False
-        self._log = ActionLog(actions)
+        self.log = ActionLog(actions)
+        self.replay = Replay(until)
+        """how the present state came about"""
         self._replayed: list[tuple[int, Action]] = []
-        self._step = 0
-        self._initial_game, self._recorded_until = game, until
+        self._initial_game = game
         self.game: GameSession | None = None
         """the game in its present state"""
         self._game_contacts: list[Contacts] = []  # shown to the rules since the last state was stored
         self.history = History()
         self._start_simulation()
-
         self._followers = FollowerSlot(self._start, self._initial_game)
         self._contact_free = ContactFreeTimer()
         self._step_cost = 0.0  # s, computation time of the last step
-        self._origin: Keyframe | None = None  # restored by the last seek, while all that followed was seen before
-        self._unconfirmed: list[int] = []
-        self._off_track = False  # the present state is not one of the session
         self._contacts: list[Contacts] = []
-        self._complete: tuple[int, Recording] | None = None  # the last step and the recording, before a seek backwards
         self.replaced: ReplacedFuture | None = None
         """the last part of the session that was replaced"""
-        self.mark_saved()
+        self.log.saved = self.log.all
         self._all_bodies = self.bodies
         self._breaks = BreakTimes(len(self.scene.joint_arrays))
-        self._previous = self._frame = self.simulation.frame()
+        self._frame: Frame = self.simulation.frame()
+        self._previous: Frame = self._frame
         self.history.store(0, self._frame)
 
     @classmethod
@@ -176,12 +175,7 @@ class Session:
     @property
     def actions(self) -> tuple[Action, ...]:
         """The actions up to now."""
-        return self._log.past
-
-    @property
-    def has_future(self) -> bool:
-        """Whether the log holds actions later than now, which will be repeated."""
-        return self._log.has_future
+        return self.log.past
 
     @property
     def waiting(self) -> bool:
@@ -191,23 +185,18 @@ class Session:
     @property
     def is_latest(self) -> bool:
         """Whether no later states, actions or inputs are known."""
-        end = self._recorded_until - TIME_ROUNDING * self.simulation.settings.dt
-        if self._step < self.history.last_step or self.simulation.time < end or self.has_future:
-            return False
-        return self.game is None or not self.game.future_presses
+        return self._step >= self.history.last_step and not self._has_future(-TIME_ROUNDING)
+
+    def _has_future(self, tolerance: float) -> bool:
+        """Return whether later actions, inputs or parts of a recording are known, with a tolerance in steps."""
+        if self.log.has_future or (self.game is not None and self.game.future_presses):
+            return True
+        return self.simulation.time < self.replay.recorded_until + tolerance * self.simulation.settings.dt
 
     @property
     def break_times(self) -> FloatArray:
         """Time at which each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
         return self._breaks.times
-
-    @property
-    def unconfirmed_steps(self) -> tuple[int, ...]:
-        """Steps first seen in a replay from a checkpoint, before a state that confirms that replay.
-
-        They are discarded if a later state differs: a replay from the start may differ in their last digits.
-        """
-        return tuple(self._unconfirmed)
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies of a state in the history; it may be later than now and have more."""
@@ -215,7 +204,7 @@ class Session:
 
     def scene_history(self) -> SceneHistory:
         """Return the scene at any time, also later than now, as far as walls and posts change."""
-        return SceneHistory(self._start[0], self._log.all)
+        return SceneHistory(self._start[0], self.log.all)
 
     def contacts(self) -> Contacts:
         """Return the contacts of the steps since the last call."""
@@ -239,12 +228,13 @@ class Session:
 
         If the present state is only reached from a checkpoint, the recording restores that checkpoint too.
         """
-        if self._complete is not None and self._step < self._complete[0]:
-            return replace(self._complete[1], at=self.time)
-        actions, origin = self.actions, self._origin
+        whole = self.replay.recording_beyond(self._step)
+        if whole is not None:
+            return replace(whole, at=self.time)
+        actions, origin = self.actions, self.replay.origin
         # Mouse pulls are released at the end: in a replay no mouse would ever release them.
         actions += tuple(Pull(time=self.simulation.time, body=name) for name in self.simulation.pulls)
-        if origin is not None and self._unconfirmed:
+        if origin is not None and self.replay.unconfirmed:
             actions = insert_switch(actions, origin.actions, origin.time)
         scene, engine, settings = self._start
         found = Recording(
@@ -263,19 +253,6 @@ class Session:
         is_whole = found.actions == source.actions and self._step == round(source.duration / self.settings.dt)
         program = RecordedGame(source.game.omitted, source.game.inexact)  # a changed session has another end
         return replace(found, game=source.game if is_whole else program)
-
-    @property
-    def unsaved_actions(self) -> tuple[Action, ...]:
-        """The actions since the start or the last save, also those later than now."""
-        return self._log.unsaved
-
-    def mark_saved(self) -> None:
-        """Count all actions as saved."""
-        self._log.saved = self._log.all
-
-    def mark_unsaved(self) -> None:
-        """Count all actions as unsaved."""
-        self._log.saved = ()
 
     # --- Stepping ------------------------------------------------------------------------------------------------
 
@@ -308,7 +285,7 @@ class Session:
                 break
             self._step_cost = perf_counter() - began
             made += 1
-            if self._origin is not None and not last:
+            if self.replay.origin is not None and not last:
                 self._compare_with_history(None)
             elif not last and until is not None and self.ended is None:
                 self.history.store_fine(self._step, self.simulation.frame())
@@ -336,10 +313,10 @@ class Session:
     def _repeat_steps(self, steps: int) -> int:
         """Repeat steps that were made before, in a batch up to the next action; return how many, 0 if not possible."""
         steps = min(steps, self.history.last_step - 1 - self._step)
-        if steps < 2 or self.game is not None or self._origin is not None:
+        if steps < 2 or self.game is not None or self.replay.origin is not None:
             return 0
         try:
-            made = advance_batch(self.simulation, steps, next_action_time(self._log.all, self._log.done))
+            made = advance_batch(self.simulation, steps, next_action_time(self.log.all, self.log.done))
         except (Divergence, Exhaustion) as error:  # they did not occur in the run itself
             raise ReplayMismatchError(str(error)) from None
         self._step += made
@@ -353,14 +330,14 @@ class Session:
             return
         contacts = simulation.contacts()
         self._game_contacts.append(contacts)
-        own, due = game.on_step(simulation.time, simulation.frame(), contacts), self._log.due(simulation)
+        own, due = game.on_step(simulation.time, simulation.frame(), contacts), self.log.due(simulation)
         if self._is_replaying:
             game.replay(simulation.time, own, due)
             return
         try:
             for action in own:
                 simulation.apply(action)
-                self._log.append(action)
+                self.log.append(action)
                 self._replayed.append((self._step, action))
         except ActionError as error:
             self.ended = f"at {simulation.time:g} s: {error}"
@@ -368,16 +345,13 @@ class Session:
     @property
     def _is_replaying(self) -> bool:
         """Whether the actions of the rules at the present step are in the log already."""
-        if self.history.get(0) is not None and self._step <= self.history.last_step:
-            return True
-        end = self._recorded_until + TIME_ROUNDING * self.simulation.settings.dt
-        inputs_left = self.game is not None and bool(self.game.future_presses)
-        return self.has_future or inputs_left or self.simulation.time <= end
+        is_seen = self.history.get(0) is not None and self._step <= self.history.last_step
+        return is_seen or self._has_future(TIME_ROUNDING)
 
     def _replay_actions(self) -> None:
         """Apply the logged actions of the present time."""
         try:
-            self._replayed += [(self._step, action) for action in self._log.replay_due(self.simulation)]
+            self._replayed += [(self._step, action) for action in self.log.replay_due(self.simulation)]
         except ActionError as error:
             self.ended = f"at {self.simulation.time:g} s: {error}"
 
@@ -393,15 +367,15 @@ class Session:
         if self._exhausted:  # the state lies within a step, so it is none of the session's
             return
         self._compare_with_history(self._frame)
-        if self._origin is not None and self.history.get(self._step) is None:
-            self._unconfirmed.append(self._step)
+        if self.replay.origin is not None and self.history.get(self._step) is None:
+            self.replay.unconfirmed.append(self._step)
         self.history.store(self._step, self._frame)
         if self.ended is None and self.history.wants_keyframe(self._step):
             can_checkpoint = self._contact_free.allows_checkpoint(self.simulation, self._frame)
             state = keyframe_state(self.simulation, can_checkpoint)
             if state is not None:
                 game = None if self.game is None else self.game.copy()
-                self.history.add_keyframe(Keyframe(self._step, self._log.done, state, game))
+                self.history.add_keyframe(Keyframe(self._step, self.log.done, state, game))
 
     def _contacts_of_step(self) -> Contacts:
         """Return the contacts since the last call, with those that the rules have been shown."""
@@ -412,19 +386,17 @@ class Session:
     def _compare_with_history(self, frame: Frame | None) -> None:
         """Compare the state hash of the present state with that of the one seen before."""
         known = self.history.get(self._step)
-        if known is not None and known.state_hash() != (frame or self.simulation.frame()).state_hash():
-            self._off_track = True
-            self.history.discard(self._unconfirmed)
-            self._unconfirmed.clear()
+        if known is None:
+            return
+        if known.state_hash() != (frame or self.simulation.frame()).state_hash():
+            self.history.discard(self.replay.leave())
             raise ReplayMismatchError(f"step {self._step} led to another state than before")
-        if known is not None:
-            self._unconfirmed.clear()
+        self.replay.unconfirmed.clear()
 
     def _commit_checkpoint(self) -> None:
         """Make the restoring of the checkpoint an action of the session: the steps that follow are new."""
-        origin, self._origin = self._origin, None
-        self._unconfirmed.clear()
-        if origin is not None and self._log.insert_switch(origin.actions, origin.time):
+        origin = self.replay.commit()
+        if origin is not None and self.log.insert_switch(origin.actions, origin.time):
             self.history.count_inserted_action(origin.step)
             self._followers.discard_from(origin.step)
 
@@ -468,7 +440,9 @@ class Session:
                 self.simulation.apply(action)
         except ActionError:
             self.game.set_presses(presses)
-            for _ in self._replay_to(self._step):
+            step = self._step
+            self._go_back(step)
+            for _ in self.seek(step):
                 pass
             raise
         self._branch(actions)
@@ -482,11 +456,10 @@ class Session:
     def _branch(self, actions: Sequence[Action]) -> None:
         """Log actions that were just applied, and discard all that came later."""
         self._commit_checkpoint()
-        if self._complete is not None and self._step < self._complete[0]:
-            self.replaced = ReplacedFuture(self.simulation.time, self._complete[1])
-        self._complete = None
-        self._log.branch(actions, self.simulation)
-        self._recorded_until = min(self._recorded_until, self.simulation.time)
+        whole = self.replay.branch(self._step, self.simulation.time)
+        if whole is not None:
+            self.replaced = ReplacedFuture(self.simulation.time, whole)
+        self.log.branch(actions, self.simulation)
         self._discard_from(self._step)
         self._breaks.update(self.simulation.broken)
         self._frame = self._previous = self.simulation.frame()
@@ -507,10 +480,10 @@ class Session:
             until: s.
             is_idle: whether no picture waits, so that a large scene may be started as well.
         """
-        if self._off_track or self._origin is not None:
+        if self.replay.is_off_track or self.replay.origin is not None:
             return
         presses = () if self.game is None else self.game.all_presses
-        self._followers.advance(self._step, self.simulation, self._log.all, presses, until, is_idle=is_idle)
+        self._followers.advance(self._step, self.simulation, self.log.all, presses, until, is_idle=is_idle)
 
     def retract(self, index: int, inputs: int | None = None) -> int:
         """Remove the action of an index and all later ones, and the inputs since then; discard the states after it.
@@ -527,13 +500,12 @@ class Session:
         """
         time = self.actions[index].time
         step = self.history.nearest(time)[0]
-        self._log.truncate(index)
+        self.log.truncate(index)
         if self.game is not None:
             before = sum(press.time < time for press in self.game.all_presses)
             self.game.truncate(before if inputs is None else inputs)
-        self._complete = None
+        self.replay.whole, self.replay.is_off_track = None, True
         self._discard_from(step)
-        self._off_track = True
         return step
 
     # --- Seeking -------------------------------------------------------------------------------------------------
@@ -543,19 +515,20 @@ class Session:
 
         Until it is finished the session is in between; a caller may abandon it and seek another step.
         """
-        step = max(0, step)
-        if step < self._step and self._step >= self.history.last_step and not self._off_track:
-            self._complete = self._step, self.recording()
-        if step < self._step or self._off_track:
-            yield from self._replay_to(step)
-            return
+        step, replay = max(0, step), self.replay
+        if step < self._step and self._step >= self.history.last_step and not replay.is_off_track:
+            replay.whole = self._step, self.recording()
+        if step < self._step or replay.is_off_track:
+            self._go_back(step)
         try:
             yield from self._advance_to(step)
-        except ReplayMismatchError:
-            yield from self._replay_from_start(step)
+        except ReplayMismatchError:  # from the start, from now on without checkpoints
+            self.history.disable_checkpoints()
+            self._restore(None)
+            yield from self._advance_to(step)
 
-    def _replay_to(self, step: int) -> Iterator[float]:
-        """Restore the last checkpoint before a step, or take over the follower, and go to that step."""
+    def _go_back(self, step: int) -> None:
+        """Restore the last checkpoint before a step, or take over the follower."""
         keyframe = self.history.keyframe_before(step)
         if keyframe is not None and not keyframe.is_exact and self.game is None:
             # A replay from a checkpoint is compared at each stored state; one from the start is made in batches.
@@ -564,31 +537,15 @@ class Session:
         if follower is None:
             self._restore(keyframe)
         else:
-            self._continue_with(follower)
-        try:
-            yield from self._advance_to(step)
-        except ReplayMismatchError:
-            yield from self._replay_from_start(step)
-
-    def _continue_with(self, follower: Follower) -> None:
-        """Replace the simulation by the follower, which is at an earlier step."""
-        self.simulation.close()
-        self.ended, self._exhausted = None, False
-        self._step, self._log.done = follower.step, follower.done
-        self._set_simulation(follower.simulation, follower.game)
-        self._begin_replay(None)
-
-    def _replay_from_start(self, step: int) -> Iterator[float]:
-        """Go to a step from the start, from now on without checkpoints."""
-        self.history.disable_checkpoints()
-        self._restore(None)
-        yield from self._advance_to(step)
+            self.simulation.close()
+            self._set_simulation(follower.simulation, follower.game, follower.step, follower.done)
+            self._begin_replay(None)
 
     def _advance_to(self, step: int) -> Iterator[float]:
         start = self._step
         while self._step < step and self.ended is None:
             coarse = step - SEEK_FINE_STEPS - self._step
-            if coarse > 0 and self._origin is None and self.game is None and self._step < self.history.last_step:
+            if coarse > 0 and self.replay.origin is None and self.game is None and self._step < self.history.last_step:
                 self.advance(min(REPLAY_BATCH, coarse))
             else:
                 batch = SEEK_BATCH if coarse > 0 else 1
@@ -597,55 +554,46 @@ class Session:
             yield (self._step - start) / (step - start)
 
     def _restore(self, keyframe: Keyframe | None) -> None:
-        """Go back to a checkpoint, or to the start."""
-        restored = self._load(keyframe)
-        if keyframe is not None and not restored:
-            self.history.disable_checkpoints()
-        self._begin_replay(keyframe if restored and keyframe is not None and not keyframe.is_exact else None)
-
-    def _begin_replay(self, origin: Keyframe | None) -> None:
-        """Start to repeat the session from the present simulation, which comes from a checkpoint `origin`."""
-        self._origin = origin
-        self._unconfirmed.clear()
-        self._off_track = False
-        self._contact_free = ContactFreeTimer()
-        self._contacts.clear()
-        self._previous = self._frame = self.simulation.frame()
-        self.history.store(self._step, self._frame)
-
-    def _load(self, keyframe: Keyframe | None) -> bool:
-        """Replace the simulation by one at a checkpoint, or at the start; return whether it is at the checkpoint."""
+        """Go back to a checkpoint, or to the start, also if the engine cannot continue from the checkpoint."""
         simulation = None
         if keyframe is not None:
             try:
                 simulation = keyframe.resumed()
             except (Refusal, ActionError):
-                keyframe = None
+                self.history.disable_checkpoints()
         self.simulation.close()
-        self.ended, self._exhausted = None, False
-        self._step, self._log.done = (keyframe.step, keyframe.actions) if keyframe is not None else (0, 0)
-        if simulation is None or keyframe is None:
+        if keyframe is None or simulation is None:
             self._start_simulation()
-            return False
-        self._set_simulation(simulation, keyframe.game)
+            self._begin_replay(None)
+            return
+        self._set_simulation(simulation, keyframe.game, keyframe.step, keyframe.actions)
         if self.game is not None:
-            self.game.replay_player(simulation.time, self._log.due(simulation))
+            self.game.replay_player(simulation.time, self.log.due(simulation))
         self._replay_actions()
-        return True
+        self._begin_replay(None if keyframe.is_exact else keyframe)
 
     def _start_simulation(self) -> None:
         """Replace the simulation by one at the start."""
-        self._set_simulation(SwitchableSimulation(*self._start), self._initial_game)
+        self._set_simulation(SwitchableSimulation(*self._start), self._initial_game, 0, 0)
         self._run_rules()
         self._replay_actions()
 
-    def _set_simulation(self, simulation: SwitchableSimulation, game: GameSession | None) -> None:
-        """Continue with a simulation and a copy of a game; inputs later than now are kept, to be repeated."""
+    def _set_simulation(self, simulation: SwitchableSimulation, game: GameSession | None, step: int, done: int) -> None:
+        """Continue with a simulation after some steps and actions; later inputs of the game are kept."""
+        self.ended, self._exhausted = None, False
+        self._step, self.log.done = step, done
         self.simulation = simulation
-        """the engine, with switches between engines"""
         simulation.patience = STEP_TIMEOUT
         simulation.contacts()  # discards those before
         self._game_contacts.clear()
         before, self.game = self.game, None if game is None else game.copy()
         if self.game is not None and before is not None:
             self.game.set_presses(before.all_presses)
+
+    def _begin_replay(self, origin: Keyframe | None) -> None:
+        """Start to repeat the session from the present simulation, which comes from a checkpoint `origin`."""
+        self.replay.begin(origin)
+        self._contact_free = ContactFreeTimer()
+        self._contacts.clear()
+        self._previous = self._frame = self.simulation.frame()
+        self.history.store(self._step, self._frame)

@@ -13,7 +13,8 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.window.hit_test import Distance, Hull, hull_distance
+from sandbox.scene.geometry.vectors import offset_from_segment
+from sandbox.window.hit_test import Distance, Hull, distance_from_hull
 
 PATCH_DEPTH = 0.5
 """Depth of a patch in each piece, as a fraction of half the thickness of the thinner piece; a rim takes at most 0.16.
@@ -81,7 +82,7 @@ class BodyGeometry:
 
     def distance(self, number: int, pose: ScreenPose) -> Distance:
         """Return the signed distance function of a body, px: the minimum over its pieces."""
-        distances = [hull_distance(hull) for hull in self.hulls(number, pose)]
+        distances = [distance_from_hull(hull) for hull in self.hulls(number, pose)]
         if len(distances) == 1:
             return distances[0]
         return lambda x, y: np.asarray(np.minimum.reduce([piece_distance(x, y) for piece_distance in distances]))
@@ -186,8 +187,7 @@ def _inscribed_radius(point: FloatArray, polygons: list[FloatArray], tolerance: 
     for polygon in polygons:
         along = np.roll(polygon, -1, axis=0) - polygon
         length = np.maximum(np.hypot(*along.T), 1e-300)
-        fraction = np.clip(((point - polygon) * along).sum(axis=1) / length**2, 0.0, 1.0)
-        distance = np.hypot(*(polygon + fraction[:, None] * along - point).T)
+        distance = np.hypot(*offset_from_segment(point, polygon, along).T)
         (sides,) = np.nonzero(distance <= tolerance)
         if not len(sides):
             continue

@@ -188,9 +188,15 @@ OVERSAMPLING = 4
 def draw_disc(
     surface: pygame.Surface, position: tuple[float, float], radius: float, colour: RgbColour, hole: float = 0.0
 ) -> None:
-    """Draw a small antialiased disc, or a ring with inner radius `hole` if that is positive; px."""
+    """Draw a small antialiased disc, or a ring with inner radius `hole` if that is positive; px.
+
+    One out of sight is left out: SDL has no coordinates beyond 32 bits.
+    """
+    (x, y), (width, height) = position, surface.get_size()
+    if not (-radius <= x <= width + radius and -radius <= y <= height + radius):
+        return
     image = _disc_image(round(OVERSAMPLING * max(radius, 0.5)), colour, round(OVERSAMPLING * hole))
-    surface.blit(image, image.get_rect(center=(round(position[0]), round(position[1]))))
+    surface.blit(image, image.get_rect(center=(round(x), round(y))))
 
 
 @lru_cache(maxsize=256)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import pygame
 
 from sandbox.arrays import FloatArray
+from sandbox.window.hit_test import segment_distance
 from sandbox.window.render.palette import RgbColour
 
 SignedDistance = Callable[[FloatArray, FloatArray], FloatArray]
@@ -70,15 +71,8 @@ def disc_distance(x: float, y: float, radius: float) -> SignedDistance:
 
 def capsule_distance(a: tuple[float, float], b: tuple[float, float], radius: float) -> SignedDistance:
     """Return the distance from a capsule: a segment with round ends."""
-    along = b[0] - a[0], b[1] - a[1]
-    squared = max(along[0] ** 2 + along[1] ** 2, 1e-12)
-
-    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
-        x, y = px - a[0], py - a[1]
-        fraction = np.clip((x * along[0] + y * along[1]) / squared, 0.0, 1.0)
-        return np.asarray(np.sqrt((x - fraction * along[0]) ** 2 + (y - fraction * along[1]) ** 2) - radius)
-
-    return distance
+    distance = segment_distance((a, b))
+    return lambda px, py: distance(px, py) - radius
 
 
 def arc_distance(x: float, y: float, radius: float, middle: float, half: float) -> SignedDistance:

@@ -7,6 +7,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.geometry.vectors import offset_from_segment
 from sandbox.window.hit_test import Hull, hull_gap, hulls_of
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
@@ -61,7 +62,7 @@ def _recompute_curved(view: DrawContext, normal: FloatArray, rows: "np.ndarray[t
         if isinstance(element, Post):
             offset = np.asarray(element.position) - centre
         elif isinstance(element, Wall) and len(element.points) <= MAX_WALL_POINTS:
-            offset = _nearest(element, centre) - centre
+            offset = _offset_of_wall(element, centre)
         else:
             continue
         normal[row] = offset / np.hypot(*offset)
@@ -103,13 +104,11 @@ def _hulls_of_fixed(element: Plane | Wall | Post, point: FloatArray) -> list[Hul
     return [Hull(np.asarray((foot - along, foot + along)), 0.0)]
 
 
-def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
-    """Return the point of a wall's centre line that is closest to a point, m."""
+def _offset_of_wall(wall: Wall, centre: FloatArray) -> FloatArray:
+    """Return the shortest vector from a point to a wall's centre line, m."""
     ends = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
-    start, along = ends[:-1], np.diff(ends, axis=0)
-    fraction = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
-    nearest = start + fraction[:, None] * along
-    return np.asarray(nearest[np.argmin(np.hypot(*(nearest - centre).T))])
+    offset = -offset_from_segment(centre, ends[:-1], np.diff(ends, axis=0))
+    return np.asarray(offset[np.argmin(np.hypot(*offset.T))])
 
 
 MAX_ARROWS = 1000

@@ -7,10 +7,11 @@ import pytest
 
 import sandbox
 from sandbox.measure.compare.reductions import expand_generators
-from sandbox.measure.metrics.clearance import clearance, hull_distance, plane_clearance
+from sandbox.measure.metrics.clearance import clearance, plane_clearance
 from sandbox.measure.metrics.contacts import are_collisions, collisions, share_layer
 from sandbox.measure.metrics.invariants import momentum_drift
 from sandbox.scene.files.load import from_document, loads
+from sandbox.scene.geometry.hulls import hull_distance
 
 SCENE = loads(
     '[[box]]\nname = "box"\nposition = [0, 0]\nsize = [2.0, 1.0]\n'

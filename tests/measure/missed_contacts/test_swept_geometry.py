@@ -3,7 +3,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.measure.metrics.clearance import offset_from_segment
 from sandbox.measure.missed_contacts.swept_geometry import (
     CLEAR,
     DEEP,
@@ -13,6 +12,7 @@ from sandbox.measure.missed_contacts.swept_geometry import (
     closest_to_segment,
     crosses,
 )
+from sandbox.scene.geometry.vectors import offset_from_segment
 
 FRACTIONS = np.linspace(0, 1, 2001)[:, None]
 coordinate = st.floats(-5, 5).map(lambda x: round(x, 3))

@@ -13,7 +13,7 @@ import pytest
 from sandbox.scene.editing import autosave as module
 from sandbox.scene.editing.autosave import HEADER, INTERVAL, Autosave, recoverable
 from sandbox.scene.editing.draft import SceneDraft
-from sandbox.scene.editing.elements import ElementKey, removal
+from sandbox.scene.editing.elements import ElementKey, removal_changes
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.scene.files.toml_changes import SetValue
@@ -250,7 +250,7 @@ def test_new_scene_is_kept_in_the_working_folder(tmp_path: Path, monkeypatch: py
     autosave = Autosave(draft)
     autosave.update(0.0)
     assert names(tmp_path) == set()
-    draft.change(removal(draft.scene, [ElementKey("plane", 0)]), "delete")
+    draft.change(removal_changes(draft.scene, [ElementKey("plane", 0)]), "delete")
     autosave.update(0.0)
     assert names(tmp_path) == {".new-scene.toml.autosave"}
     assert recoverable(None) is None  # this editor is open

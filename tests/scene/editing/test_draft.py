@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.joints import Pivot
-from sandbox.scene.editing.clipboard import copied, pasting
+from sandbox.scene.editing.clipboard import copy_elements, paste_elements
 from sandbox.scene.editing.draft import NEW_SCENE, SceneDraft
-from sandbox.scene.editing.elements import ElementKey, all_elements, material_users, removal, renaming
-from sandbox.scene.editing.transforms import Similarity, transformation
+from sandbox.scene.editing.elements import ElementKey, all_elements, material_users, removal_changes, renaming_changes
+from sandbox.scene.editing.transforms import Similarity, transform_elements
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
@@ -66,7 +66,7 @@ def draft(tmp_path: Path) -> SceneDraft:
 
 
 def move(draft: SceneDraft, *keys: ElementKey, by: tuple[float, float] = (1.0, 0.5)) -> None:
-    values = transformation(draft.scene, keys, Similarity(shift=by))
+    values = transform_elements(draft.scene, keys, Similarity(shift=by))
     draft.change([SetValue((*k.location, name), v) for k, each in values.items() for name, v in each.items()], "move")
 
 
@@ -82,7 +82,7 @@ def test_undo_and_redo_restore_texts_to_the_byte(draft: SceneDraft) -> None:
     texts = [draft.text]
     move(draft, ElementKey("ball", 0))
     texts.append(draft.text)
-    draft.change(removal(draft.scene, [ElementKey("box", 0)]), "delete a box")
+    draft.change(removal_changes(draft.scene, [ElementKey("box", 0)]), "delete a box")
     texts.append(draft.text)
     assert (draft.undo_label, draft.redo_label) == ("delete a box", None)
     assert [draft.undo(), draft.text, draft.undo(), draft.text] == ["delete a box", texts[1], "move", texts[0]]
@@ -119,11 +119,11 @@ def test_change_that_gives_a_fault_is_refused(draft: SceneDraft) -> None:
 
 
 def test_removal_takes_what_is_attached(draft: SceneDraft) -> None:
-    draft.change(removal(draft.scene, [ElementKey("ball", 0)]), "delete")
+    draft.change(removal_changes(draft.scene, [ElementKey("ball", 0)]), "delete")
     assert [joint.kind for joint in draft.scene.joints] == ["spring"]
     assert "# the wheels" not in draft.text
     assert "# a car, by hand" in draft.text
-    draft.change(removal(draft.scene, [ElementKey("box", 0)]), "delete")
+    draft.change(removal_changes(draft.scene, [ElementKey("box", 0)]), "delete")
     assert draft.scene.joints == ()
 
 
@@ -134,7 +134,7 @@ def pivot_of(draft: SceneDraft, joint: int) -> Point | None:
 
 
 def test_renaming_follows_references(draft: SceneDraft) -> None:
-    draft.change(renaming(draft.scene, ElementKey("box", 0), 'body "one"'), "rename")
+    draft.change(renaming_changes(draft.scene, ElementKey("box", 0), 'body "one"'), "rename")
     assert [joint.between[0] for joint in draft.scene.joints] == ['body "one"'] * 2
 
 
@@ -143,20 +143,20 @@ def test_material_of_a_part_is_renamed_with_it() -> None:
         '[[material]]\nname = "a"\n[[body]]\nposition = [0, 0]\nball = [{ radius = 1, material = "a" }]\n'
     )
     assert material_users(draft.scene, "a") == [ElementKey("body", 0)]
-    draft.change(renaming(draft.scene, ElementKey("material", 0), "b"), "rename")
+    draft.change(renaming_changes(draft.scene, ElementKey("material", 0), "b"), "rename")
     assert draft.text.count('"b"') == 2 and draft.scene.compounds[0].balls[0].material == "b"
 
 
 def test_copies_have_names_and_joints_of_their_own(draft: SceneDraft) -> None:
     scene = draft.scene
     keys = [key for key, _ in all_elements(scene) if key.table in ("ball", "box")]
-    changes, added = pasting(scene, copied(scene, keys), Similarity(shift=(10.0, 0.0)))
+    changes, added = paste_elements(scene, copy_elements(scene, keys), Similarity(shift=(10.0, 0.0)))
     draft.change(changes, "paste")
     assert [ball.name for ball in draft.scene.balls] == ["rear", "front", "rear 2", "front 2"]
     assert [joint.between for joint in draft.scene.joints[2:]] == [("chassis 2", "rear 2"), ("chassis 2", "front 2")]
     assert pivot_of(draft, 2) == (9.0, 0.4)
     assert ElementKey("joint", 3) in added
-    again, _ = pasting(draft.scene, copied(draft.scene, keys), Similarity(shift=(20.0, 0.0)))
+    again, _ = paste_elements(draft.scene, copy_elements(draft.scene, keys), Similarity(shift=(20.0, 0.0)))
     draft.change(again, "paste")
     assert draft.scene.balls[-1].name == "front 3"
 
@@ -273,16 +273,16 @@ def apply(draft: SceneDraft, operation: tuple[str, int, float]) -> None:
         "mirror": Similarity((amount, 0.0), mirrored=True),
     }.get(kind)
     if by is not None:
-        values = transformation(draft.scene, [key], by)
+        values = transform_elements(draft.scene, [key], by)
         changes = [SetValue((*k.location, name), plain(v)) for k, each in values.items() for name, v in each.items()]
     elif kind == "delete":
-        changes = removal(draft.scene, [key])
+        changes = removal_changes(draft.scene, [key])
     elif kind == "copy":
-        changes, _ = pasting(draft.scene, copied(draft.scene, [key]), Similarity(shift=(amount, 1.0)))
+        changes, _ = paste_elements(draft.scene, copy_elements(draft.scene, [key]), Similarity(shift=(amount, 1.0)))
     elif kind == "add":
         changes = [AddElement("ball", {"name": f"new {number} {amount}", "position": [amount, 9.0], "radius": 0.1})]
     elif kind == "rename":
-        changes = renaming(draft.scene, key, f"name {number} {amount}") if hasattr_name(draft, key) else []
+        changes = renaming_changes(draft.scene, key, f"name {number} {amount}") if hasattr_name(draft, key) else []
     with suppress(SceneError):  # such as two elements of one name
         draft.change(changes, kind)
 

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.scene.editing.elements import ElementKey
-from sandbox.scene.editing.outlines import simplified, simplified_loop
-from sandbox.scene.editing.take_apart import TakeApartError, taking_apart
+from sandbox.scene.editing.take_apart import TakeApartError, take_apart_changes
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import with_changes
+from sandbox.scene.geometry.polyline import simplify_loop, simplify_polyline
 
 POINTS = st.lists(st.tuples(st.floats(-10, 10), st.floats(-10, 10)), min_size=2, max_size=40)
 
@@ -26,7 +26,7 @@ def distance(point: tuple[float, float], a: tuple[float, float], b: tuple[float,
 
 @given(POINTS, st.floats(1e-3, 3.0))
 def test_no_point_is_farther_than_the_tolerance(points: list[tuple[float, float]], tolerance: float) -> None:
-    found = simplified(points, tolerance)
+    found = simplify_polyline(points, tolerance)
     assert (found[0], found[-1]) == (points[0], points[-1])
     assert set(found) <= set(points)
     sides = list(pairwise(found))
@@ -35,9 +35,10 @@ def test_no_point_is_farther_than_the_tolerance(points: list[tuple[float, float]
 
 
 def test_circle_becomes_a_polygon_with_few_corners() -> None:
-    assert simplified([(0.1 * k, 0.2 * k) for k in range(50)], 1e-9) == [(0.0, 0.0), (4.9, 9.8)]  # a straight line
+    line = [(0.1 * k, 0.2 * k) for k in range(50)]
+    assert simplify_polyline(line, 1e-9) == [line[0], line[-1]]
     circle = [(math.cos(0.01 * k), math.sin(0.01 * k)) for k in range(628)]
-    corners = simplified_loop(circle, 0.02)
+    corners = simplify_loop(circle, 0.02)
     assert 8 <= len(corners) <= 32  # a sagitta of 0.02 subtends 0.4 rad, 16 sides
     area = 0.5 * abs(sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(corners, (*corners[1:], corners[0]), strict=True)))
     assert area == pytest.approx(math.pi, rel=0.05)
@@ -70,7 +71,7 @@ colour = "#ff0000"
 
 def test_generators_taken_apart_start_as_before() -> None:
     before = loads(TEXT)
-    text = with_changes(TEXT, taking_apart(before, [ElementKey("stack", 0), ElementKey("grid", 0)]))
+    text = with_changes(TEXT, take_apart_changes(before, [ElementKey("stack", 0), ElementKey("grid", 0)]))
     after = loads(text)
     assert (after.grids, after.stacks, len(after.balls), len(after.boxes)) == ((), (), 4, 4)
     assert sorted(after.bodies.names) == sorted(before.bodies.names)
@@ -100,7 +101,7 @@ points = [[7, 7], [8, 8]]
 
 def test_walls_are_divided_at_their_corners_and_keep_all_else() -> None:
     before = loads(WALLS)
-    text = with_changes(WALLS, taking_apart(before, [ElementKey("wall", 0), ElementKey("wall", 1)]))
+    text = with_changes(WALLS, take_apart_changes(before, [ElementKey("wall", 0), ElementKey("wall", 1)]))
     after = loads(text)
     assert 'name = "fence"  # kept' in text
     assert [(wall.name, wall.points) for wall in after.walls] == [
@@ -118,10 +119,10 @@ def test_walls_are_divided_at_their_corners_and_keep_all_else() -> None:
     for k in (1, 5, 6):
         assert (after.walls[k].friction, after.walls[k].thickness) == (0.5, 0.1)
     with pytest.raises(TakeApartError, match="two points"):
-        taking_apart(before, [ElementKey("wall", 2)])
+        take_apart_changes(before, [ElementKey("wall", 2)])
 
 
 def test_other_elements_cannot_be_taken_apart() -> None:
     scene = loads(TEXT + '[[ball]]\nname = "a"\nposition = [9, 9]\nradius = 1\n')
     with pytest.raises(TakeApartError, match="cannot be taken apart"):
-        taking_apart(scene, [ElementKey("ball", 0)])
+        take_apart_changes(scene, [ElementKey("ball", 0)])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.elements import ElementKey, all_elements, bodies_of, unique_name
-from sandbox.scene.editing.transforms import CANNOT_ROTATE, Similarity, transformation
+from sandbox.scene.editing.transforms import CANNOT_ROTATE, Similarity, transform_elements
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import SetValue, with_changes
 
@@ -75,7 +75,7 @@ ROUNDING = 1e-7
 
 
 def after(by: Similarity, keys: list[ElementKey], text: str = TEXT) -> Scene:
-    values = transformation(loads(text), keys, by)
+    values = transform_elements(loads(text), keys, by)
     changes = [SetValue((*key.location, name), value) for key, each in values.items() for name, value in each.items()]
     return loads(with_changes(text, changes))
 
@@ -143,7 +143,7 @@ def test_stack_turns_about_its_base() -> None:
 
 
 def test_identity_changes_nothing() -> None:
-    assert transformation(SCENE, KEYS, Similarity(centre=(3.0, 4.0))) == {}
+    assert transform_elements(SCENE, KEYS, Similarity(centre=(3.0, 4.0))) == {}
 
 
 def test_names_of_copies_count_up() -> None:

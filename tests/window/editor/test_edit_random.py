@@ -115,7 +115,7 @@ class RandomUser(RuleBasedStateMachine):
         pygame.key.set_mods(0)
         context = self.window.context
         context.exit_status, context.gui.scene_browser = None, None
-        self.window.commands.cancel_confirmation()
+        self.window.commands.confirmation.cancel()
         if context.gui.help.open:
             context.gui.toggle_help()
         if self.window.editing is None:

@@ -199,7 +199,7 @@ def test_actions_during_a_seek_apply_at_its_target(monkeypatch: pytest.MonkeyPat
     view.update(1.0, paused=True)
     assert view.busy == "replaying 0%"
     view.apply(Remove(time=0.0, body="atom-1"))
-    assert (view.busy, view.session.step_number, view.session.has_future) == (None, 50, False)
+    assert (view.busy, view.session.step_number, view.session.log.has_future) == (None, 50, False)
     for _ in range(50):
         view.step()
     view.seek(20)  # a second seek before the first is finished

@@ -474,7 +474,7 @@ TWO = scene_of(
 def test_confirmed_steps_are_unchanged_by_any_order_of_operations(engine: str, plan: list[tuple[str, int]]) -> None:
     session = Session(TWO, engine)
     for kind, number in plan:
-        expected = {k: v for k, v in hashes(session).items() if k not in session.unconfirmed_steps}
+        expected = {k: v for k, v in hashes(session).items() if k not in session.replay.unconfirmed}
         match kind:
             case "on":
                 try:

@@ -175,7 +175,7 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
     seek(session, 120 - steps)  # 0: at the end; 40: with later presses and actions
 
     def everything() -> tuple[Any, ...]:
-        return full_state(session), session.actions, session.has_future, session.game and session.game.all_presses
+        return full_state(session), session.actions, session.log.has_future, session.game and session.game.all_presses
 
     before = everything()
     recording = session.recording()
@@ -257,7 +257,7 @@ def test_retract_removes_the_inputs_since_the_action_except_the_stated_ones(kept
     seek(session, session.retract(kick, *kept))
     assert [press.value for press in session.game.all_presses] == [0.25, 0.75][: 1 + len(kept)]
     assert session.game.future_presses == ()  # a kept press is repeated although no action follows
-    assert not session.has_future
+    assert not session.log.has_future
     assert (session.step_number, dict(rules_of(session).display_lines())["aim"]) == (10, aim)
     session.advance(40)
     assert_replays(session)
