@@ -18,7 +18,7 @@ from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.input.body_tools import BodyTools, count_changes
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters
-from sandbox.window.playback.parameters import turned as parameter_actions
+from sandbox.window.playback.parameters import parameter_actions as parameter_actions
 from sandbox.window.playback.session import Session
 from tests.toml_text import toml
 from tests.window.pressing import key, key_up, move, press, release
