@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS, scale_for
-from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default, space_attributes
+from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default
 from sandbox.formatting import format_quantity
+from sandbox.measure.tradeoff.recommendation import pymunk_lines
 from sandbox.scene.description.world import Settings
 
 
@@ -31,32 +32,11 @@ def game_code(engine: str, settings: Settings, fps: float, zoom: float, is_slop_
         is_slop_stated: whether the scene states the slop.
     """
     if engine == "pymunk":
-        return _pymunk_code(settings, fps, zoom, is_slop_stated)
+        lines = pymunk_lines(settings, f"1 / {fps:.17g}")
+        return GameCode("python", tuple(lines), tuple(_pymunk_remarks(settings, zoom, is_slop_stated)))
     if engine == "box2d":
         return _box2d_code(settings, fps)
     return _scene_code(engine, settings)
-
-
-def _pymunk_code(settings: Settings, fps: float, zoom: float, is_slop_stated: bool) -> GameCode:
-    """Return lines for a `pymunk.Space` named `space`; only attributes that differ from pymunk's defaults are set."""
-    lines = [
-        f"space.{name} = {float(f'{value:.12g}') if isinstance(value, float) else value!r}"
-        for name, value in space_attributes(settings).items()
-        if not is_space_default(name, value)
-    ]
-    lines.append(f"dt = 1 / {fps:.17g}")
-    count = settings.substeps
-    if settings.half_kick:
-        lines += [
-            "for body in space.bodies:  # once, before the first step; bodies added later need it too",
-            "    if body.body_type == pymunk.Body.DYNAMIC:",
-            f"        body.velocity += space.gravity * dt / {2 * count}",
-        ]
-    if count == 1:
-        lines.append("space.step(dt)  # every frame")
-    else:
-        lines += [f"for _ in range({count}):  # every frame", f"    space.step(dt / {count})"]
-    return GameCode("python", tuple(lines), tuple(_pymunk_remarks(settings, zoom, is_slop_stated)))
 
 
 def _pymunk_remarks(settings: Settings, zoom: float, is_slop_stated: bool) -> list[str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from sandbox.engines.pymunk_adapter.engine import space_attributes
+from sandbox.engines.pymunk_adapter.engine import is_space_default, space_attributes
 from sandbox.formatting import format_quantity
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import Objective
@@ -181,15 +181,26 @@ def format_value(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def pymunk_lines(settings: Settings) -> list[str]:
-    """Return lines of Python that give a `pymunk.Space` the resolved settings of the pymunk engine.
+def pymunk_lines(settings: Settings, dt: str | None = None) -> list[str]:
+    """Return lines of Python that give a `pymunk.Space` named `space` the resolved settings of the pymunk engine.
 
-    They do not include what the engine does to bodies and shapes, such as drag and moments of inertia.
+    Attributes that have pymunk's defaults are left out, and so is what the engine does to bodies and shapes, such as
+    drag and moments of inertia.
+
+    Args:
+        settings: the settings.
+        dt: expression of the step, such as `1 / 60`; default: its value.
     """
-    lines = [f"space.{name} = {value!r}" for name, value in space_attributes(settings).items()]
+    attributes = space_attributes(settings).items()
+    lines = [f"space.{name} = {value!r}" for name, value in attributes if not is_space_default(name, value)]
+    lines.append(f"dt = {dt or repr(settings.dt)}")
+    count = settings.substeps
     if settings.half_kick:
-        half = f"{settings.dt!r} / {2 * settings.substeps}"
-        lines.append(f"body.velocity += space.gravity * {half}  # every dynamic body, once before the first step")
-    if settings.substeps == 1:
-        return [*lines, f"space.step({settings.dt!r})"]
-    return [*lines, f"for _ in range({settings.substeps}):", f"    space.step({settings.dt!r} / {settings.substeps})"]
+        lines += [
+            "for body in space.bodies:  # once, before the first step; bodies added later need it too",
+            "    if body.body_type == pymunk.Body.DYNAMIC:",
+            f"        body.velocity += space.gravity * dt / {2 * count}",
+        ]
+    if count == 1:
+        return [*lines, "space.step(dt)  # every frame"]
+    return [*lines, f"for _ in range({count}):  # every frame", f"    space.step(dt / {count})"]
