@@ -225,5 +225,4 @@ def _path(assignment: str) -> tuple[tuple[str, ...], str] | None:
 
 def relabelled(fault: Fault, keys: Sequence[str]) -> Fault:
     """Return the fault of an override; one of an unknown key that is swept names `--sweep` in place of `--set`."""
-    is_swept = fault.path == "--set" and any(fault.message.startswith((f"{key}:", f"{key!r}")) for key in keys)
-    return replace(fault, path="--sweep") if is_swept else fault
+    return replace(fault, path="--sweep") if fault.path == "--set" and fault.key in keys else fault

@@ -4,7 +4,7 @@ import json
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Self
 
@@ -30,6 +30,8 @@ class Fault:
     """path of the key, such as `ball.cue.velocity[1]`; empty if the fault concerns the whole file"""
     message: str
     """description of the error and of the valid values"""
+    key: str = field(default="", compare=False)
+    """key of the override at fault, as it was given; empty for other faults"""
 
     @classmethod
     def of(cls, source: str, message: str) -> Self:

@@ -153,7 +153,7 @@ def from_document(
     stated, whole, changed = document, True, set[Location]()
     if has_preset(document, (path for path, _ in assignments)):
         stated, changed, assignments, wrong = presets.apply_preset_overrides(document, assignments)
-        faults += [Fault(file, None, "--set", message) for message in wrong]
+        faults += [Fault(file, None, "--set", message, key) for key, message in wrong]
         written = presets.expanded_document(stated)
         document, whole = (stated, False) if written is None else (written, True)
     remaining: list[Override] = []
@@ -164,7 +164,7 @@ def from_document(
         except AddressError as error:
             remaining.append((path, value))
             if whole:
-                faults.append(Fault(file, None, "--set", str(error)))
+                faults.append(Fault(file, None, "--set", str(error), path))
     if faults:
         raise SceneError(faults)
 
@@ -244,7 +244,8 @@ def _parse_overrides(overrides: Iterable[Override], file: str) -> tuple[list[tup
             check_value(value)
             parsed.append((path, value))
         except (AddressError, NestingError) as error:
-            faults.append(Fault(file, None, "--set", str(error)))
+            key = "" if isinstance(override, str) else override[0]
+            faults.append(Fault(file, None, "--set", str(error), key))
     return parsed, faults
 
 

@@ -46,14 +46,14 @@ def expanded_document(document: dict[str, Any]) -> dict[str, Any] | None:
 
 def apply_preset_overrides(
     document: dict[str, Any], assignments: list[Assignment]
-) -> tuple[dict[str, Any], set[Location], list[Assignment], list[str]]:
+) -> tuple[dict[str, Any], set[Location], list[Assignment], list[tuple[str, str]]]:
     """Apply the overrides of presets and of values that take precedence over presets.
 
     Returns:
-        The document; the locations that were set; the assignments to elements that a preset may create; messages for
-        other assignments, whose paths into a preset do not exist.
+        The document; the locations that were set; the assignments to elements that a preset may create; path and
+        message of each other assignment, whose path into a preset does not exist.
     """
-    wrong: list[str] = []
+    wrong: list[tuple[str, str]] = []
     changed: set[Location] = set()
     later: list[Assignment] = []
     for path, value in assignments:
@@ -64,7 +64,7 @@ def apply_preset_overrides(
             changed.add(location)
         except AddressError as error:
             if any(key in document and _is_within(path, key) for key in PRESETS):
-                wrong.append(str(error))
+                wrong.append((path, str(error)))
             else:
                 later.append((path, value))
     return document, changed, later, wrong
