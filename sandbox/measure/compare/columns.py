@@ -25,9 +25,12 @@ def _divergence(row: Row) -> float | str | None:
     return "never" if known else row.first_divergence
 
 
+DIVERGENCE: Column[Row] = Column(
+    "diverges, s", "time at which a distance first exceeds the tolerance, s", _divergence, "time"
+)
 COLUMNS: tuple[Column[Row], ...] = (
     *(_error(each.name) for each in fields(Score) if METRICS[each.name].head is not None),
-    Column("diverges, s", "time at which a distance first exceeds the tolerance, s", _divergence, "time"),
+    DIVERGENCE,
     Column(
         "energy",
         "change of the energy without a cause, as a fraction; + is a gain",

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from sandbox.formatting import UNKNOWN, format_number
 from sandbox.measure.columns import shown
 from sandbox.measure.compare import Comparison, Row
-from sandbox.measure.compare.columns import COLUMNS
+from sandbox.measure.compare.columns import COLUMNS, DIVERGENCE
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.provenance import machine, versions
@@ -110,13 +110,15 @@ NAMES = HtmlColumn("engine"), HtmlColumn("verdict")
 COST = HtmlColumn("ms per s", True, "computing time in milliseconds per simulated second")
 
 
-ENGINE_COLUMNS = (*NAMES, *html_columns(COLUMNS), COST)
+MEASURED = tuple(column for column in COLUMNS if column is not DIVERGENCE)
+"""Columns of the measured values, but for the time that the verdict states."""
+ENGINE_COLUMNS = (*NAMES, *html_columns(MEASURED), COST)
 """All columns that the table of the engines may have."""
 
 
 def columns_of(rows: Sequence[Row]) -> list[HtmlColumn]:
     """Return the columns of the table of all engines."""
-    return [*NAMES, *html_columns(shown(COLUMNS, rows)), COST]
+    return [*NAMES, *html_columns(shown(MEASURED, rows)), COST]
 
 
 def write_comparison(comparison: Comparison, path: str | Path, on_recording: Sequence[str] = ()) -> Path:
@@ -193,7 +195,7 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
 
 def engines_table(comparison: Comparison) -> Markup:
     """Return the table of all engines."""
-    classes, columns = css_classes(comparison), shown(COLUMNS, comparison.rows)
+    classes, columns = css_classes(comparison), shown(MEASURED, comparison.rows)
     rows = [
         [
             engine_name(row.name, classes[row.name]),
