@@ -36,6 +36,7 @@ from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
+    add_value_columns,
     cell_text,
     format_optional,
     heads_of,
@@ -44,8 +45,8 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
+from sandbox.columns import Column, shown
 from sandbox.formatting import format_plural
-from sandbox.measure.columns import Column, shown
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
 from sandbox.measure.compare.columns import COLUMNS, ONE_SIDED
 from sandbox.measure.compare.contact_matching import ContactMatch
@@ -93,7 +94,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
     add_columns(table, (*map(short_key, swept), "dt"), "right")
     add_columns(table, ["status"])
     columns = shown((*COLUMNS, SECONDS), comparison.rows)
-    add_columns(table, [column.head for column in columns], "right")
+    add_value_columns(table, columns)
     for row in comparison.rows:
         table.add_row(
             row.engine,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from sandbox.columns import Column, R
 from sandbox.formatting import UNKNOWN
-from sandbox.measure.columns import Column, R
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -35,6 +35,12 @@ def add_columns(table: "Table", heads: Iterable[str], justify: Literal["left", "
         table.add_column(head, justify=justify, no_wrap=True)
 
 
+def add_value_columns(table: "Table", columns: Iterable[Column[R]]) -> None:
+    """Add columns of values; all but texts are justified to the right."""
+    for column in columns:
+        add_columns(table, [column.head], "left" if column.kind == "text" else "right")
+
+
 def heads_of(table: "Table") -> list[str]:
     """Return the heads of the columns."""
     return [str(column.header) for column in table.columns]
@@ -49,10 +55,10 @@ def cell_text(column: Column[R], row: R) -> str:
     """Return the value of a row in a column as text."""
     value = column.value(row)
     if value is None or isinstance(value, str):
-        return value or UNKNOWN
+        return UNKNOWN if value is None else value
     if column.kind == "change":
         return f"{value:+.2g}" if value else "0"
-    return format(value, {"number": ".3g", "time": ".4g", "count": ","}[column.kind])
+    return format(value, {"number": ".3g", "time": ".4g", "count": ",", "text": ""}[column.kind])
 
 
 def new_console() -> "Console":

@@ -33,7 +33,17 @@ from sandbox.cli.options import (
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
 from sandbox.cli.streams import print_json
-from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.cli.tables import (
+    add_columns,
+    add_value_columns,
+    cell_text,
+    heads_of,
+    new_table,
+    print_legend,
+    print_line,
+    print_table,
+)
+from sandbox.columns import Column
 from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
@@ -67,16 +77,21 @@ LONG = ">frame"
 """Mark of settings that are not recommended, because their dt is longer than a frame."""
 
 
-COLUMNS = {
-    "engine": "the physics engine",
-    "dt": "time step of a frame, s",
-    "substeps": "solver steps per frame",
-    "iterations": "iterations of the contact solver per substep",
-    "other settings": "further changes of [solver]",
-    "ms/s minimum": "computing time per simulated second on this machine, ms: the smallest of the timings",
-    "ms/s median": "the same: the median of the timings",
-}
-"""Columns of the table and their meaning, for `--verbose`; the column of the error is added."""
+def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
+    """Return the columns of the table."""
+    unit = f", {found.metric.unit}" if found.metric.unit else ""
+    cost = "computing time per simulated second on this machine, ms: the {} of the timings"
+    iterations = "iterations of the contact solver per substep"
+    return [
+        Column("engine", "the physics engine", lambda point: point.engine, "text"),
+        Column("dt", "time step of a frame, s", lambda point: point.settings.dt, "time"),
+        Column("substeps", "solver steps per frame", lambda point: point.settings.substeps, "count"),
+        Column("iterations", iterations, lambda point: point.settings.iterations, "count"),
+        Column("other settings", "further changes of [solver]", _other_settings, "text"),
+        Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", lambda point: point.error),
+        Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
+        Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time"),
+    ]
 
 
 def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
@@ -89,25 +104,20 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     """
     from rich.text import Text
 
-    unit = f", {found.metric.unit}" if found.metric.unit else ""
-    error_head = f"{found.metric.name}{unit}"
-    table = new_table()
-    add_columns(table, ["engine"])
-    add_columns(table, ("dt", "substeps", "iterations"), "right")
-    add_columns(table, ["other settings"])
-    add_columns(table, (error_head, "ms/s minimum", "ms/s median"), "right")
+    table, columns = new_table(), _columns(found)
+    add_value_columns(table, columns)
     add_columns(table, [""])
     rows = _rows(found)
     for point in rows:
         marks = [*_marks(point, found), *([LONG] if point.settings.dt > found.max_dt else [])]
-        table.add_row(*_cells(point), Text(" ".join(marks), style="green"))
+        table.add_row(*(cell_text(column, point) for column in columns), Text(" ".join(marks), style="green"))
     name = f"{scene} ({found.scene.title})" if found.scene.title else scene
     print_line(f"{name}: {found.error_about}")
     print_line(_about(found))
     if rows:
         print_table(table)
         if verbose:
-            print_legend([*heads_of(table), *LEGEND], COLUMNS | {error_head: f"{found.metric.about}{unit}"} | LEGEND)
+            print_legend([*heads_of(table), *LEGEND], {column.head: column.about for column in columns} | LEGEND)
         else:
             click.echo(_legend(rows, found))
         if any(point.settings.dt > found.max_dt for point in rows):
@@ -163,24 +173,13 @@ def _long_legend(found: Tradeoff) -> str:
     return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{exception}, so the setting is not recommended"
 
 
-def _cells(point: Evaluation) -> list[str]:
-    steps = {"dt", "substeps", "iterations"}
-    words = ", ".join(
+def _other_settings(point: Evaluation) -> str:
+    """Return the changes of a setting that have no column."""
+    return ", ".join(
         f"no {key}" if value is None else f"{key} {format_value(value)}"
         for key, value in point.changes.items()
-        if key not in steps
+        if key not in {"dt", "substeps", "iterations"}
     )
-    own = point.settings
-    return [
-        point.engine,
-        f"{own.dt:.4g}",
-        str(own.substeps),
-        str(own.iterations),
-        words,
-        format_optional(point.error),
-        format_optional(point.cost, ".4g"),
-        format_optional(point.cost_median, ".4g"),
-    ]
 
 
 def _failures(found: Tradeoff) -> list[str]:

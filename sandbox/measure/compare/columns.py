@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import fields
 
-from sandbox.measure.columns import Column
+from sandbox.columns import Column
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.compare.result import Row, Score
 

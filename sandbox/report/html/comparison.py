@@ -8,8 +8,8 @@ from typing import Any
 
 from markupsafe import Markup
 
+from sandbox.columns import shown
 from sandbox.formatting import UNKNOWN, format_number
-from sandbox.measure.columns import shown
 from sandbox.measure.compare import Comparison, Row
 from sandbox.measure.compare.columns import COLUMNS, DIVERGENCE
 from sandbox.measure.compare.contact_matching import ContactMatch

@@ -19,8 +19,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from sandbox.atomic_write import atomic_write
+from sandbox.columns import Column, Kind, R
 from sandbox.formatting import format_change, format_count, format_number, format_plural
-from sandbox.measure.columns import Column, Kind, R
 from sandbox.report.style import css_class_of
 
 SCRIPTS = ("charts.js", "renderer.js", "replay.js")

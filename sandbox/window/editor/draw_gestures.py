@@ -15,7 +15,7 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.editing.elements import FIELD_OF, ElementKey, all_names, elements_of_table, unique_name
 from sandbox.scene.editing.transforms import plain_value, round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
-from sandbox.scene.geometry.polyline import simplify_loop, simplify_polyline
+from sandbox.scene.geometry.simplification import simplify_loop, simplify_polyline
 from sandbox.window.editor.gestures import Gesture, typed_numbers
 from sandbox.window.editor.snapping import REACH, Pointer, rounded
 from sandbox.window.render.circles import draw_disc

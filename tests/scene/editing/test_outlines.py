@@ -12,7 +12,7 @@ from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.editing.take_apart import TakeApartError, take_apart_changes
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import with_changes
-from sandbox.scene.geometry.polyline import simplify_loop, simplify_polyline
+from sandbox.scene.geometry.simplification import simplify_loop, simplify_polyline
 
 POINTS = st.lists(st.tuples(st.floats(-10, 10), st.floats(-10, 10)), min_size=2, max_size=40)
 

@@ -5,8 +5,8 @@ from typing import Generic, Literal, NamedTuple, TypeVar
 
 R = TypeVar("R")
 
-Kind = Literal["number", "time", "change", "count"]
-"""Format of the values: a number; a time, s; a signed fraction; a count"""
+Kind = Literal["number", "time", "change", "count", "text"]
+"""Format of the values: a number; a time, s, or a cost; a signed fraction; a count; a text"""
 
 
 class Column(NamedTuple, Generic[R]):
