@@ -1,9 +1,10 @@
 """JSON documents from dataclasses: the values of a document, and its JSON Schema from the same types.
 
-A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field. The
-fields and properties that a class lists in `json_head` precede the other fields, the properties in `json_properties`
-follow them; each is listed by name or as (key, name). `json_name` is the name of a class in schemas; default: the name
-of the class. JSON has no number for nan and infinity: they become null, so that every float may be null in the schema.
+A dataclass becomes an object with its fields in order, but for those without `repr`. The metadata of `in_json` rename,
+omit or inline a field. The fields and properties that a class lists in `json_head` precede the other fields, the
+properties in `json_properties` follow them; each is listed by name or as (key, name). `json_name` is the name of a
+class in schemas; default: the name of the class. JSON has no number for nan and infinity: they become null, so that
+every float may be null in the schema.
 """
 
 import math
@@ -48,7 +49,9 @@ class JsonField(NamedTuple):
 def _members(cls: Any) -> list[tuple[str, JsonField]]:
     """Return the fields and properties that the documents of a class have, in order, and how they appear, with keys."""
     if is_dataclass(cls):
-        options: dict[str, JsonField] = {each.name: each.metadata.get("json", JsonField()) for each in fields(cls)}
+        options: dict[str, JsonField] = {
+            each.name: each.metadata.get("json", JsonField(omit=not each.repr)) for each in fields(cls)
+        }
     else:
         options = dict.fromkeys(cls.model_fields if issubclass(cls, BaseModel) else cls._fields, JsonField())
     head, last = getattr(cls, "json_head", ()), getattr(cls, "json_properties", ())

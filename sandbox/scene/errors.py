@@ -30,7 +30,7 @@ class Fault:
     """path of the key, such as `ball.cue.velocity[1]`; empty if the fault concerns the whole file"""
     message: str
     """description of the error and of the valid values"""
-    key: str = field(default="", compare=False)
+    key: str = field(default="", repr=False, compare=False)
     """key of the override at fault, as it was given; empty for other faults"""
 
     @classmethod
