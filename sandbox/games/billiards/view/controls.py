@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import pygame
 
@@ -195,47 +195,59 @@ TURN_STEP, FINE_TURN_STEP = 0.002, 0.0001
 POWER_STEP = 0.02
 """fraction of the greatest power by which an arrow key changes it"""
 
-CUE_KEY_HELP = (
-    ("Mouse", "aim; Shift: fine"),
-    ("Left or Right", "fine aim; Shift: finer"),
-    ("Up or Down", "power"),
-    ("S (hold)", "stroke: pull back, push forward"),
-    ("Left-drag", "draw the cue back, release"),
-    ("E (hold)", "english: where the tip hits"),
-    ("X (hold)", "set the power"),
-    ("Space", "shoot"),
-    ("G", "cue ball in hand"),
-    ("Z", "undo shot"),
-    ("Click", "call a ball, or a pocket"),
-    ("C", "call a safety"),
-    ("D", "next choice, if any"),
-    ("Enter", "confirm the choice"),
+
+class CueKey(NamedTuple):
+    """Keys at a table, or use of the mouse, as a line of the help page."""
+
+    label: str
+    about: str
+    actions: Mapping[int, Callable[[CueControls], object]] = {}
+    """handlers of presses by pygame key code"""
+    is_held: bool = False
+    """whether the mode of the mouse that a press begins ends with the release"""
+
+
+def _hold(label: str, about: str, key: int, mode: CueMode) -> CueKey:
+    return CueKey(f"{label} (hold)", about, {key: lambda cue: cue.begin(mode)}, is_held=True)
+
+
+CUE_KEYS = (
+    CueKey("Mouse", "aim; Shift: fine"),
+    CueKey(
+        "Left or Right",
+        "fine aim; Shift: finer",
+        {pygame.K_LEFT: lambda cue: cue.turn(_angle_step()), pygame.K_RIGHT: lambda cue: cue.turn(-_angle_step())},
+    ),
+    CueKey(
+        "Up or Down",
+        "power",
+        {
+            pygame.K_UP: lambda cue: cue.change_power(POWER_STEP),
+            pygame.K_DOWN: lambda cue: cue.change_power(-POWER_STEP),
+        },
+    ),
+    _hold("S", "stroke: pull back, push forward", pygame.K_s, "stroke"),
+    CueKey("Left-drag", "draw the cue back, release"),
+    _hold("E", "english: where the tip hits", pygame.K_e, "english"),
+    _hold("X", "set the power", pygame.K_x, "power"),
+    CueKey("Space", "shoot", {pygame.K_SPACE: lambda cue: cue.player.shoot()}),
+    CueKey("G", "cue ball in hand", {pygame.K_g: lambda cue: cue.player.toggle_in_hand()}),
+    CueKey("Z", "undo shot", {pygame.K_z: lambda cue: cue.player.undo()}),
+    CueKey("Click", "call a ball, or a pocket"),
+    CueKey("C", "call a safety", {pygame.K_c: lambda cue: cue.player.toggle_safety()}),
+    CueKey("D", "next choice, if any", {pygame.K_d: lambda cue: cue.player.choose_next()}),
+    CueKey("Enter", "confirm the choice", {pygame.K_RETURN: lambda cue: cue.player.take_choice()}),
 )
+CUE_KEY_HELP = tuple((row.label, row.about) for row in CUE_KEYS)
 """keys and their descriptions in the help overlay"""
 
 
 def cue_bindings(cue: CueControls) -> ControlBindings:
     """Return the key bindings at a table."""
-    player = cue.player
-    modes: tuple[tuple[int, CueMode], ...] = (
-        (pygame.K_s, "stroke"),
-        (pygame.K_e, "english"),
-        (pygame.K_x, "power"),
+    pressed = {key: partial(action, cue) for row in CUE_KEYS for key, action in row.actions.items()}
+    return ControlBindings(
+        pressed, {key: cue.end for row in CUE_KEYS if row.is_held for key in row.actions}, CUE_KEY_HELP
     )
-    pressed: dict[int, Callable[[], object]] = {
-        pygame.K_SPACE: player.shoot,
-        pygame.K_g: player.toggle_in_hand,
-        pygame.K_z: player.undo,
-        pygame.K_LEFT: lambda: cue.turn(_angle_step()),
-        pygame.K_RIGHT: lambda: cue.turn(-_angle_step()),
-        pygame.K_UP: lambda: cue.change_power(POWER_STEP),
-        pygame.K_DOWN: lambda: cue.change_power(-POWER_STEP),
-        pygame.K_c: player.toggle_safety,
-        pygame.K_d: player.choose_next,
-        pygame.K_RETURN: player.take_choice,
-        **{key: partial(cue.begin, mode) for key, mode in modes},
-    }
-    return ControlBindings(pressed, {key: cue.end for key, _ in modes}, CUE_KEY_HELP)
 
 
 def _angle_step() -> float:
