@@ -12,6 +12,7 @@ from typing import Any
 from sandbox.games.billiards.rules.base import BallEvent, GameError, Respot, Ruleset, RulesState, Situation
 from sandbox.games.billiards.table_geometry import HAIR, TOUCH, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.vectors import nearest_on_segment
 from sandbox.trajectory import Contacts
 
 
@@ -55,7 +56,7 @@ def _blocking_ball(cue: PlacedDisc, target: PlacedDisc, others: dict[str, Placed
     distances = {}
     for edge in _edges(cue, target):
         for name, disc in others.items():
-            if _segment_distance((cue[0], cue[1]), edge, (disc[0], disc[1])) < cue[2] + disc[2]:
+            if nearest_on_segment((disc[0], disc[1]), (cue[0], cue[1]), edge)[1] < cue[2] + disc[2]:
                 distances[name] = math.hypot(disc[0] - cue[0], disc[1] - cue[1])
     return min(distances, key=lambda name: distances[name]) if distances else None
 
@@ -72,15 +73,6 @@ def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
         (cue[0] + forward * math.cos(left), cue[1] + forward * math.sin(left)),
         (cue[0] + forward * math.cos(right), cue[1] + forward * math.sin(right)),
     )
-
-
-def _segment_distance(begin: Point, end: Point, point: Point) -> float:
-    """Return the distance of a point from a line segment, m."""
-    dx, dy = end[0] - begin[0], end[1] - begin[1]
-    px, py = point[0] - begin[0], point[1] - begin[1]
-    size = dx * dx + dy * dy
-    fraction = min(1.0, max(0.0, (px * dx + py * dy) / size)) if size else 0.0
-    return math.hypot(px - fraction * dx, py - fraction * dy)
 
 
 def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:

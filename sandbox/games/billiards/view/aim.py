@@ -22,7 +22,7 @@ from sandbox.window.render.palette import (
     RgbColour,
     mix_colours,
 )
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf, draw_sdf_disc
 
 FADE_LENGTH = 3.0
 """m along a path over which its brightness halves"""
@@ -84,11 +84,8 @@ def _draw_end(view: DrawContext, points: FloatArray, aim: CueAim, pocketed: bool
 def _draw_ring(
     view: DrawContext, at: FloatArray, radius: float, colour: RgbColour, line: float, opacity: float = 1.0
 ) -> None:
-    (x, y), size = view.camera.to_screen(at).tolist(), radius * view.camera.scale
-    side = math.ceil(size) + 3
-    within = pygame.Rect(math.floor(x) - side, math.floor(y) - side, 2 * side + 1, 2 * side + 1)
     style = ShapeStyle(None, colour, line * view.ui_scale, opacity, antialias=view.antialias)
-    draw_sdf(view.surface, disc_distance(x, y, size), style, within)
+    draw_sdf_disc(view.surface, view.camera.to_screen(at).tolist(), radius * view.camera.scale, style)
 
 
 def draw_aim(view: DrawContext, aim: CueAim) -> None:

@@ -30,7 +30,7 @@ from sandbox.window.render.palette import (
     hex_colour,
     mix_colours,
 )
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
 
 MAX_SCOREBOARD_WIDTH = 470.0
@@ -263,7 +263,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale
     """Draw the english dial: the ball, the miscue limit, and the contact point of the tip."""
     (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
     draw_box(surface, tip_box(rect, ui_scale), 10 * ui_scale, opacity=170)
-    _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * ui_scale))
+    draw_sdf_disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * ui_scale))
     faint = mix_colours(IVORY, PANEL, 0.28)
     for a, b in (((x - radius, y), (x + radius, y)), ((x, y - radius), (x, y + radius))):
         pygame.draw.line(surface, faint, a, b)
@@ -273,7 +273,8 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale
             points = [(x + MISCUE * radius * math.cos(t), y + MISCUE * radius * math.sin(t)) for t in turns]
             pygame.draw.aalines(surface, mix_colours(IVORY, VERMILION, 0.75), False, points)
     at = x + cue.side * radius, y - cue.height * radius
-    _disc(surface, at, TIP_RADIUS * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * ui_scale, opacity=0.95))
+    style = ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * ui_scale, opacity=0.95)
+    draw_sdf_disc(surface, at, TIP_RADIUS * radius, style)
     if cue.side or cue.height:
         text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
         draw_text(
@@ -313,12 +314,6 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_sca
         "bottomright",
         mono=True,
     )
-
-
-def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, style: ShapeStyle) -> None:
-    side = math.ceil(radius) + 2
-    within = pygame.Rect(math.floor(at[0]) - side, math.floor(at[1]) - side, 2 * side + 1, 2 * side + 1)
-    draw_sdf(surface, disc_distance(*at, radius), style, within)
 
 
 SIDE, GAP = 92.0, 14.0

@@ -17,9 +17,9 @@ from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.render.draw_context import Canvas
-from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
+from sandbox.window.render.lines import Pixel, draw_line, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, RgbColour, mix_colours
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 from sandbox.window.render.static_geometry import draw_static_bodies
 from sandbox.window.view_bounds import RAIL, shorter_side
 
@@ -230,12 +230,8 @@ class _TablePen:
     def disc(
         self, at: Point, radius: float, colour: RgbColour, rim: RgbColour | None = None, line: float = 0.0
     ) -> None:
-        ((x, y),), r = self.at((at,)), radius * self.canvas.camera.scale
-        if clip_segment((x, y), (x, y), self.canvas.surface.get_rect(), r + 4.0) is None:
-            return
-        within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
         style = ShapeStyle(colour, rim or colour, line * self.canvas.ui_scale, antialias=self.canvas.antialias)
-        draw_sdf(self.canvas.surface, disc_distance(x, y, r), style, within)
+        draw_sdf_disc(self.canvas.surface, self.at((at,))[0], radius * self.canvas.camera.scale, style)
 
 
 def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
