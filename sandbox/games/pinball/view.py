@@ -5,11 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
-from sandbox.arrays import IntArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import GROUND
 from sandbox.scene.description.fixed import Post
-from sandbox.window.render.draw_context import Canvas, DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext, GameView
 from sandbox.window.render.lamps import draw_lamps, draw_spot
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line
 from sandbox.window.render.palette import INK, RgbColour, colour_of_fixed, mix_colours
@@ -91,20 +90,10 @@ def _draw_dark_disc(layer: pygame.Surface, at: Pixel, radius: float) -> None:
         pygame.draw.circle(layer, DARK, at, radius)
 
 
-class PinballView:
+class PinballView(GameView):
     """Draws the playfield; balls are drawn as in other scenes."""
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw the playfield."""
         draw_playfield(ctx, ctx.snapshot.scene)
         return True
-
-    def below(self, ctx: DrawContext) -> None:
-        """Draw nothing."""
-
-    def bodies(self, ctx: DrawContext) -> IntArray:
-        """Draw nothing."""
-        return np.empty(0, np.int64)
-
-    def above(self, ctx: DrawContext) -> None:
-        """Draw nothing."""
