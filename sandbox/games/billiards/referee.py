@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sandbox.games.billiards.rules.base import BallEvent, GameError, Respot, Ruleset, RulesState, Situation
-from sandbox.games.billiards.table_geometry import HAIR, TOUCH, PlacedDisc, TableGeometry
+from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP, PLACEMENT_GAP, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
 from sandbox.scene.geometry.vectors import nearest_on_segment
 from sandbox.trajectory import Contacts
@@ -19,7 +19,9 @@ from sandbox.trajectory import Contacts
 def touching_balls(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
     """Return the balls that touch the cue ball."""
     x, y, radius = cue
-    return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
+    return tuple(
+        name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= MAX_TOUCH_GAP
+    )
 
 
 def situation_of(
@@ -112,7 +114,7 @@ def _distance_to_room(spot: Point, direction: Point, radius: float, others: Sequ
     for x, y, r in others:
         forward = (x - spot[0]) * direction[0] + (y - spot[1]) * direction[1]
         sideways = (x - spot[0]) * direction[1] - (y - spot[1]) * direction[0]
-        contact_distance = radius + r + HAIR
+        contact_distance = radius + r + PLACEMENT_GAP
         if abs(sideways) < contact_distance:
             half = math.sqrt(contact_distance * contact_distance - sideways * sideways)
             blocked.append((forward - half, forward + half))
@@ -123,7 +125,7 @@ def _distance_to_room(spot: Point, direction: Point, radius: float, others: Sequ
     return distance
 
 
-SIMULTANEOUS = 5e-3
+SEPARATION_TIME = 5e-3
 """s: a pair that touched before the shot counts as not yet separated up to this time after it was set in motion"""
 
 
@@ -153,7 +155,7 @@ def shot_events(
         since = time - began
         if since < 0.0:
             continue
-        if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else motion_times.get(a, math.inf)):
+        if (a, b) in against and since <= SEPARATION_TIME + (0.0 if b >= 0 else motion_times.get(a, math.inf)):
             continue
         if b >= 0:
             events.append(BallEvent(since, names[a], "ball", names[b]))
@@ -183,13 +185,13 @@ def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozen
     """Return the pairs that touch, as body indices, the lower first; fixed objects are −1 − k."""
     found = []
     ordered = sorted(range(len(position)), key=lambda k: position[k][0])
-    widest = 2.0 * max(layout.radius, default=0.0) + TOUCH
+    widest = 2.0 * max(layout.radius, default=0.0) + MAX_TOUCH_GAP
     for n, i in enumerate(ordered):
         (x, y), radius = position[i], layout.radius[i]
         for k in ordered[n + 1 :]:
             if position[k][0] - x > widest:
                 break
-            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= TOUCH:
+            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= MAX_TOUCH_GAP:
                 found.append((min(i, k), max(i, k)))
     found += layout.against_fixed(position)
     return frozenset(found)

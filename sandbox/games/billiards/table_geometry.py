@@ -14,11 +14,11 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.geometry.vectors import offset_from_segment
 
-TOUCH = 1e-6
+MAX_TOUCH_GAP = 1e-6
 """m: gap up to which balls touch, for the rules; far above the rounding errors of engines"""
 
-HAIR = 1e-5
-"""m: gap between balls that the referee places, above `TOUCH`, so that they do not touch"""
+PLACEMENT_GAP = 1e-5
+"""m: gap between balls that the referee places, above `MAX_TOUCH_GAP`, so that they do not touch"""
 
 PlacedDisc = tuple[float, float, float]
 """x, y and radius, m"""
@@ -171,4 +171,4 @@ class TableGeometry:
 
 def _touching(distance: FloatArray, owner: list[int]) -> list[tuple[int, int]]:
     """Return the pairs that touch, from (M, K) distances between bodies and fixed objects."""
-    return [(i, owner[k]) for i, k in np.argwhere(distance <= TOUCH).tolist()]
+    return [(i, owner[k]) for i, k in np.argwhere(distance <= MAX_TOUCH_GAP).tolist()]

@@ -8,10 +8,10 @@ from sandbox.games.pinball.events import Award, Device, Effect, Hit, Light, Play
 from sandbox.games.pinball.playfield import Playfield, PlayfieldElement
 from sandbox.scene.geometry.vectors import nearest_on_segment
 
-FALL = 0.26
+FALL_TIME = 0.26
 """s, time that a target takes to drop. Source: Visual Pinball, 60 units at its default drop speed"""
 
-REST = 1.5
+REST_TIME = 1.5
 """s for which a completed bank stays down"""
 
 BANK_POINTS = 25_000
@@ -37,7 +37,7 @@ class DropTargetBanks(Device):
         index = next((k for k, each in enumerate(self.members) if each is hit.element), None)
         if index is None or index in self.down or index in self.falling:
             return
-        self.falling[index] = hit.time + FALL
+        self.falling[index] = hit.time + FALL_TIME
         yield PlaySound("drop")
         yield Award("drop", points_of(hit), self.group, TARGET_BONUS, hit.ball)
 
@@ -48,7 +48,7 @@ class DropTargetBanks(Device):
             self.down.add(index)
             yield Toggle(time=now.time, thing=self.members[index].name, solid=False)
             if len(self.down) == len(self.members):
-                self.rise = now.time + REST
+                self.rise = now.time + REST_TIME
                 yield PlaySound("bank")
                 yield Award("bank", BANK_POINTS, self.group, BANK_BONUS)
         if self.rise is not None and now.time >= self.rise:

@@ -16,7 +16,7 @@ from sandbox.window.render.sdf import ShapeStyle
 from sandbox.window.render.static_geometry import draw_markings, draw_static_bodies, draw_zones, on_layer
 
 DARK: RgbColour = (5, 8, 14)
-SHADOW = (0.003, -0.005)
+SHADOW_OFFSET = (0.003, -0.005)
 """m, offset of the shadow of a static body"""
 SHADOW_ALPHA, TRANSPARENT = 90, (255, 0, 255)
 """opacity of shadows, of 255; and the colour key of the shadow layer"""
@@ -70,7 +70,7 @@ def _draw_shadows(canvas: Canvas, scene: Scene) -> None:
     for wall in scene.walls:
         if not wall.solid or GROUND not in wall.layers:
             continue
-        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
+        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW_OFFSET
         half = max(0.5 * wall.thickness * canvas.camera.scale, 1.0)
         ends: list[Pixel] = [(x, y) for x, y in canvas.camera.to_screen(points).tolist()]
         for a, b in pairwise(ends):
@@ -79,7 +79,7 @@ def _draw_shadows(canvas: Canvas, scene: Scene) -> None:
             for end in ends:
                 _draw_dark_disc(layer, end, half)
     for post in scene.posts:
-        x, y = canvas.camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        x, y = canvas.camera.to_screen(np.asarray(post.position) + SHADOW_OFFSET).tolist()
         if post.solid and GROUND in post.layers and post.radius * canvas.camera.scale < LARGE_DISC:
             _draw_dark_disc(layer, (x, y), post.radius * canvas.camera.scale)
     canvas.surface.blit(layer, (0, 0))

@@ -26,15 +26,15 @@ from sandbox.window.playback.snapshot import Snapshot
 
 CueMode = Literal["aim", "stroke", "draw", "english", "power"]
 
-FINE = 0.08
+FINE_FACTOR = 0.08
 """factor of mouse movements with Shift"""
-ROOM = 0.5
+MAX_DRAW_BACK = 0.5
 """m, greatest draw-back of the cue"""
 MIN_DRAW_BACK = 0.015
 """m, least draw-back for a stroke"""
 SPEED_WINDOW = 0.07
 """s over which the speed of a stroke is measured"""
-DIAL = 90.0
+DIAL_RADIUS = 90.0
 """px at unit 1 of mouse movement from the centre of the ball to its edge, and for half of the power"""
 MIN_AIM_DISTANCE = 1.5
 """distance of the pointer from the cue ball, in radii, below which it does not aim"""
@@ -76,11 +76,11 @@ class CueControls:
             return
         if not player.is_own_turn:
             return
-        cue, factor = player.cue, FINE if fine else 1.0
+        cue, factor = player.cue, FINE_FACTOR if fine else 1.0
         if self.mode == "english":
-            cue.tip_at(cue.side + factor * pixels[0] / DIAL, cue.height - factor * pixels[1] / DIAL)
+            cue.tip_at(cue.side + factor * pixels[0] / DIAL_RADIUS, cue.height - factor * pixels[1] / DIAL_RADIUS)
         elif self.mode == "power":
-            cue.power -= factor * pixels[1] / (2.0 * DIAL)
+            cue.power -= factor * pixels[1] / (2.0 * DIAL_RADIUS)
         elif self.mode == "aim":
             self._aim(before, now, fine)
         else:
@@ -96,7 +96,7 @@ class CueControls:
             self._offset, self._strokes = 0.0, player.strokes
         if fine:
             turned = math.remainder(angle - math.atan2(before[1] - y, before[0] - x), math.tau)
-            self._offset = math.remainder(cue.aim + FINE * turned - angle, math.tau)
+            self._offset = math.remainder(cue.aim + FINE_FACTOR * turned - angle, math.tau)
         cue.aim = angle + self._offset
 
     def turn(self, change: float) -> None:
@@ -112,7 +112,7 @@ class CueControls:
 
     def _push(self, forward: float, time: float) -> None:
         """Move the cue along its direction, m; reaching the ball after a draw-back is a stroke."""
-        self._drawn = min(self._drawn - forward, ROOM)
+        self._drawn = min(self._drawn - forward, MAX_DRAW_BACK)
         self._deepest = max(self._deepest, self._drawn)
         self._recent.append((time, forward))
         while self._recent and self._recent[0][0] < time - SPEED_WINDOW:
@@ -120,7 +120,7 @@ class CueControls:
         cue = self.player.cue
         cue.back = max(self._drawn, 0.0)
         if self.mode == "draw":
-            cue.power = min(cue.back / ROOM, 1.0)
+            cue.power = min(cue.back / MAX_DRAW_BACK, 1.0)
         elif self._drawn <= 0.0 and self._deepest >= MIN_DRAW_BACK:
             speed = sum(each for _, each in self._recent) / SPEED_WINDOW
             self.end()

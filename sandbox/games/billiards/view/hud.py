@@ -37,7 +37,7 @@ MAX_SCOREBOARD_WIDTH = 470.0
 """px at a UI scale of 1"""
 MIN_SCOREBOARD_WIDTH = 300.0
 """px at a UI scale of 1; if the top has less room, the scoreboard is at the bottom"""
-RIGHT = 66.0
+FRAME_RATE_WIDTH = 66.0
 """px at a UI scale of 1: free width to its right, for the frame rate"""
 
 
@@ -70,7 +70,7 @@ def layout_scoreboard(
         occupied: occupied width at the bottom right, px.
     """
     size, pad, margin = 13.0 * ui_scale, round(9 * ui_scale), round(10 * ui_scale)
-    right = free.right - round(RIGHT * ui_scale)
+    right = free.right - round(FRAME_RATE_WIDTH * ui_scale)
     at_top = right - left >= MIN_SCOREBOARD_WIDTH * ui_scale
     if not at_top:
         left, right = free.left + margin, free.right - max(margin, occupied)
@@ -316,7 +316,7 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_sca
     )
 
 
-SIDE, GAP = 92.0, 14.0
+DIAL_SIDE, DIAL_GAP = 92.0, 14.0
 """px at a UI scale of 1: side of the english dial, and gap between dials"""
 POWER_BAR = 18.0
 """px at a UI scale of 1: width of the power bar"""
@@ -401,11 +401,11 @@ def _scale(free: pygame.Rect, ui_scale: float) -> float:
 
 def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
     """Return the rectangles of the english dial and the power bar, px."""
-    side, gap, bar = round(SIDE * scale), round(GAP * scale), round(POWER_BAR * scale)
+    side, gap, bar = round(DIAL_SIDE * scale), round(DIAL_GAP * scale), round(POWER_BAR * scale)
     power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
     return pygame.Rect(power.left - gap - side, power.top, side, side), power
 
 
 def _dials_width(scale: float) -> int:
     """Return the width of the dials at the right, px."""
-    return round(SIDE * scale) + round(POWER_BAR * scale) + 3 * round(GAP * scale)
+    return round(DIAL_SIDE * scale) + round(POWER_BAR * scale) + 3 * round(DIAL_GAP * scale)
