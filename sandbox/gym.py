@@ -241,7 +241,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             return None
         episode = self._current_episode()
         if self._canvas is None:
-            from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is needed only to render
+            from sandbox.window.render.renderer import OffscreenRenderer  # pygame is needed only to render
 
             self._canvas = OffscreenRenderer(SIZE)
         relay = episode.simulation

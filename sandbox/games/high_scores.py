@@ -20,7 +20,7 @@ from sandbox.user_folders import data_folder
 
 FILE = "high-scores.json"
 
-BEST = 10
+MAX_SCORES = 10
 """number of scores kept in each table"""
 
 MAX_SCORE = 10**15
@@ -69,7 +69,7 @@ class HighScores:
             OSError: the file cannot be read.
             ValueError: the file is damaged.
         """
-        return tuple(Entry(*row) for row in self._read().get(table, [])[:BEST])
+        return tuple(Entry(*row) for row in self._read().get(table, [])[:MAX_SCORES])
 
     def rank(self, table: str, score: int | float) -> int | None:
         """Return the rank that a score would have, from 1, after equal scores; None if it does not enter the table.
@@ -79,7 +79,7 @@ class HighScores:
             ValueError: the file is damaged.
         """
         ahead = sum(each.score >= score for each in self.of(table))
-        return ahead + 1 if score > 0 and ahead < BEST else None
+        return ahead + 1 if score > 0 and ahead < MAX_SCORES else None
 
     def enter(self, table: str, initials: str, score: int | float) -> int | None:
         """Enter a score in a table and return its rank; None if it does not enter, which leaves the file unchanged.
@@ -94,7 +94,7 @@ class HighScores:
         tables = self._read()
         rows = tables.setdefault(table, [])
         rows.insert(rank - 1, (initials_of(initials), score))
-        del rows[BEST:]
+        del rows[MAX_SCORES:]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(self.path) as temporary:
             temporary.write_text(json.dumps(tables, indent=1, ensure_ascii=False, sort_keys=True), encoding="utf-8")

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from sandbox.echo import MAX_NAMED, printable, short_repr, shorten
-from sandbox.games.billiards.scene import BALL, DURATION, SUBSTEPS
-from sandbox.games.billiards.tables import BALLS, MATERIAL
+from sandbox.games.billiards.scene import BALL_MATERIAL, DURATION, SUBSTEPS
+from sandbox.games.billiards.tables import BALLS, CUSHION_MATERIAL
 from sandbox.levels.builder import ImportedLevel
 from sandbox.levels.safe_json import JsonNode, parse_json, read_json
 from sandbox.levels.scene_text import LevelBlock, LevelElement, clean_text, compose_scene, table_lines, toml_text
@@ -170,10 +170,13 @@ class _Shot:
                 },
             ),
             ("[contact_models]", {"ball_ball": "frictional", "cushion": "han2005"}),
-            ("[[material]]", {"name": BALL}),
-            ("[[material]]", {"name": MATERIAL}),
-            ("[[pair]]", {"between": (BALL, BALL), "restitution": values["e_b"]}),
-            ("[[pair]]", {"between": (BALL, MATERIAL), "restitution": values["e_c"], "friction": values["f_c"]}),
+            ("[[material]]", {"name": BALL_MATERIAL}),
+            ("[[material]]", {"name": CUSHION_MATERIAL}),
+            ("[[pair]]", {"between": (BALL_MATERIAL, BALL_MATERIAL), "restitution": values["e_b"]}),
+            (
+                "[[pair]]",
+                {"between": (BALL_MATERIAL, CUSHION_MATERIAL), "restitution": values["e_c"], "friction": values["f_c"]},
+            ),
         ]
         if (area := self._area()) is not None:
             tables.append(("[play]", {"area": area}))
@@ -205,12 +208,12 @@ class _Shot:
             (ax, ay, height), (bx, by, other) = (node[key].vector(MAX_LENGTH) for key in ("p1", "p2"))
             if height != other:
                 node["p2"].refuse(f"has the height {other:g} m, and p1 {height:g} m; a cushion has one height")
-            values = {"points": ((ax, ay), (bx, by)), "height": height, "material": MATERIAL}
+            values = {"points": ((ax, ay), (bx, by)), "height": height, "material": CUSHION_MATERIAL}
             yield _block("wall", f"cushion {name}", values, node)
         for name, node in table["cushion_segments"]["circular"].members():
             x, y, height = node["center"].vector(MAX_LENGTH)
             radius = node["radius"].number(1e-9, MAX_LENGTH)
-            values = {"position": (x, y), "radius": radius, "height": height, "material": MATERIAL}
+            values = {"position": (x, y), "radius": radius, "height": height, "material": CUSHION_MATERIAL}
             yield _block("post", f"jaw {name}", values, node)
         for name, node in table["pockets"].members():
             x, y, _ = node["center"].vector(MAX_LENGTH)
@@ -235,7 +238,7 @@ class _Shot:
             values: dict[str, Any] = {"position": (x, y)}
             values |= {"velocity": (vx, vy)} if vx or vy else {}
             values |= {"spin": spin} if any(spin) else {}
-            values |= {"radius": radius, "mass": mass, "material": BALL}
+            values |= {"radius": radius, "mass": mass, "material": BALL_MATERIAL}
             colour = _COLOURS.get(name.partition("_")[0])
             yield _block("ball", name, values | ({"colour": colour} if colour else {}), node)
 

@@ -236,7 +236,7 @@ def _draw_total_energy(panel: Axes, comparison: Comparison, detail: ChartDetail 
 
 
 def _energy_limits(totals: Mapping[str, FloatArray], true_energy: FloatArray | None) -> tuple[float, float] | None:
-    """Return the lowest and highest energy to show, J: those of the truth, and of engines as far as `REACH` allows.
+    """Return the lowest and highest energy to show, J: those of the truth, and of engines as far as `MAX_REACH` allows.
 
     Without a truth the energies at the start take its place. None without finite energies.
     """

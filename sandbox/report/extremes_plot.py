@@ -20,7 +20,7 @@ COLOURS: dict[Verdict, str] = {"exact": "#0072b2", "degraded": "#8cc6ec", "refus
 MARKS: dict[Verdict, str] = {"exact": "E", "degraded": "d", "refused": "–", "failed": "×"}
 INKS: dict[Verdict, str] = {"exact": "white", "degraded": "#222222", "refused": "#777777", "failed": "white"}
 NOT_RUN = "#ffffff"
-ROW = 0.24
+ROW_HEIGHT = 0.24
 """Height of a row, inches."""
 
 
@@ -47,10 +47,10 @@ def draw_axes(result: Extremes) -> Figure:
         top = 1.0 - 0.85 / height
         for axis in side:
             rows = len(result.plan.setups(axis))
-            panel_height = rows * ROW / height
+            panel_height = rows * ROW_HEIGHT / height
             panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.28, panel_height))
             _draw_axis(panel, result, axis)
-            top -= (rows * ROW + 1.0) / height
+            top -= (rows * ROW_HEIGHT + 1.0) / height
     _legend(figure, 1.0 - 0.42 / height)
     return figure
 
@@ -59,7 +59,7 @@ def draw_pairs(result: Extremes) -> Figure:
     """Return a matrix for each pair and setup, a row of matrices for each pair."""
     pairs = [pair for pair in result.plan.pairs if any(cell.axis == pair.name for cell in result.pairs)]
     columns = max(len(result.plan.setups(pair)) for pair in pairs)
-    heights = [len(pair.first.levels) * ROW + 0.95 for pair in pairs]
+    heights = [len(pair.first.levels) * ROW_HEIGHT + 0.95 for pair in pairs]
     height, width = sum(heights) + 0.9, 1.4 + columns * 2.5
     figure = Figure(figsize=(width, height), facecolor="white")
     figure.suptitle("Two axes combined", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
@@ -67,8 +67,8 @@ def draw_pairs(result: Extremes) -> Figure:
     for pair, row_height in zip(pairs, heights, strict=True):
         figure.text(0.1 / width, top / height, pair.name, size=10, weight="bold", va="top")
         for k, setup in enumerate(result.plan.setups(pair)):
-            origin = 1.3 + k * 2.5, top - 0.45 - len(pair.first.levels) * ROW
-            size = 2.1, len(pair.first.levels) * ROW
+            origin = 1.3 + k * 2.5, top - 0.45 - len(pair.first.levels) * ROW_HEIGHT
+            size = 2.1, len(pair.first.levels) * ROW_HEIGHT
             panel = figure.add_axes((origin[0] / width, origin[1] / height, size[0] / width, size[1] / height))
             _draw_pair(panel, [c for c in result.pairs if (c.axis, c.setup) == (pair.name, setup.name)], pair)
             panel.set_title(setup.name, size=8, pad=3)
@@ -88,7 +88,7 @@ def level_text(level: float) -> str:
 
 
 def _height(result: Extremes, axes: Sequence[Axis]) -> float:
-    return sum(len(result.plan.setups(axis)) * ROW + 1.0 for axis in axes)
+    return sum(len(result.plan.setups(axis)) * ROW_HEIGHT + 1.0 for axis in axes)
 
 
 def _halved(axes: Sequence[Axis], sizes: Sequence[float]) -> tuple[list[Axis], list[Axis]]:

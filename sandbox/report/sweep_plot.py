@@ -16,7 +16,7 @@ from sandbox.arrays import FloatArray
 from sandbox.report.style import COLOURS, INK, colour_of, literal, style_axes, write_figure
 
 BAND_OPACITY = 0.18
-SHIFT = 0.12
+BAR_SHIFT = 0.12
 """Distance between the bars of two lines at one text, in distances of texts"""
 MAX_WRITTEN = 200
 """Cells of a heat map whose values are written into them"""
@@ -69,7 +69,7 @@ def plot_lines(
         if categories:
             spread = np.stack([each.median - each.low, each.high - each.median])
             style: dict[str, Any] = {"fmt": "o", "ms": 6.0, "capsize": 5.0, "elinewidth": 1.6}
-            shift = SHIFT * (k - (len(series) - 1) / 2.0)
+            shift = BAR_SHIFT * (k - (len(series) - 1) / 2.0)
             panel.errorbar(each.values + shift, each.median, spread, color=colour, label=each.name, **style)
             continue
         panel.fill_between(each.values, each.low, each.high, color=colour, alpha=BAND_OPACITY, lw=0.0)

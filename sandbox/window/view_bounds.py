@@ -14,7 +14,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.window.camera import Camera, ViewBox
 
-RAIL = 0.115
+RAIL_WIDTH = 0.115
 """width of the rails around a playing area, from the inner edge of the cushion, as a fraction of its shorter side"""
 MAX_STEPS, MAX_BODY_STEPS = 12_000, 30_000
 """Limits of `predict_bounds`: steps, and steps times moving bodies; about half a second on pymunk."""
@@ -45,7 +45,7 @@ def shorter_side(area: ViewBox) -> float:
 
 def area_bounds(area: ViewBox) -> ViewBox:
     """Return the box of a playing area with the rails around it, m."""
-    rail = RAIL * shorter_side(area)
+    rail = RAIL_WIDTH * shorter_side(area)
     (left, bottom), (right, top) = area
     return (left - rail, bottom - rail), (right + rail, top + rail)
 

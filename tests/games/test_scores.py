@@ -10,7 +10,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.cli.run_tables import MAX_BINS, ScoreStatistics
-from sandbox.games.high_scores import BEST, FILE, HighScores, initials_of, opened, table_of
+from sandbox.games.high_scores import FILE, MAX_SCORES, HighScores, initials_of, opened, table_of
 from sandbox.scene.files.load import loads
 
 SCORES = st.lists(st.one_of(st.integers(-1000, 10_000_000), st.floats(-1e6, 1e6)), min_size=1, max_size=60)
@@ -76,7 +76,7 @@ def test_the_ten_best_scores_are_kept_in_descending_order(scores: HighScores) ->
 
 
 def test_rank_equals_the_rank_at_which_a_score_is_entered(scores: HighScores) -> None:
-    for k in range(BEST):
+    for k in range(MAX_SCORES):
         scores.enter("a", "abc", 100 * (k + 1))
     for score, rank in ((2000, 1), (1000, 2), (150, 10), (100, None), (50, None)):
         assert scores.rank("a", score) == rank

@@ -51,9 +51,9 @@ WEAPONS: tuple[Weapon, ...] = (
 WRECK = Weapon("wreck", "shell", 4.0, 30.0, 0)
 """Explosion of a destroyed tank."""
 
-FRAGMENTS = 5
+FRAGMENT_COUNT = 5
 """number of fragments of a cluster"""
-SPREAD = 3.0
+FRAGMENT_SPREAD = 3.0
 """m/s, difference of the horizontal velocities of neighbouring fragments"""
 
 
@@ -63,7 +63,7 @@ PER_KILL = 100
 """points for destroying a tank, in addition to one for each point of health"""
 MONEY_PER_HEALTH = 5
 """money for each point of health taken"""
-BARREL = 0.75
+BARREL_LENGTH = 0.75
 """distance from centre to muzzle, in widths of a tank"""
 SAFE_FALL, FALL_DAMAGE = 1.0, 3.0
 """m that a tank may fall without damage, and health lost per metre beyond that"""
@@ -154,7 +154,7 @@ class Tanks:
 
     def muzzle(self, tank: Tank) -> Muzzle:
         """Return the muzzle of a tank."""
-        return Muzzle(tank.position, BARREL * self.size[0])
+        return Muzzle(tank.position, BARREL_LENGTH * self.size[0])
 
     def blast(self, shooter: Tank, position: Point, weapon: Weapon) -> list[Tank]:
         """Damage the tanks near an explosion, and reward the shooter; return the damaged tanks."""
@@ -180,9 +180,9 @@ REST_SPEED = 0.1
 """m/s: below this speed, a tank counts as at rest"""
 SETTLE_TIMEOUT = 8.0
 """s after which settling ends even if tanks still move"""
-PAUSE = 0.5
+MIN_SETTLING_TIME = 0.5
 """s, minimum duration of settling"""
-LIFT = 0.01
+TERRAIN_CLEARANCE = 0.01
 """m, clearance above the terrain at which buried tanks and new rollers are placed"""
 
 
@@ -258,7 +258,7 @@ class Battlefield:
             x, y = tank.position
             if 0.0 <= x <= self.ground.width and y < self.ground.surface(x):
                 width, height = self.tanks.size
-                tank.position = (x, self.ground.under(x, 0.5 * width) + 0.5 * height + LIFT)
+                tank.position = (x, self.ground.under(x, 0.5 * width) + 0.5 * height + TERRAIN_CLEARANCE)
                 actions.append(Move(time=time, body=tank.name, position=tank.position, velocity=(0.0, 0.0)))
         return actions
 
@@ -277,7 +277,7 @@ class Battlefield:
         actions = self._lift_buried(info.time)
         waited = info.time - self._since
         still = self._has_dirt_landed(info.time) and self.tanks.at_rest(info.frame, REST_SPEED)
-        if waited < PAUSE or (waited < SETTLE_TIMEOUT and not still):
+        if waited < MIN_SETTLING_TIME or (waited < SETTLE_TIMEOUT and not still):
             return False, actions
         self.falling.clear()
         destroyed = []

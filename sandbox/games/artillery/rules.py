@@ -16,7 +16,7 @@ import numpy as np
 from sandbox.action import Action, SetParameter
 from sandbox.arrays import FloatArray
 from sandbox.games.artillery.ballistics import Flight, landing
-from sandbox.games.artillery.battlefield import FULL_HEALTH, PAUSE, WEAPONS, Battlefield, Tank
+from sandbox.games.artillery.battlefield import FULL_HEALTH, MIN_SETTLING_TIME, WEAPONS, Battlefield, Tank
 from sandbox.games.artillery.bot_planner import BotPlanner, turn_generator
 from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
 from sandbox.games.artillery.targeting import FiringSolution
@@ -112,7 +112,7 @@ def set_gun(tank: Tank, turn: float, more: float) -> None:
     tank.power = min(max(tank.power + more, MIN_POWER), 1.0)
 
 
-HEIGHTS = 33
+OBSERVED_HEIGHTS = 33
 """number of terrain heights in an observation, evenly spaced from side to side"""
 
 AIR_PARAMETERS = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag", "damping"})
@@ -260,7 +260,7 @@ class ArtilleryRules:
             gun = {"barrel": tank.angle, "power": tank.power, "weapon": tank.weapon}
             found += [(f"{tank.name} {name}", value) for name, value in (own | gun).items()]
         found += [("landed x", -1.0 if last is None else last[0])]
-        heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))
+        heights = field.ground.surface(np.linspace(0.0, field.ground.width, OBSERVED_HEIGHTS))
         return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
 
     def view_state(self, time: float) -> ArtilleryViewState:
@@ -378,7 +378,7 @@ class ArtilleryRules:
         if self._aim is None:
             return []
         reached = self._gunner.move_towards(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)
-        return self._fire() if reached and self._time - self._since >= PAUSE else []
+        return self._fire() if reached and self._time - self._since >= MIN_SETTLING_TIME else []
 
     def _fire(self) -> list[Action]:
         tank = self.shooter

@@ -26,7 +26,14 @@ from sandbox.games.artillery.ballistics import (
     landing,
     state_past_edge,
 )
-from sandbox.games.artillery.battlefield import FRAGMENTS, LIFT, SPREAD, Battlefield, Tank, Weapon
+from sandbox.games.artillery.battlefield import (
+    FRAGMENT_COUNT,
+    FRAGMENT_SPREAD,
+    TERRAIN_CLEARANCE,
+    Battlefield,
+    Tank,
+    Weapon,
+)
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.terrain import Ground
 from sandbox.games.contract import StepInfo
@@ -287,7 +294,7 @@ class Projectiles:
         low, high = max(x - 0.5, 0.0), min(x + 0.5, ground.width)
         along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
         along /= np.hypot(*along)
-        position = np.array([x, y]) + (ROLLER_RADIUS + LIFT) * np.array([-along[1], along[0]])
+        position = np.array([x, y]) + (ROLLER_RADIUS + TERRAIN_CLEARANCE) * np.array([-along[1], along[0]])
         velocity = float(step.velocity(fraction) @ along) * along
         self.shells.remove(shell)
         rolling = self._spawn_shell(time, shell.shooter, shell.weapon, position, velocity, rolls=True)
@@ -327,8 +334,8 @@ class Projectiles:
         """Split a cluster into fragments with different horizontal velocities, whose mean is that of the cluster."""
         self.shells.remove(shell)
         actions: list[Action] = [Remove(time=time, body=shell.name)]
-        for k in range(FRAGMENTS):
-            offset = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
+        for k in range(FRAGMENT_COUNT):
+            offset = np.array([FRAGMENT_SPREAD * (k - 0.5 * (FRAGMENT_COUNT - 1)), 0.0])
             velocity = shell.velocity + offset
             actions.append(self._spawn_shell(time, shell.shooter, shell.weapon, shell.position, velocity))
             self.shells[-1].is_whole = False

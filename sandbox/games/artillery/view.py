@@ -24,7 +24,7 @@ from sandbox.games.artillery.view_state import (
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
-from sandbox.window.render.draw_context import Canvas, DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext, GameView
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
 from sandbox.window.render.palette import (
     BACKGROUND,
@@ -443,7 +443,7 @@ def _draw_wind(view: DrawContext, wind: float) -> None:
         )
 
 
-class ArtilleryView:
+class ArtilleryView(GameView):
     """Draws sky and terrain, tanks with their guns, shells, explosions, and the wind."""
 
     def background(self, ctx: DrawContext) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 from sandbox.action import Action, Move, Strike
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall, player_name
-from sandbox.games.billiards.table_geometry import TOUCH
+from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
@@ -179,7 +179,7 @@ class BilliardsRules:
         """Update the match to positions that changed without a shot, for example by a force."""
         now, count = frame.position, len(self.match.position)
         # Single-precision engines round the positions of moves; such differences are ignored.
-        if np.abs(now[:count] - self.match.position).max(initial=0.0) > TOUCH:
+        if np.abs(now[:count] - self.match.position).max(initial=0.0) > MAX_TOUCH_GAP:
             self.match = replace(self.match, position=_points(now[:count]))
 
     def _end_shot(self, frame: Frame) -> Sequence[Action]:

@@ -33,7 +33,7 @@ from sandbox.games.billiards.rules.base import (
     Situation,
 )
 from sandbox.games.billiards.rules.registry import ruleset_named
-from sandbox.games.billiards.table_geometry import TOUCH, PlacedDisc, TableGeometry
+from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP, PlacedDisc, TableGeometry
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
@@ -272,7 +272,7 @@ class Match:
                 break
             if b >= 0:
                 first = time
-                if layout.before_head(self.position[b if a == cue else a]) >= -TOUCH:
+                if layout.before_head(self.position[b if a == cue else a]) >= -MAX_TOUCH_GAP:
                     return False
             elif first is None and layout.before_head(contacts.point[k].tolist()) > 0.0:
                 return False

@@ -7,17 +7,17 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.billiards.rules.base import PlacementRegion
-from sandbox.games.billiards.table_geometry import HAIR, PlacedDisc, TableGeometry
+from sandbox.games.billiards.table_geometry import PLACEMENT_GAP, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
 
-ROUNDING = 1e-9
+POSITION_TOLERANCE = 1e-9
 """m by which a place may exceed a bound: tolerance for rounding errors"""
 
 CIRCLE_POINTS = 72
 """number of candidate places around each ball"""
 
 
-GRID = 16
+GRID_SIZE = 16
 """columns and rows of candidate places over the allowed area"""
 
 
@@ -34,11 +34,11 @@ def placement_refusal(
         others: other balls on the table.
     """
     point = np.array([at])
-    if not np.all(np.isfinite(point)) or layout.room(point)[0] < radius - ROUNDING:
+    if not np.all(np.isfinite(point)) or layout.room(point)[0] < radius - POSITION_TOLERANCE:
         return "the ball would be outside the cushions"
     if not _within(layout, place, point)[0]:
         return f"the ball must be placed {place}"
-    if _gap(point, radius, others)[0] < -ROUNDING:
+    if _gap(point, radius, others)[0] < -POSITION_TOLERANCE:
         return "another ball is there"
     return None
 
@@ -47,7 +47,7 @@ def allowed(
     layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
 ) -> BoolArray:
     """Return whether a ball may be placed at (M, 2) points, m, as (M,) booleans."""
-    free = (layout.room(points) >= radius - ROUNDING) & (_gap(points, radius, others) >= -ROUNDING)
+    free = (layout.room(points) >= radius - POSITION_TOLERANCE) & (_gap(points, radius, others) >= -POSITION_TOLERANCE)
     return np.asarray(free & _within(layout, place, points))
 
 
@@ -67,7 +67,7 @@ def nearest(
     ]
     discs = np.array(others, dtype=float).reshape(-1, 3)
     for x, y, r in discs.tolist():
-        bearing, centre_distance = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
+        bearing, centre_distance = math.atan2(at[1] - y, at[0] - x), radius + r + PLACEMENT_GAP
         angles = bearing + np.linspace(-math.pi, math.pi, CIRCLE_POINTS + 1)  # includes the nearest point of the circle
         ring = np.array([x, y]) + centre_distance * np.column_stack((np.cos(angles), np.sin(angles)))
         candidates += [ring, _clamped(layout, place, ring, radius)]
@@ -87,7 +87,7 @@ def spread(layout: TableGeometry, place: PlacementRegion, radius: float, others:
         points = _grid_points(layout, place, radius)
         points = points[allowed(layout, place, points, radius, ())]
         layout.places[place, radius] = points
-    free = points[_gap(points, radius, others) >= -ROUNDING]
+    free = points[_gap(points, radius, others) >= -POSITION_TOLERANCE]
     return [(x, y) for x, y in free.tolist()]
 
 
@@ -96,9 +96,9 @@ def _within(layout: TableGeometry, place: PlacementRegion, points: FloatArray) -
     if place == "anywhere":
         return np.ones(len(points), dtype=bool)
     home, along = np.array(layout.home), np.array(layout.along)
-    is_behind = (points - home) @ along <= ROUNDING
+    is_behind = (points - home) @ along <= POSITION_TOLERANCE
     if place == "in the D" and layout.d_radius:
-        is_behind &= np.hypot(*(points - home).T) <= layout.d_radius + ROUNDING
+        is_behind &= np.hypot(*(points - home).T) <= layout.d_radius + POSITION_TOLERANCE
     return np.asarray(is_behind)
 
 
@@ -123,7 +123,7 @@ def _grid_points(layout: TableGeometry, place: PlacementRegion, radius: float) -
     if place == "in the D" and layout.d_radius:
         (x, y), reach = layout.home, layout.d_radius + radius
         x0, y0, x1, y1 = max(x0, x - reach), max(y0, y - reach), min(x1, x + reach), min(y1, y + reach)
-    columns, rows = np.linspace(x0 + radius, x1 - radius, GRID), np.linspace(y0 + radius, y1 - radius, GRID)
+    columns, rows = np.linspace(x0 + radius, x1 - radius, GRID_SIZE), np.linspace(y0 + radius, y1 - radius, GRID_SIZE)
     grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
     return _clamped(layout, place, grid, radius)
 
@@ -137,11 +137,11 @@ def _gap(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> Flo
 
 
 def _touching_two(others: FloatArray, radius: float) -> FloatArray:
-    """Return the centres of a ball that touches two others, with a gap of `HAIR`, (M, 2) m."""
+    """Return the centres of a ball that touches two others, with a gap of `PLACEMENT_GAP`, (M, 2) m."""
     candidates = []
     for i, (ax, ay, ar) in enumerate(others.tolist()):
         for bx, by, br in others[i + 1 :].tolist():
-            a, b, d = ar + radius + HAIR, br + radius + HAIR, math.hypot(bx - ax, by - ay)
+            a, b, d = ar + radius + PLACEMENT_GAP, br + radius + PLACEMENT_GAP, math.hypot(bx - ax, by - ay)
             if not 0.0 < d < a + b:
                 continue
             forward = 0.5 * (a * a - b * b + d * d) / d

@@ -10,15 +10,18 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sandbox.games.billiards.rules.base import BallEvent, GameError, Respot, Ruleset, RulesState, Situation
-from sandbox.games.billiards.table_geometry import HAIR, TOUCH, PlacedDisc, TableGeometry
+from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP, PLACEMENT_GAP, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.vectors import nearest_on_segment
 from sandbox.trajectory import Contacts
 
 
 def touching_balls(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
     """Return the balls that touch the cue ball."""
     x, y, radius = cue
-    return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
+    return tuple(
+        name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= MAX_TOUCH_GAP
+    )
 
 
 def situation_of(
@@ -55,7 +58,7 @@ def _blocking_ball(cue: PlacedDisc, target: PlacedDisc, others: dict[str, Placed
     distances = {}
     for edge in _edges(cue, target):
         for name, disc in others.items():
-            if _segment_distance((cue[0], cue[1]), edge, (disc[0], disc[1])) < cue[2] + disc[2]:
+            if nearest_on_segment((disc[0], disc[1]), (cue[0], cue[1]), edge)[1] < cue[2] + disc[2]:
                 distances[name] = math.hypot(disc[0] - cue[0], disc[1] - cue[1])
     return min(distances, key=lambda name: distances[name]) if distances else None
 
@@ -72,15 +75,6 @@ def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
         (cue[0] + forward * math.cos(left), cue[1] + forward * math.sin(left)),
         (cue[0] + forward * math.cos(right), cue[1] + forward * math.sin(right)),
     )
-
-
-def _segment_distance(begin: Point, end: Point, point: Point) -> float:
-    """Return the distance of a point from a line segment, m."""
-    dx, dy = end[0] - begin[0], end[1] - begin[1]
-    px, py = point[0] - begin[0], point[1] - begin[1]
-    size = dx * dx + dy * dy
-    fraction = min(1.0, max(0.0, (px * dx + py * dy) / size)) if size else 0.0
-    return math.hypot(px - fraction * dx, py - fraction * dy)
 
 
 def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:
@@ -120,7 +114,7 @@ def _distance_to_room(spot: Point, direction: Point, radius: float, others: Sequ
     for x, y, r in others:
         forward = (x - spot[0]) * direction[0] + (y - spot[1]) * direction[1]
         sideways = (x - spot[0]) * direction[1] - (y - spot[1]) * direction[0]
-        contact_distance = radius + r + HAIR
+        contact_distance = radius + r + PLACEMENT_GAP
         if abs(sideways) < contact_distance:
             half = math.sqrt(contact_distance * contact_distance - sideways * sideways)
             blocked.append((forward - half, forward + half))
@@ -131,7 +125,7 @@ def _distance_to_room(spot: Point, direction: Point, radius: float, others: Sequ
     return distance
 
 
-SIMULTANEOUS = 5e-3
+SEPARATION_TIME = 5e-3
 """s: a pair that touched before the shot counts as not yet separated up to this time after it was set in motion"""
 
 
@@ -161,7 +155,7 @@ def shot_events(
         since = time - began
         if since < 0.0:
             continue
-        if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else motion_times.get(a, math.inf)):
+        if (a, b) in against and since <= SEPARATION_TIME + (0.0 if b >= 0 else motion_times.get(a, math.inf)):
             continue
         if b >= 0:
             events.append(BallEvent(since, names[a], "ball", names[b]))
@@ -191,13 +185,13 @@ def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozen
     """Return the pairs that touch, as body indices, the lower first; fixed objects are −1 − k."""
     found = []
     ordered = sorted(range(len(position)), key=lambda k: position[k][0])
-    widest = 2.0 * max(layout.radius, default=0.0) + TOUCH
+    widest = 2.0 * max(layout.radius, default=0.0) + MAX_TOUCH_GAP
     for n, i in enumerate(ordered):
         (x, y), radius = position[i], layout.radius[i]
         for k in ordered[n + 1 :]:
             if position[k][0] - x > widest:
                 break
-            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= TOUCH:
+            if math.hypot(position[k][0] - x, position[k][1] - y) - radius - layout.radius[k] <= MAX_TOUCH_GAP:
                 found.append((min(i, k), max(i, k)))
     found += layout.against_fixed(position)
     return frozenset(found)

@@ -6,8 +6,8 @@ from typing import Any
 
 from sandbox.games.billiards.tables import (
     BALLS,
-    MATERIAL,
-    NOSE,
+    CUSHION_MATERIAL,
+    NOSE_HEIGHT,
     RACK_BALLS,
     RACK_SPOTS,
     TABLES,
@@ -27,7 +27,7 @@ from sandbox.scene.description.world import Material, Pair
 from sandbox.scene.errors import Location
 from sandbox.scene.files.presets import Preset, added, paired, stated
 
-BALL = "phenolic"
+BALL_MATERIAL = "phenolic"
 """material of the balls"""
 
 RACKS: dict[TableGame, RackName] = {
@@ -93,14 +93,14 @@ def expanded(scene: Scene) -> Scene:
         "contact_models": stated(scene.contact_models, {"ball_ball": "frictional", "cushion": "han2005"}),
         "world": stated(scene.world, {"duration": DURATION}),
         "solver": stated(scene.solver, {"substeps": SUBSTEPS}),
-        "materials": added(scene.materials, (Material(name=BALL), Material(name=MATERIAL))),
+        "materials": added(scene.materials, (Material(name=BALL_MATERIAL), Material(name=CUSHION_MATERIAL))),
         "pairs": paired(scene.pairs, _pairs(billiards)),
         "balls": added(scene.balls, _balls(billiards, balls, rack, spots, radius, scene.world.seed)),
     }
     play: dict[str, Any] = {"game": billiards.game}
     if billiards.table is not None:
         table = TABLES[billiards.table]
-        nose = next(each for each in (billiards.nose, balls.nose, 2.0 * NOSE * radius) if each is not None)
+        nose = next(each for each in (billiards.nose, balls.nose, 2.0 * NOSE_HEIGHT * radius) if each is not None)
         static = static_colliders(table, nose)
         changes["walls"] = added(scene.walls, static.walls)
         changes["posts"] = added(scene.posts, static.posts)
@@ -120,7 +120,7 @@ def _balls(
     positions = {**rack_positions(rack, spots, radius, billiards.gap, seed), **billiards.place}
     mass = balls.mass if billiards.ball_mass is None else billiards.ball_mass
     return [
-        Ball(name=name, position=positions[name], radius=radius, mass=mass, material=BALL, colour=colour)
+        Ball(name=name, position=positions[name], radius=radius, mass=mass, material=BALL_MATERIAL, colour=colour)
         for name, colour in balls.colours.items()
         if name in positions
     ]
@@ -147,8 +147,12 @@ def _spots(scene: Scene, billiards: Billiards) -> dict[str, Point]:
 
 def _pairs(billiards: Billiards) -> tuple[Pair, ...]:
     return (
-        Pair(between=(BALL, BALL), restitution=billiards.ball_restitution),
-        Pair(between=(BALL, MATERIAL), restitution=billiards.cushion_restitution, friction=billiards.cushion_friction),
+        Pair(between=(BALL_MATERIAL, BALL_MATERIAL), restitution=billiards.ball_restitution),
+        Pair(
+            between=(BALL_MATERIAL, CUSHION_MATERIAL),
+            restitution=billiards.cushion_restitution,
+            friction=billiards.cushion_friction,
+        ),
     )
 
 

@@ -23,6 +23,7 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import BallEvent, ShotCall, balls_touched_by
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.surface import Stroke
+from sandbox.scene.geometry.vectors import offset_from_segment
 
 MIN_CUT_COSINE = 0.2
 """cosine of the thinnest candidate cut, 78°"""
@@ -94,9 +95,7 @@ def pot_options(
 
 def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
     """Return whether a ball blocks the straight path of another, from `begin` to `end`."""
-    path, offset = end - begin, others - begin
-    fraction = np.clip(offset @ path / max(float(path @ path), 1e-18), 0.0, 1.0)
-    normal_offset = offset - fraction[:, None] * path
+    normal_offset = offset_from_segment(others, begin, end - begin)
     is_near: BoolArray = np.einsum("kc,kc->k", normal_offset, normal_offset) < (2.0 * BLOCKING_FRACTION * radius) ** 2
     return bool(is_near.any())
 

@@ -12,12 +12,13 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
+from sandbox.scene.geometry.vectors import offset_from_segment
 
-TOUCH = 1e-6
+MAX_TOUCH_GAP = 1e-6
 """m: gap up to which balls touch, for the rules; far above the rounding errors of engines"""
 
-HAIR = 1e-5
-"""m: gap between balls that the referee places, above `TOUCH`, so that they do not touch"""
+PLACEMENT_GAP = 1e-5
+"""m: gap between balls that the referee places, above `MAX_TOUCH_GAP`, so that they do not touch"""
 
 PlacedDisc = tuple[float, float, float]
 """x, y and radius, m"""
@@ -145,12 +146,8 @@ class TableGeometry:
         """Return the distance of (M, 2) points from the faces of the wall segments, (M, K) m."""
         ends, half, _ = self.segments
         a, segment = ends[:, :2], ends[:, 2:] - ends[:, :2]
-        from_a = points[:, None] - a
-        fraction = np.einsum("mkc,kc->mk", from_a, segment) / np.maximum(
-            np.einsum("kc,kc->k", segment, segment), 1e-300
-        )
-        distance = from_a - np.clip(fraction, 0.0, 1.0)[..., None] * segment
-        return np.asarray(np.hypot(distance[..., 0], distance[..., 1]) - half)
+        offset = offset_from_segment(points[:, None], a, segment)
+        return np.asarray(np.hypot(offset[..., 0], offset[..., 1]) - half)
 
     def from_planes(self, points: FloatArray) -> FloatArray:
         """Return the distance of (M, 2) points from each plane, (M, K) m."""
@@ -174,4 +171,4 @@ class TableGeometry:
 
 def _touching(distance: FloatArray, owner: list[int]) -> list[tuple[int, int]]:
     """Return the pairs that touch, from (M, K) distances between bodies and fixed objects."""
-    return [(i, owner[k]) for i, k in np.argwhere(distance <= TOUCH).tolist()]
+    return [(i, owner[k]) for i, k in np.argwhere(distance <= MAX_TOUCH_GAP).tolist()]

@@ -69,7 +69,7 @@ class Billiards(Part):
 
 INCH = 0.0254  # m
 
-NOSE = 0.64
+NOSE_HEIGHT = 0.64
 """height of a cushion nose as a fraction of the ball diameter; WPA, height of the cushion: 62.5 to 64.5 %"""
 
 
@@ -179,7 +179,7 @@ class BallSet:
     colours: dict[str, str]
     """colours by name; the first ball is the cue ball"""
     nose: float | None = None
-    """height of the cushion noses, m, if the rules state it as a length; default: `NOSE` times the diameter"""
+    """height of the cushion noses, m, if the rules state it as a length; default: `NOSE_HEIGHT` times the diameter"""
     sliding: float = 0.2
     rolling: float = 0.01
     spinning: float = 0.444
@@ -254,7 +254,7 @@ RACK_BALLS: dict[RackName, str] = {"8-ball": "pool", "9-ball": "pool", "snooker"
 """Ball set of each rack."""
 
 
-MATERIAL = "cushion"
+CUSHION_MATERIAL = "cushion"
 
 CUSHIONS = (
     "lower cushion",
@@ -316,7 +316,7 @@ def static_colliders(table: TableSpec, nose: float) -> TableColliders:
             jaw = f"{hole.name} jaw {number}"
             radius = hole.opening.jaw
             centre = _displaced(_nose_end(hole, lip), lip.out, radius)
-            posts.append(Post(name=jaw, position=centre, radius=radius, height=nose, material=MATERIAL))
+            posts.append(Post(name=jaw, position=centre, radius=radius, height=nose, material=CUSHION_MATERIAL))
             ends = _facing(hole, lip)
             if ends is not None:
                 walls.append(_wall(f"{hole.name} facing {number}", ends, nose))
@@ -348,7 +348,7 @@ def _rectangle(table: TableSpec, nose: float) -> tuple[Wall, ...]:
 
 
 def _wall(name: str, ends: tuple[Point, Point], nose: float) -> Wall:
-    return Wall(name=name, points=ends, height=nose, material=MATERIAL)
+    return Wall(name=name, points=ends, height=nose, material=CUSHION_MATERIAL)
 
 
 def _lip(hole: PocketHole, lip: PocketLip) -> Point:
@@ -395,7 +395,7 @@ def _displaced(point: Point, direction: Vector, distance: float) -> Point:
     return point[0] + direction[0] * distance, point[1] + direction[1] * distance
 
 
-HAIR = 1e-10
+RACK_GAP = 1e-10
 """m: gap between racked balls that touch; small enough to count as touching, larger than rounding errors"""
 
 CUE_BALL_OFFSET = 0.1825
@@ -469,7 +469,7 @@ def _lattice(
     rows: list[list[str]], begin: Point, along: Vector, radius: float, gap: float, random: np.random.Generator
 ) -> dict[str, Point]:
     """Return the positions of rows of balls, the first row at `begin`, the others behind it along `along`, m."""
-    pitch, max_shift = 2.0 * radius + max(0.5 * gap, HAIR), 0.25 * gap
+    pitch, max_shift = 2.0 * radius + max(0.5 * gap, RACK_GAP), 0.25 * gap
     positions: dict[str, Point] = {}
     for k, row in enumerate(rows):
         for n, name in enumerate(row):

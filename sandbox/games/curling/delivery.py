@@ -14,7 +14,7 @@ from sandbox.games.curling.sheet import RELEASE
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Floor
 
-SPIN = 1.0
+RELEASE_SPIN = 1.0
 """rad/s at release: about two and a half turns until the stone rests"""
 FRACTION_TOLERANCE = 1e-12
 """tolerance of the bisection for the fraction of the speed: above the rounding error of 1e-16"""
@@ -38,7 +38,7 @@ class Delivery(NamedTuple):
     @property
     def spin(self) -> float:
         """rad/s, at release."""
-        return self.turn * SPIN
+        return self.turn * RELEASE_SPIN
 
 
 class Ice(NamedTuple):

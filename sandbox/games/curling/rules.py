@@ -94,7 +94,7 @@ class CurlingScore(NamedTuple):
 BROOM = "broom"
 SIDEWAYS, HARDER = 0.5, 2.5
 """m/s: speed of the broom, and rate of change of the weight, while a key is held"""
-WEIGHTS = -8.0, 14.0
+WEIGHT_LIMITS = -8.0, 14.0
 """m, bounds of the weight; the lower one is short of the hog line"""
 MAX_BROOM_OFFSET = 0.5 * WIDTH - 0.2
 """m, bound of the distance of the broom from the centre line"""
@@ -127,7 +127,7 @@ class CurlingAim(NamedTuple):
     def limited(self) -> "CurlingAim":
         """Return the nearest aim within the bounds of broom and weight."""
         broom = min(max(self.broom, -MAX_BROOM_OFFSET), MAX_BROOM_OFFSET)
-        return self._replace(broom=broom, weight=min(max(self.weight, WEIGHTS[0]), WEIGHTS[1]))
+        return self._replace(broom=broom, weight=min(max(self.weight, WEIGHT_LIMITS[0]), WEIGHT_LIMITS[1]))
 
 
 def broom_offset(heading: float) -> float:
@@ -263,7 +263,7 @@ class Curling:
         """Move broom and weight while their keys are held."""
         held = self._held_controls
         self._weight += HARDER * elapsed * (("harder" in held) - ("softer" in held))
-        self._weight = min(max(self._weight, WEIGHTS[0]), WEIGHTS[1])
+        self._weight = min(max(self._weight, WEIGHT_LIMITS[0]), WEIGHT_LIMITS[1])
         aside = ("left" in held) - ("right" in held)
         return (self._move_broom(self._broom + SIDEWAYS * elapsed * aside),) if aside else ()
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from sandbox.arrays import IntArray
 from sandbox.window.render.circles import SHORTEST_SPOKE, CircleRenderer, darken
-from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.draw_context import DrawContext, GameView
 from sandbox.window.render.lines import draw_line
 from sandbox.window.render.palette import RgbColour
 
@@ -41,18 +41,11 @@ def _pale(colour: list[int]) -> RgbColour:
     return red, green, blue
 
 
-class CurlingView:
+class CurlingView(GameView):
     """Draws the stones; the renderer draws the ice."""
 
     def __init__(self) -> None:
         self._discs = CircleRenderer()
-
-    def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002
-        """Leave the background to the renderer."""
-        return False
-
-    def below(self, ctx: DrawContext) -> None:
-        """Draw nothing."""
 
     def bodies(self, ctx: DrawContext) -> IntArray:
         """Draw the stones; nothing if bodies are points or not round."""
@@ -60,6 +53,3 @@ class CurlingView:
             return np.empty(0, np.int64)
         draw_stones(ctx, self._discs)
         return ctx.shown
-
-    def above(self, ctx: DrawContext) -> None:
-        """Draw nothing."""

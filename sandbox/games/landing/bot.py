@@ -14,17 +14,17 @@ from sandbox.games.contract import Rules, StepInfo, UnsuitableSceneError, checke
 from sandbox.games.landing.rules import Landing
 from sandbox.scene.random_streams import Stream, draws
 
-SPRING, DAMPER = 0.0625, 0.4
+POSITION_GAIN, VELOCITY_GAIN = 0.0625, 0.4
 """1/s² and 1/s: horizontal acceleration per distance from the pad, and per velocity; nearly critically damped"""
 MAX_SIDEWAYS_FRACTION = 0.25
 """largest horizontal acceleration, as a fraction of that of the engines"""
-STIFFNESS, DAMPING = 1.6, 1.8
+ANGLE_GAIN, ANGULAR_VELOCITY_GAIN = 1.6, 1.8
 """1/s² and 1/s: angular acceleration per angle and per angular velocity"""
 DESCENT_CONE = 2.0, 1.0
 """m, and m per m of height: horizontal distance from the pad up to which the ship descends"""
 STEADY_HEIGHT = 2.0
 """m, height below which the ship descends only while it is steady"""
-STEADY = 0.4, 0.1
+STEADY_LIMITS = 0.4, 0.1
 """m/s and rad: limits of horizontal speed and tilt of a steady ship"""
 TOUCHDOWN_SPEED = 0.5
 """m/s, rate of descent at the pad"""
@@ -32,7 +32,7 @@ BRAKING_FRACTION = 0.15
 """deceleration of the descent, as a fraction of the largest upward acceleration against gravity"""
 DESCENT_GAIN = 2.0
 """1/s, vertical acceleration per difference from the rate of descent"""
-LEVELS = 100
+THROTTLE_LEVELS = 100
 """number of throttle levels: coarser throttles keep the recording of a game short"""
 MAX_ERROR = 0.5
 """largest relative error of the estimated height and velocities at skill 0"""
@@ -83,14 +83,14 @@ class LandingBot:
 
         engines = _engines(rules)
         available = math.fsum(each.lift for each in engines if not each.turn)
-        sideways = _clamp(SPRING * distance - DAMPER * vx, MAX_SIDEWAYS_FRACTION * available)
+        sideways = _clamp(POSITION_GAIN * distance - VELOCITY_GAIN * vx, MAX_SIDEWAYS_FRACTION * available)
         descent = 0.0
-        settled = height > STEADY_HEIGHT or (abs(vx) < STEADY[0] and abs(tilt) < STEADY[1])
+        settled = height > STEADY_HEIGHT or (abs(vx) < STEADY_LIMITS[0] and abs(tilt) < STEADY_LIMITS[1])
         if abs(distance) < DESCENT_CONE[0] + DESCENT_CONE[1] * height and settled:
             braking = BRAKING_FRACTION * max(available - rules.gravity, 0.0)
             descent = TOUCHDOWN_SPEED + math.sqrt(2.0 * braking * max(height, 0.0))
         up = rules.gravity - DESCENT_GAIN * (descent + vy)
-        turn = STIFFNESS * (math.atan2(-sideways, max(up, 0.2 * available)) - tilt) - DAMPING * rate
+        turn = ANGLE_GAIN * (math.atan2(-sideways, max(up, 0.2 * available)) - tilt) - ANGULAR_VELOCITY_GAIN * rate
         return self._throttle_changes(engines, up / max(math.cos(tilt), 0.5), turn)
 
     def _throttle_changes(self, engines: Sequence[_Engine], lift: float, turn: float) -> list[tuple[str, float]]:
@@ -104,7 +104,7 @@ class LandingBot:
                 level = abs(turn) / total_turn
             elif not each.turn and total_lift > 0.0:
                 level = lift / total_lift
-            level = round(min(max(level, 0.0), 1.0) * LEVELS) / LEVELS
+            level = round(min(max(level, 0.0), 1.0) * THROTTLE_LEVELS) / THROTTLE_LEVELS
             if level != self._levels.get(each.name, 0.0):
                 self._levels[each.name] = level
                 changes.append((each.name, level))

@@ -9,17 +9,17 @@ from sandbox.games.pinball.playfield import PlayfieldElement
 from sandbox.games.pinball.rules import FLIPPERS, PLUNGER, PinballRules
 from sandbox.scene.random_streams import Stream, draws
 
-LEAD = 0.03
+LEAD_TIME = 0.03
 """s, time that a flipper takes to rise, for which the bot extrapolates the ball. Source: Visual Pinball, stroke of 34
 ms"""
 
-HELD = 0.15
+HOLD_TIME = 0.15
 """s for which a flipper is held up"""
 
 FLIPPER_PAUSE, PLUNGER_PAUSE = 0.05, 1.0
 """s, minimum time from the release of a flipper, and of the plunger, to its next press: the ball has to leave"""
 
-PULL = 1.2
+PULL_TIME = 1.2
 """s for which the plunger is pulled"""
 
 PULL_STRENGTH = 0.85, 1.0
@@ -75,7 +75,7 @@ class PinballBot:
             del self._press_times[control]
             if control not in self._release_times and self._pause_ends.get(control, 0.0) <= info.time:
                 plunges = control == PLUNGER
-                self._release_times[control] = info.time + (PULL if plunges else HELD)
+                self._release_times[control] = info.time + (PULL_TIME if plunges else HOLD_TIME)
                 found.append((control, float(self._rng.uniform(*PULL_STRENGTH)) if plunges else 1.0))
         return found
 
@@ -105,6 +105,6 @@ def _is_in_reach(flipper: PlayfieldElement, ball: int, info: StepInfo, rules: Pi
     up = rules.board.up
     if vx * up[0] + vy * up[1] > 0.1:  # the ball already moves upwards
         return False
-    ahead = (x + vx * LEAD - flipper.position[0], y + vy * LEAD - flipper.position[1])
+    ahead = (x + vx * LEAD_TIME - flipper.position[0], y + vy * LEAD_TIME - flipper.position[1])
     above = ahead[0] * up[0] + ahead[1] * up[1]
     return math.hypot(*ahead) < flipper.span + rules.board.radius and above < 1.2 * rules.board.radius + 0.02

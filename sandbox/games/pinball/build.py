@@ -107,10 +107,10 @@ class Building:
             self.markings.append(Marking(position=position, radius=radius, colour=colour))
 
 
-BALL = "steel"
+BALL_MATERIAL = "steel"
 
 MATERIALS = (
-    Material(name=BALL),
+    Material(name=BALL_MATERIAL),
     Material(name="wall", restitution=0.3, friction=0.3),
     Material(name="rubber", restitution=0.8, restitution_falloff=0.3, friction=0.6),
     Material(name="target", restitution=0.35, restitution_falloff=0.5, friction=0.2),
@@ -122,12 +122,12 @@ MATERIALS = (
 
 def pairs(ball_restitution: float) -> tuple[Pair, ...]:
     """Return the coefficients of a contact between two balls."""
-    return (Pair(between=(BALL, BALL), restitution=ball_restitution, friction=0.2),)
+    return (Pair(between=(BALL_MATERIAL, BALL_MATERIAL), restitution=ball_restitution, friction=0.2),)
 
 
-G = 9.81
+GRAVITY = 9.81
 """m/s²"""
-ROLLING = 5.0 / 7.0
+ROLLING_FACTOR = 5.0 / 7.0
 """acceleration of a solid sphere that rolls down a slope, as a fraction of gravity along it: see `rolling_gravity`"""
 
 
@@ -139,7 +139,7 @@ def rolling_gravity(slope: float) -> Vector:
     its mass. The bodies of a scene are discs in the plane, which cannot roll on it, so gravity is reduced instead.
     Limits: after a collision, a sphere rolls again without delay.
     """
-    return 0.0, -ROLLING * G * math.sin(slope)
+    return 0.0, -ROLLING_FACTOR * GRAVITY * math.sin(slope)
 
 
 def bat(length: float, base: float, tip: float, tolerance: float = 5e-5) -> tuple[Point, ...]:
@@ -294,7 +294,14 @@ def ball(building: Building, name: str, element: PinballBall) -> None:
     radius = building.ball_radius if element.radius is None else element.radius
     mass = building.ball_mass if element.mass is None else element.mass
     building.body(
-        Ball(name=name, position=element.position, radius=radius, mass=mass, material=BALL, colour=element.colour)
+        Ball(
+            name=name,
+            position=element.position,
+            radius=radius,
+            mass=mass,
+            material=BALL_MATERIAL,
+            colour=element.colour,
+        )
     )
     building.part(name, "ball", at=element.position)
 
@@ -461,7 +468,7 @@ def _pull(building: Building, piece: tuple[Point, ...], steepness: float) -> Vec
     """Return gravity on a piece of a climb, m/s²; its work between the ends of the piece is that of the rise."""
     (ax, ay), (bx, by) = piece[0], piece[-1]
     size = math.dist(piece[0], piece[-1])
-    deceleration = G * ROLLING * steepness * length_of(piece) / size**2
+    deceleration = GRAVITY * ROLLING_FACTOR * steepness * length_of(piece) / size**2
     return building.gravity[0] - deceleration * (bx - ax), building.gravity[1] - deceleration * (by - ay)
 
 

@@ -211,7 +211,7 @@ def _award_ramp(hit: Hit) -> Iterator[Effect]:
 PLATE_RADIUS = 0.018
 """m, distance from the axis to the edge that the ball hits"""
 
-DECAY = -math.log(0.9879) / 0.01
+SPIN_DECAY = -math.log(0.9879) / 0.01
 """1/s, decay rate of the speed. Source: Visual Pinball's default damping, a factor of 0.9879 every 10 ms."""
 
 MIN_SPIN_SPEED = 4.0
@@ -248,8 +248,8 @@ class SpinnerDevice(Device):
         passed, self.time = time - self.time, max(time, self.time)
         if not self.speed or passed <= 0.0:
             return
-        speed = self.speed * math.exp(-DECAY * passed)
-        self.angle += (self.speed - speed) / DECAY
+        speed = self.speed * math.exp(-SPIN_DECAY * passed)
+        self.angle += (self.speed - speed) / SPIN_DECAY
         self.speed = speed
         while self.angle >= 2.0 * math.pi:
             self.angle -= 2.0 * math.pi
@@ -265,7 +265,7 @@ ROLES = ("bumper", "slingshot", "standup", "rollover", "gate")
 TARGET_BONUS = {"standup": 100, "rollover": 100}
 """points added to the bonus by each hit"""
 
-FLASH = 0.15
+FLASH_TIME = 0.15
 """s for which a lamp is lit after a hit"""
 
 
@@ -287,5 +287,5 @@ class ScoringSwitches(Device):
         yield Award(role, points_of(hit), hit.element.group, TARGET_BONUS.get(role, 0), hit.ball)
 
     def lights(self, now: StepContext) -> Iterator[Light]:
-        """Return the lamps of the elements that were hit within `FLASH`."""
-        return (Light(name) for name, when in self.struck.items() if 0.0 <= now.time - when < FLASH)
+        """Return the lamps of the elements that were hit within `FLASH_TIME`."""
+        return (Light(name) for name, when in self.struck.items() if 0.0 <= now.time - when < FLASH_TIME)

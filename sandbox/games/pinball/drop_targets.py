@@ -1,18 +1,17 @@
 """Drop targets: a bank of targets that drop when they are hit, and rise together once all are down."""
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 
 from sandbox.action import Toggle
 from sandbox.games.pinball.events import Award, Device, Effect, Hit, Light, PlaySound, StepContext, points_of
 from sandbox.games.pinball.playfield import Playfield, PlayfieldElement
-from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.vectors import nearest_on_segment
 
-FALL = 0.26
+FALL_TIME = 0.26
 """s, time that a target takes to drop. Source: Visual Pinball, 60 units at its default drop speed"""
 
-REST = 1.5
+REST_TIME = 1.5
 """s for which a completed bank stays down"""
 
 BANK_POINTS = 25_000
@@ -38,7 +37,7 @@ class DropTargetBanks(Device):
         index = next((k for k, each in enumerate(self.members) if each is hit.element), None)
         if index is None or index in self.down or index in self.falling:
             return
-        self.falling[index] = hit.time + FALL
+        self.falling[index] = hit.time + FALL_TIME
         yield PlaySound("drop")
         yield Award("drop", points_of(hit), self.group, TARGET_BONUS, hit.ball)
 
@@ -49,7 +48,7 @@ class DropTargetBanks(Device):
             self.down.add(index)
             yield Toggle(time=now.time, thing=self.members[index].name, solid=False)
             if len(self.down) == len(self.members):
-                self.rise = now.time + REST
+                self.rise = now.time + REST_TIME
                 yield PlaySound("bank")
                 yield Award("bank", BANK_POINTS, self.group, BANK_BONUS)
         if self.rise is not None and now.time >= self.rise:
@@ -84,16 +83,7 @@ class DropTargetBanks(Device):
         x, y = now.frame.position[ball].tolist()
         target = self.members[index]
         clearance = self.board.radius + target.reach
-        return any(_distance((x, y), a, b) < clearance for a, b in pairwise(target.outline))
-
-
-def _distance(point: Point, a: Point, b: Point) -> float:
-    """Return the distance of a point from a segment, m."""
-    along = (b[0] - a[0], b[1] - a[1])
-    length = along[0] ** 2 + along[1] ** 2
-    fraction = ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / length if length else 0.0
-    fraction = min(max(fraction, 0.0), 1.0)
-    return math.hypot(point[0] - a[0] - fraction * along[0], point[1] - a[1] - fraction * along[1])
+        return any(nearest_on_segment((x, y), a, b)[1] < clearance for a, b in pairwise(target.outline))
 
 
 def banks_of(board: Playfield) -> tuple[DropTargetBanks, ...]:

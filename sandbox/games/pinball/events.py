@@ -16,7 +16,7 @@ from sandbox.games.pinball.playfield import Playfield, PlayfieldElement
 from sandbox.scene.description.play import Role
 from sandbox.trajectory import Frame
 
-BALLS = 3
+BALL_COUNT = 3
 """number of balls of a game"""
 
 MAX_BONUS_MULTIPLIER = 6
@@ -28,7 +28,7 @@ class PlayerState:
 
     score: int = 0
     ball: int = 1
-    """number of the ball, from 1; `BALLS` + 1 after the last one"""
+    """number of the ball, from 1; `BALL_COUNT` + 1 after the last one"""
     extra_balls: int = 0
     """number of extra balls"""
     bonus: int = 0
@@ -47,7 +47,7 @@ class PlayerState:
     @property
     def done(self) -> bool:
         """Whether all balls have been played."""
-        return self.ball > BALLS
+        return self.ball > BALL_COUNT
 
     def end_ball(self) -> None:
         """Advance to the next ball, or use an extra ball."""

@@ -21,10 +21,10 @@ from sandbox.scene.description.play import Role
 MAX_LOCKED = 3
 """balls of multiball, if the table has as many"""
 
-LOCK = 10_000
+LOCK_POINTS = 10_000
 """points for locking a ball"""
 
-JACKPOT = 50_000
+JACKPOT_POINTS = 50_000
 
 MULTIBALL_SAVE = 12.0
 """s, ball save at the start of multiball"""
@@ -59,7 +59,7 @@ class Multiball(Device):
             if award.kind == self.jackpots:
                 yield PlaySound("jackpot")
                 yield ShowMessage("jackpot")
-                yield Award("jackpot", JACKPOT, bonus=2_000)
+                yield Award("jackpot", JACKPOT_POINTS, bonus=2_000)
         elif award.kind in ("bank", "standups") and not now.sheet.is_lock_lit:
             now.sheet.is_lock_lit = True
             yield PlaySound("ready")
@@ -67,7 +67,7 @@ class Multiball(Device):
         elif award.kind == "kicker" and award.group == LOCK_GROUP and now.sheet.is_lock_lit and award.ball is not None:
             now.sheet.is_lock_lit = False
             now.sheet.locked += 1
-            yield Award("lock", LOCK)
+            yield Award("lock", LOCK_POINTS)
             if now.sheet.locked < self.size:
                 yield PlaySound("lock")
                 yield ShowMessage(f"ball {now.sheet.locked} of {self.size} locked")

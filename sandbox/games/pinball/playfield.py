@@ -29,7 +29,7 @@ EJECT_SPEED = 1.2
 LANE_UP, LANE_DOWN, LANE_SIDE = 0.10, 0.10, 0.03
 """m, extent of the lane around the position where balls are served: a pulled plunger lowers the ball by about 43 mm"""
 
-MARGIN = 0.05
+TABLE_MARGIN = 0.05
 """m: a ball farther than this outside all static bodies has left the table"""
 
 
@@ -255,7 +255,7 @@ def _corners(scene: Scene) -> tuple[Point, Point]:
     if not points:
         return (-math.inf, -math.inf), (math.inf, math.inf)
     xs, ys = zip(*points, strict=True)
-    return (min(xs) - MARGIN, min(ys) - MARGIN), (max(xs) + MARGIN, max(ys) + MARGIN)
+    return (min(xs) - TABLE_MARGIN, min(ys) - TABLE_MARGIN), (max(xs) + TABLE_MARGIN, max(ys) + TABLE_MARGIN)
 
 
 def _middle(scene: Scene) -> Point:

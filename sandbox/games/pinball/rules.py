@@ -8,7 +8,7 @@ from sandbox.games.pinball.ball_control import BallSearch, Trough
 from sandbox.games.pinball.devices import Kickers, LaneLights, Ramps, ScoringSwitches, SpinnerDevice, lane_lights_of
 from sandbox.games.pinball.drop_targets import DropTargetBanks, banks_of
 from sandbox.games.pinball.events import (
-    BALLS,
+    BALL_COUNT,
     Award,
     BallSave,
     Device,
@@ -112,7 +112,7 @@ def display_lines(
         message: last message; empty for none.
     """
     sheet = sheets[turn]
-    ball = f"{min(sheet.ball, BALLS)} of {BALLS}"
+    ball = f"{min(sheet.ball, BALL_COUNT)} of {BALL_COUNT}"
     lines = [("Ball", f"{ball}, shoot again" if sheet.extra_balls else ball)]
     if len(sheets) > 1:
         lines.insert(0, ("Player", f"{turn + 1} of {len(sheets)}"))

@@ -12,10 +12,10 @@ from sandbox.games.pinball.playfield import Playfield
 BOB_LENGTH = 0.10
 """m, length of the pendulum"""
 
-TRIP = math.radians(1.0)
+TRIP_ANGLE = math.radians(1.0)
 """rad from the vertical, position of the ring"""
 
-DAMPING = 0.05
+DAMPING_RATIO = 0.05
 """damping ratio: a free swing loses nine tenths of its amplitude in seven periods"""
 
 BOB_RESTITUTION = 0.3
@@ -39,7 +39,7 @@ class TiltBob:
     ω′ = ω√(1 − ζ²). One push a of length τ leaves an undamped bob with the amplitude 2(a/g)·sin(ωτ/2).
     """
 
-    def __init__(self, damping: float = DAMPING, trip: float = TRIP) -> None:
+    def __init__(self, damping: float = DAMPING_RATIO, trip: float = TRIP_ANGLE) -> None:
         """Create a bob at rest; `trip=inf` removes the ring."""
         self.damping, self.trip = damping, trip
         self.omega = math.sqrt(GRAVITY / BOB_LENGTH)
@@ -78,7 +78,7 @@ class TiltBob:
         self.rate = (b * omega - decay * a) * c - (a * omega + decay * b) * s
 
 
-JOLT = 0.5 * GRAVITY
+JOLT_ACCELERATION = 0.5 * GRAVITY
 """m/s², acceleration of the table. Source, as of the duration: the keyboard nudge of Visual Pinball"""
 
 JOLT_TIME = 0.025
@@ -87,7 +87,7 @@ JOLT_TIME = 0.025
 SAME_PUSH_TIME = 0.3
 """s in which further strikes on the ring count as the same push"""
 
-WARNINGS = 2
+MAX_WARNINGS = 2
 """warnings per ball; the next strike is a tilt"""
 
 _TIME_ROUNDING = 1e-12  # s, rounding error of the ends of jolts
@@ -117,7 +117,7 @@ class NudgeAndTilt(Device):
 
     def jolt(self, direction: complex, strength: float, now: StepContext) -> Iterator[Effect]:
         """Start a jolt that accelerates the balls in a direction, of length 1, with a strength from 0 to 1."""
-        self.jolts.append((now.time, direction * strength * JOLT))
+        self.jolts.append((now.time, direction * strength * JOLT_ACCELERATION))
         yield PlaySound("nudge")
         yield from self._forces(now)
 
@@ -130,9 +130,9 @@ class NudgeAndTilt(Device):
             return
         self.quiet = now.time + SAME_PUSH_TIME
         self.warnings += 1
-        if self.warnings <= WARNINGS:
+        if self.warnings <= MAX_WARNINGS:
             yield PlaySound("warning")
-            yield ShowMessage("danger!" if self.warnings < WARNINGS else "danger, danger!")
+            yield ShowMessage("danger!" if self.warnings < MAX_WARNINGS else "danger, danger!")
         else:
             self.tilted = True
             yield PlaySound("tilt")

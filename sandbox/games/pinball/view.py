@@ -5,11 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pygame
 
-from sandbox.arrays import IntArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import GROUND
 from sandbox.scene.description.fixed import Post
-from sandbox.window.render.draw_context import Canvas, DrawContext
+from sandbox.window.render.draw_context import Canvas, DrawContext, GameView
 from sandbox.window.render.lamps import draw_lamps, draw_spot
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line
 from sandbox.window.render.palette import INK, RgbColour, colour_of_fixed, mix_colours
@@ -17,7 +16,7 @@ from sandbox.window.render.sdf import ShapeStyle
 from sandbox.window.render.static_geometry import draw_markings, draw_static_bodies, draw_zones, on_layer
 
 DARK: RgbColour = (5, 8, 14)
-SHADOW = (0.003, -0.005)
+SHADOW_OFFSET = (0.003, -0.005)
 """m, offset of the shadow of a static body"""
 SHADOW_ALPHA, TRANSPARENT = 90, (255, 0, 255)
 """opacity of shadows, of 255; and the colour key of the shadow layer"""
@@ -71,7 +70,7 @@ def _draw_shadows(canvas: Canvas, scene: Scene) -> None:
     for wall in scene.walls:
         if not wall.solid or GROUND not in wall.layers:
             continue
-        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
+        points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW_OFFSET
         half = max(0.5 * wall.thickness * canvas.camera.scale, 1.0)
         ends: list[Pixel] = [(x, y) for x, y in canvas.camera.to_screen(points).tolist()]
         for a, b in pairwise(ends):
@@ -80,7 +79,7 @@ def _draw_shadows(canvas: Canvas, scene: Scene) -> None:
             for end in ends:
                 _draw_dark_disc(layer, end, half)
     for post in scene.posts:
-        x, y = canvas.camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        x, y = canvas.camera.to_screen(np.asarray(post.position) + SHADOW_OFFSET).tolist()
         if post.solid and GROUND in post.layers and post.radius * canvas.camera.scale < LARGE_DISC:
             _draw_dark_disc(layer, (x, y), post.radius * canvas.camera.scale)
     canvas.surface.blit(layer, (0, 0))
@@ -91,20 +90,10 @@ def _draw_dark_disc(layer: pygame.Surface, at: Pixel, radius: float) -> None:
         pygame.draw.circle(layer, DARK, at, radius)
 
 
-class PinballView:
+class PinballView(GameView):
     """Draws the playfield; balls are drawn as in other scenes."""
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw the playfield."""
         draw_playfield(ctx, ctx.snapshot.scene)
         return True
-
-    def below(self, ctx: DrawContext) -> None:
-        """Draw nothing."""
-
-    def bodies(self, ctx: DrawContext) -> IntArray:
-        """Draw nothing."""
-        return np.empty(0, np.int64)
-
-    def above(self, ctx: DrawContext) -> None:
-        """Draw nothing."""

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from sandbox.formatting import UNKNOWN, format_number, format_percent, format_plural
 from sandbox.measure.extremes.outcome import MEANINGS, Verdict
 from sandbox.report.html.page import (
-    Content,
+    CellColumns,
     HtmlColumn,
     Page,
     Section,
@@ -17,7 +17,7 @@ from sandbox.report.html.page import (
     concatenated,
     engine_name,
     fragment,
-    table,
+    row_table,
     write_page,
 )
 
@@ -88,42 +88,28 @@ def _setup(cell: ExtremesMapping) -> str:
 
 
 def _limits(rows: Sequence[ExtremesMapping]) -> Markup:
-    columns = (
-        HtmlColumn("axis"),
-        HtmlColumn("engine"),
-        HtmlColumn("settings"),
-        HtmlColumn("passes up to", True),
-        HtmlColumn("first failure", True),
+    columns: CellColumns[ExtremesMapping] = (
+        (HtmlColumn("axis"), lambda row: str(row["axis"]).replace("_", " ")),
+        (HtmlColumn("engine"), lambda row: engine_name(row["engine"])),
+        (HtmlColumn("settings"), lambda row: _setup(row) or "default"),
+        (HtmlColumn("passes up to", True), lambda row: format_number(row["limit"], 4)),
+        (HtmlColumn("first failure", True), lambda row: format_number(row["first_failure"], 4)),
     )
-    cells: list[list[Content]] = [
-        [
-            str(row["axis"]).replace("_", " "),
-            engine_name(row["engine"]),
-            _setup(row) or "default",
-            format_number(row["limit"], 4),
-            format_number(row["first_failure"], 4),
-        ]
-        for row in rows
-    ]
-    return table(columns, cells, "Limits")
+    return row_table(columns, rows, "Limits")
 
 
 def _predictions(predictions: Sequence[ExtremesMapping]) -> Markup:
     """Return a row for each kind of warning."""
-    columns = (
-        HtmlColumn("warning"),
-        HtmlColumn("precision", True),
-        HtmlColumn("recall", True),
-        HtmlColumn("true alarms", True),
-        HtmlColumn("false alarms", True),
-        HtmlColumn("missed failures", True),
+    columns: CellColumns[ExtremesMapping] = (
+        (HtmlColumn("warning"), lambda row: str(row["kind"]).replace("_", " ")),
+        (HtmlColumn("precision", True), lambda row: _percentage(row["precision"])),
+        (HtmlColumn("recall", True), lambda row: _percentage(row["recall"])),
+        (HtmlColumn("true alarms", True), lambda row: format_number(row["true_positives"])),
+        (HtmlColumn("false alarms", True), lambda row: format_number(row["false_positives"])),
+        (HtmlColumn("missed failures", True), lambda row: format_number(row["false_negatives"])),
     )
-    cells: list[list[Content]] = [
-        [
-            str(row["kind"]).replace("_", " "),
-            *(UNKNOWN if row[key] is None else format_percent(row[key]) for key in ("precision", "recall")),
-            *(format_number(row[key]) for key in ("true_positives", "false_positives", "false_negatives")),
-        ]
-        for row in predictions
-    ]
-    return table(columns, cells, "Predictions")
+    return row_table(columns, predictions, "Predictions")
+
+
+def _percentage(fraction: float | None) -> str:
+    return UNKNOWN if fraction is None else format_percent(fraction)

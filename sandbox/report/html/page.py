@@ -7,7 +7,7 @@ content security policy names them by their hashes: no other script runs, no oth
 import base64
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
@@ -78,6 +78,16 @@ def table(columns: Sequence[HtmlColumn], rows: Sequence[Sequence[Content]], capt
     """
     cells = [list(zip(columns, row, strict=True)) for row in rows]
     return fragment("parts.html.j2", "table", columns, cells, caption, wide)
+
+
+CellColumns = Sequence[tuple[HtmlColumn, Callable[[R], Content]]]
+"""Columns of a table with a row for each R: the head, and the function that returns the cell of a row."""
+
+
+def row_table(columns: CellColumns[R], rows: Iterable[R], caption: str) -> Markup:
+    """Return a table with a row for each of some values; caption as for `table`."""
+    cells = [[cell(row) for _, cell in columns] for row in rows]
+    return table([head for head, _ in columns], cells, caption)
 
 
 def html_columns(columns: Iterable[Column[R]]) -> list[HtmlColumn]:

@@ -186,7 +186,7 @@ COLUMNS = (
     HtmlColumn("rests at x, m", True, "mean and standard deviation over the strokes that leave it on the table"),
     HtmlColumn("rests at y, m", True, "mean and standard deviation over the strokes that leave it on the table"),
 )
-DOTS = 80
+PICTURE_DPI = 80
 """Dots per inch of the picture."""
 
 
@@ -226,6 +226,6 @@ def _odds_picture(odds: Odds) -> Markup:
     stream = io.BytesIO()
     with catch_warnings():
         ignore_missing_glyphs()
-        draw_rests(odds).savefig(stream, format="png", dpi=DOTS)
+        draw_rests(odds).savefig(stream, format="png", dpi=PICTURE_DPI)
     text = base64.b64encode(stream.getvalue()).decode("ascii")
     return Markup('<img src="data:image/png;base64,{}" alt="Where balls come to rest">').format(text)

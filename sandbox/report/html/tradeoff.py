@@ -15,6 +15,7 @@ from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE
 from sandbox.report.html.comparison import HOW_TO_REPLAY, linked_plots, settings_text
 from sandbox.report.html.inline_svg import markup_of, svg_of
 from sandbox.report.html.page import (
+    CellColumns,
     Content,
     HtmlColumn,
     Page,
@@ -25,6 +26,7 @@ from sandbox.report.html.page import (
     fragment,
     paragraph,
     remark_paragraphs,
+    row_table,
     table,
     write_page,
 )
@@ -307,28 +309,18 @@ COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum 
 def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
     """Return a row for each point of the front."""
     at = f" at {document['fps']:g} fps" if document.get("fps") else ""
-    columns = (
-        HtmlColumn("engine"),
-        HtmlColumn("changes"),
-        _metric_column(document),
-        COST,
-        HtmlColumn("median", True, "milliseconds per simulated second, median of the repeats"),
-        HtmlColumn("ms per frame", True, f"median of the most expensive frame{at}"),
-        HtmlColumn("repeats", True),
+    median = HtmlColumn("median", True, "milliseconds per simulated second, median of the repeats")
+    frame = HtmlColumn("ms per frame", True, f"median of the most expensive frame{at}")
+    columns: CellColumns[WorkPoint] = (
+        (HtmlColumn("engine"), lambda point: engine_name(point.engine)),
+        (HtmlColumn("changes"), lambda point: _marked_changes(point, document)),
+        (_metric_column(document), lambda point: format_number(point.error)),
+        (COST, lambda point: format_number(point.cost)),
+        (median, lambda point: format_number(point.row.get("cost_median_ms_per_second"))),
+        (frame, lambda point: _frame_cell(point, document)),
+        (HtmlColumn("repeats", True), lambda point: str(point.row.get("repeats", UNKNOWN))),
     )
-    rows = [
-        [
-            engine_name(point.engine),
-            _marked_changes(point, document),
-            format_number(point.error),
-            format_number(point.cost),
-            format_number(point.row.get("cost_median_ms_per_second")),
-            _frame_cell(point, document),
-            str(point.row.get("repeats", UNKNOWN)),
-        ]
-        for point in points
-    ]
-    return table(columns, rows, "The Pareto front")
+    return row_table(columns, points, "The Pareto front")
 
 
 def _points_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
@@ -381,23 +373,17 @@ def _changes(point: WorkPoint) -> str:
 
 
 def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
-    columns = (
-        HtmlColumn("instead"),
-        HtmlColumn("engine"),
-        HtmlColumn(f"error{', ' if unit else ''}{unit}", True),
-        HtmlColumn("ms per s", True),
-        HtmlColumn("relative cost", True),
+    columns: CellColumns[TradeoffMapping] = (
+        (HtmlColumn("instead"), lambda row: str(row.get("what")).replace("_", " ")),
+        (HtmlColumn("engine"), lambda row: engine_name(row["engine"]) if row.get("engine") else UNKNOWN),
+        (HtmlColumn(f"error{', ' if unit else ''}{unit}", True), lambda row: format_number(row.get("error"))),
+        (HtmlColumn("ms per s", True), lambda row: format_number(row.get("cost_ms_per_second"))),
+        (HtmlColumn("relative cost", True), _ratio_cell),
     )
-    rows = [
-        [
-            str(each.get("what")).replace("_", " "),
-            engine_name(each["engine"]) if each.get("engine") else UNKNOWN,
-            format_number(each.get("error")),
-            format_number(each.get("cost_ms_per_second")),
-            f"×{format_number(each['ratio'])}" if each.get("ratio") is not None else UNKNOWN,
-        ]
-        for each in proposals
-    ]
     sentences = [each["sentence"] for each in proposals if each.get("sentence")]
     listed = fragment("parts.html.j2", "items", sentences, "plain") if sentences else None
-    return concatenated(listed, table(columns, rows, "Cheaper models"))
+    return concatenated(listed, row_table(columns, proposals, "Cheaper models"))
+
+
+def _ratio_cell(row: TradeoffMapping) -> str:
+    return f"×{format_number(row['ratio'])}" if row.get("ratio") is not None else UNKNOWN

@@ -46,7 +46,7 @@ MAX_MARKED = 200
 MAX_EXACT_BODIES = 50
 """bodies of an element up to which its exact bounds are computed; above, those of their bounding discs"""
 
-CERTAIN = frozenset({"overlap", "anchors", "joint_start", "duration", FAILED})
+CERTAIN_KINDS = frozenset({"overlap", "anchors", "joint_start", "duration", FAILED})
 """Kinds of problems that occur in any case, and not only at some phases or speeds."""
 TITLES = {
     "depth": "deep contact",
@@ -339,7 +339,7 @@ class CheckMarks:
         is_hovered = target.collidepoint(self._pointer)
         at = row.left + 0.5 * size, row.centery
         if result.marks:
-            colour = WARNING if any(mark.kind in CERTAIN for mark in result.marks) else ORANGE
+            colour = WARNING if any(mark.kind in CERTAIN_KINDS for mark in result.marks) else ORANGE
             draw_mark(surface, "triangle", at, 0.45 * size, colour)
         else:
             draw_mark(surface, "disc" if result.engines and not result.note else "ring", at, 0.36 * size, GREEN)
@@ -485,7 +485,7 @@ def _same_problem(marks: Sequence[SceneMark], former: SceneMark) -> SceneMark | 
 
 
 def _colour(mark: SceneMark) -> RgbColour:
-    return WARNING if mark.kind in CERTAIN else ORANGE
+    return WARNING if mark.kind in CERTAIN_KINDS else ORANGE
 
 
 def _heading(result: CheckResult) -> str:

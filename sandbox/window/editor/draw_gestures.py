@@ -17,7 +17,7 @@ from sandbox.scene.editing.transforms import plain_value, round_value
 from sandbox.scene.files.toml_changes import AddElement, Change
 from sandbox.scene.geometry.simplification import simplify_loop, simplify_polyline
 from sandbox.window.editor.gestures import Gesture, typed_numbers
-from sandbox.window.editor.snapping import REACH, Pointer, rounded
+from sandbox.window.editor.snapping import SNAP_DISTANCE, Pointer, rounded
 from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.draw_context import Canvas
 from sandbox.window.render.lines import draw_dashes, draw_line
@@ -225,7 +225,7 @@ class OutlineGesture(DrawGesture):
         self.corners = [self.begin]
         self.is_closed = False
         self._freehand: list[Point] = []  # drawn with the button held
-        self._reach = pointer.view.metres(REACH)  # of the first corner, within which a click closes the outline
+        self._reach = pointer.view.metres(SNAP_DISTANCE)  # of the first corner, within which a click closes the outline
         self._thickness = WALL_THICKNESS * self.default if table == "wall" else 0.0
 
     def drag(self, pointer: Pointer) -> None:

@@ -8,10 +8,10 @@ import pygame
 from sandbox.scene.editing.transforms import AlignmentSide
 from sandbox.window.editor.edit_view import TYPED, EditView
 from sandbox.window.editor.toolbar import TOOLS, EditTool
+from sandbox.window.input.bindings import ARROWS
 from sandbox.window.input.keymap import Command, latin_key
 from sandbox.window.ui.help import HelpGroup
 
-ARROWS = {pygame.K_LEFT: (-1, 0), pygame.K_RIGHT: (1, 0), pygame.K_UP: (0, 1), pygame.K_DOWN: (0, -1)}
 ALIGNMENTS: dict[int, tuple[AlignmentSide, AlignmentSide]] = {
     pygame.K_LEFT: ("left", "centre"),
     pygame.K_RIGHT: ("right", "centre"),
@@ -55,8 +55,10 @@ def _use_clipboard(view: EditView, key: int, _: bool) -> None:
         (view.editor.cut if key == pygame.K_x else view.editor.copy)()
 
 
-def _command(label: str, about: str, command: Command, **keys: tuple[int, ...]) -> EditKey:
-    return EditKey(label, about, lambda view, *_: view.run(command), is_global=True, **keys)
+def _command(command: Command) -> EditKey:
+    """Return the row of a command that the editor shares with the rest of the window."""
+    plain, control = (command.keys if command.modifiers == each else () for each in (0, pygame.KMOD_CTRL))
+    return EditKey(command.label, command.about, lambda view, *_: view.run(command), plain, control, is_global=True)
 
 
 _SELECTION = (
@@ -124,9 +126,7 @@ _SCENE = (
         lambda view, *_: view.editor.take_apart(),
         control_shift=(pygame.K_x,),
     ),
-    _command("Ctrl+O", "open a scene", Command.PICKER, control=(pygame.K_o,)),
-    _command("Ctrl+P", "screenshot", Command.SCREENSHOT, control=(pygame.K_p,)),
-    _command("Ctrl+R", "start or stop recording", Command.RECORD, control=(pygame.K_r,)),
+    *map(_command, (Command.PICKER, Command.SCREENSHOT, Command.RECORD)),
     EditKey(
         "Esc",
         "cancel; select nothing; quit",
@@ -138,10 +138,8 @@ _SCENE = (
 _VIEW = (
     EditKey("Wheel", "zoom at the cursor"),
     EditKey("Right-drag", "pan"),
-    EditKey("Home", "fit the scene", lambda view, *_: view.run(Command.HOME), (pygame.K_HOME,)),
-    _command("Tab", "show or hide the panel", Command.PANEL, plain=(pygame.K_TAB,)),
-    _command("F11", "full screen", Command.FULL_SCREEN, plain=(pygame.K_F11,)),
-    _command("F1 or H", "this help", Command.HELP, plain=(pygame.K_F1, pygame.K_h)),
+    _command(Command.HOME)._replace(about="fit the scene", is_global=False),
+    *map(_command, (Command.PANEL, Command.FULL_SCREEN, Command.HELP)),
 )
 
 

@@ -27,7 +27,7 @@ ACCELERATION_PER_METRE = 10.0
 """m/s² that a thrust gives its body for each metre of its arrow"""
 ATTRACTION = 10.0
 """m/s², acceleration of a new attraction at a quarter of the view from it"""
-SWING = math.radians(50.0)
+FLIPPER_SWING = math.radians(50.0)
 """rad from the rest angle of a new flipper to its end"""
 STROKE_TIME = 0.04
 """s, duration of the stroke of a new flipper"""
@@ -169,7 +169,7 @@ class FlipperGesture(DriveGesture):
         is_left = x >= hinge[0]
         mass, inertia = float(scene.bodies.mass[body]), float(scene.bodies.moment[body])
         moment = inertia + mass * math.dist(hinge, (x, y)) ** 2
-        end = single.angle + (SWING if is_left else -SWING)
+        end = single.angle + (FLIPPER_SWING if is_left else -FLIPPER_SWING)
         values: dict[str, Any] = {
             "name": self.name,
             "kind": "torque",
@@ -177,7 +177,7 @@ class FlipperGesture(DriveGesture):
             "key": "left" if is_left else "right",
             "pivot": [round_value(hinge[0]), round_value(hinge[1])],
             "stops": [single.angle, round_value(end)],
-            "torque": float(f"{moment * 2.0 * SWING / STROKE_TIME**2:.2g}"),
+            "torque": float(f"{moment * 2.0 * FLIPPER_SWING / STROKE_TIME**2:.2g}"),
             "bounce": 0.2,
         }
         return [*naming_changes(scene, body), AddElement("drive", values)]

@@ -11,7 +11,7 @@ from sandbox.engines.registry import USUAL, able, start
 from sandbox.scene.compile.scene import Scene
 from sandbox.window.editor.latest_job import LatestJob
 
-SECONDS = 2.0
+PREDICTED_TIME = 2.0
 """s of motion that are predicted"""
 MAX_POINTS = 200
 """Points of a path"""
@@ -19,7 +19,7 @@ MAX_BODIES = 300
 """Bodies up to which paths follow the pointer, by `exact` if it can: more would slow the window down"""
 MAX_BODIES_AT_REST = 3_000
 """Bodies up to which paths are predicted, by pymunk, once nothing is dragged any more"""
-REST = 0.2
+IDLE_TIME = 0.2
 """s without a change after which a path of more than `MAX_BODIES` is predicted"""
 MAX_WORK = 50_000
 """Steps × bodies of a prediction; a scene with more bodies is predicted for a shorter time"""
@@ -38,7 +38,7 @@ class GhostPath:
     engine: str
 
 
-def predict_path(scene: Scene, body: int, seconds: float = SECONDS) -> GhostPath | None:
+def predict_path(scene: Scene, body: int, seconds: float = PREDICTED_TIME) -> GhostPath | None:
     """Return the path of a body from the start of a scene; None if no engine can run it, or it is too large.
 
     The engine `exact` predicts it where it can, whose answer does not depend on the time step; otherwise, or in large
@@ -107,7 +107,7 @@ class GhostPredictor:
             is_large = len(scene.bodies) > MAX_BODIES
             if is_large:
                 self._job.forget()  # the former path would stay while the body is dragged
-            self._job.submit(self._submitted, REST if is_large else 0.0)
+            self._job.submit(self._submitted, IDLE_TIME if is_large else 0.0)
 
     def close(self) -> None:
         """End the thread, after the present prediction."""

@@ -30,7 +30,7 @@ VELOCITY_DISTANCE = 22.0
 """px at UI scale 1 from the selection to the handle of a velocity of 0"""
 MAX_VERTICES = 200
 """Corners of an element that have handles"""
-MARGIN = 7.0
+FRAME_MARGIN = 7.0
 """px at UI scale 1 between the box of the selection and the frame with its handles"""
 WITHOUT_BOX = ("joint", "thrust", "attraction", "drive")
 """Elements that are neither scaled nor rotated by themselves"""
@@ -53,7 +53,7 @@ def handles_of(scene: Scene, selection: Sequence[ElementKey], view: ViewScale) -
     box = bounds_of_elements(scene, selection)
     if box is None or all(key.table in WITHOUT_BOX for key in selection):
         return found
-    margin = view.metres(MARGIN)
+    margin = view.metres(FRAME_MARGIN)
     box = (box[0][0] - margin, box[0][1] - margin), (box[1][0] + margin, box[1][1] + margin)
     (left, _), (right, top) = box
     found += [EditHandle("scale", k, corner) for k, corner in enumerate(_corners(box))]

@@ -17,7 +17,7 @@ from sandbox.window.hit_test import hulls_of
 
 MIN_GRID = 6.0
 """px at UI scale 1: smallest distance of grid points"""
-REACH = 8.0
+SNAP_DISTANCE = 8.0
 """px at UI scale 1: distance within which a point snaps"""
 PICK_REACH = 6.0
 """px at UI scale 1 beside an element within which it is picked"""
@@ -95,7 +95,7 @@ def snap_point(scene: Scene, point: Point, view: ViewScale, without: Collection[
     if len(targets[0]):
         distance = np.hypot(*(targets[0] - np.asarray(point)).T)
         nearest = int(np.argmin(distance))
-        if distance[nearest] <= view.metres(REACH):
+        if distance[nearest] <= view.metres(SNAP_DISTANCE):
             x, y = targets[0][nearest].tolist()
             return SnappedPoint((x, y), targets[1][nearest])
     step = view.grid
@@ -140,7 +140,7 @@ def surface_shift(scene: Scene, keys: Collection[ElementKey], view: ViewScale) -
         keys: the elements that are moved.
         view: scale of the view.
     """
-    reach = view.metres(REACH)
+    reach = view.metres(SNAP_DISTANCE)
     moved = [body for key in keys for body in bodies_of(scene, key)]
     gaps = list(_plane_gaps(scene, keys, moved))
     if len(moved) == 1 and scene.bodies.round[moved[0]]:

@@ -182,7 +182,7 @@ class HudStatus:
     """(keys, action) bound by the scene"""
 
 
-LONG = 1.1
+FLAME_LENGTH = 1.1
 """Length of the flame of a body's strongest thruster at full throttle, in body radii."""
 
 
@@ -208,8 +208,9 @@ def active_thrusters(
         x, y = _centre(bodies.elements[int(bodies.element[number])])
         place = thrust.point[0] - x, thrust.point[1] - y
         # Square root, so that a tenth of the thrust is still visible.
-        long = LONG * float(bodies.radius[number]) * math.sqrt(level * force / strongest)
-        found.append(ThrusterFlame(number, place, (-thrust.force[0] / force * long, -thrust.force[1] / force * long)))
+        length = FLAME_LENGTH * float(bodies.radius[number]) * math.sqrt(level * force / strongest)
+        flame = -thrust.force[0] / force * length, -thrust.force[1] / force * length
+        found.append(ThrusterFlame(number, place, flame))
     return tuple(found)
 
 

@@ -1,4 +1,4 @@
-"""Canvas: where and how a picture is drawn; draw context: a canvas with the frame being drawn."""
+"""Canvas: where and how a picture is drawn; draw context: a canvas with the frame being drawn; view of a game."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -77,3 +77,32 @@ class DrawContext(Canvas):
     def style(self, line: float = 1.5) -> CircleStyle:
         """Return the style of discs with a rim of `line` px at a UI scale of 1."""
         return CircleStyle(line * self.ui_scale, antialias=self.antialias)
+
+
+class GameView:
+    """Draws the parts of a frame that are specific to a game. `ctx.snapshot.game` is `Rules.view_state`, or None.
+
+    A view is named in the `GameSpec` of its game and imported when a scene of that game is first drawn. A renderer
+    keeps one view per game, which may cache sprites and the rolling orientation of balls between frames. A class with
+    these methods that does not derive from this one is a view too; it may lack `hud`.
+    """
+
+    def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002
+        """Draw ground and static bodies on an empty surface; return False to use the default drawing.
+
+        The surface is cached until the scene or the camera changes. `ctx` contains no bodies.
+        """
+        return False
+
+    def below(self, ctx: DrawContext) -> None:
+        """Draw the layer below the bodies."""
+
+    def bodies(self, ctx: DrawContext) -> IntArray:  # noqa: ARG002
+        """Draw some bodies; return their indices, which the renderer then skips."""
+        return np.empty(0, np.int64)
+
+    def above(self, ctx: DrawContext) -> None:
+        """Draw the layer above the bodies."""
+
+    def hud(self, ctx: DrawContext) -> None:
+        """Draw text or icons over all other content of the frame, in the window only."""

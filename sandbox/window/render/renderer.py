@@ -1,24 +1,30 @@
-"""Renderer of a scene snapshot, and of the inset that magnifies part of it in a corner of the surface.
+"""Renderer of a scene snapshot, of the inset that magnifies part of it in a corner, and of frames as arrays.
 
 Only visible bodies are drawn. Static content is cached until the scene or the camera changes.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import pygame
 
+from sandbox.action import Throttle
 from sandbox.arrays import BoolArray, IntArray
+from sandbox.game_names import GAMES, game_specs, spec_of
+from sandbox.game_spec import GameSpec, import_part
+from sandbox.games.contract import HasLamps, HasViewState, Rules
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
+from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
-from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.playback.snapshot import Snapshot, active_thrusters
 from sandbox.window.render.accents import AccentNumbers
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
-from sandbox.window.render.draw_context import Canvas, DrawContext
-from sandbox.window.render.game_view import GameViews, HasHud
+from sandbox.window.render.draw_context import Canvas, DrawContext, GameView
 from sandbox.window.render.grid import draw_grid, draw_scale
 from sandbox.window.render.lamps import LampRenderer, draw_lamps
 from sandbox.window.render.overlays import OverlayRenderer
@@ -35,6 +41,7 @@ from sandbox.window.render.static_geometry import (
     layers_among,
     on_layer,
 )
+from sandbox.window.view_bounds import view_bounds
 
 MAX_POINT_RADIUS = 1.2
 """px, radius below which a ball is drawn as a point"""
@@ -162,7 +169,7 @@ class Renderer:
             game.above(view)
         if scale:
             draw_scale(canvas, foot)
-        if hud and isinstance(game, HasHud):
+        if hud and game is not None and hasattr(game, "hud"):
             game.hud(view)
 
     def _draw_layers(self, view: DrawContext, which: IntArray | None) -> None:
@@ -393,3 +400,77 @@ def _inset_rect(box: ViewBox, free: pygame.Rect, margin: int, occupied: int) -> 
     rect = pygame.Rect((0, 0), size)
     rect.bottomright = free.right - margin - (occupied + margin if occupied else 0), free.bottom - margin
     return rect
+
+
+class GameViews:
+    """Views by game, created on first use."""
+
+    def __init__(self) -> None:
+        self._views: dict[str, GameView] = {}
+        self._last: tuple[Scene, GameView | None] | None = None
+
+    def view_of(self, scene: Scene) -> GameView | None:
+        """Return the view that draws a scene; None if no game has one for it."""
+        if self._last is None or self._last[0] is not scene:
+            path = view_path(scene)
+            if path is not None and path not in self._views:
+                self._views[path] = import_part(path)()
+            self._last = scene, None if path is None else self._views[path]
+        return self._last[1]
+
+
+def view_path(scene: Scene) -> str | None:
+    """Return the import string of the view that draws a scene; None if there is none.
+
+    The game named by the scene takes precedence over games whose `presents` accepts the scene.
+    """
+    specs = game_specs()
+    if scene.play.game is not None:
+        named = _named_spec(scene.play.game)
+        specs = specs if named is None else (named, *(spec for spec in specs if spec is not named))
+    return next((spec.view for spec in specs if spec.view is not None and _presents(spec, scene)), None)
+
+
+def _named_spec(game: str) -> GameSpec | None:
+    try:
+        return spec_of(game)
+    except (ImportError, AttributeError, ValueError):
+        assert game not in GAMES
+        return None  # an installed game that fails to import: starting the game reports the error
+
+
+def _presents(spec: GameSpec, scene: Scene) -> bool:
+    if spec.presents is None:
+        return scene.play.game in spec.names
+    return bool(import_part(spec.presents)(scene))
+
+
+class OffscreenRenderer:
+    """Draws frames into an array."""
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        """Create a renderer for frames of `size`, px."""
+        pygame.font.init()
+        self._surface = pygame.Surface(size)
+        self._renderer, self._inset = Renderer(), InsetRenderer()
+
+    def picture(
+        self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules, throttles: Mapping[str, Throttle]
+    ) -> npt.NDArray[np.uint8]:
+        """Return a frame of a game as the window shows it, without text: (height, width, 3).
+
+        Args:
+            scene: in its current form.
+            bodies: including spawned ones.
+            frame: state of the bodies.
+            rules: of the game, the source of lit lamps and of the view state (guns, blasts).
+            throttles: current settings, by thruster name.
+        """
+        camera = Camera.fitting(view_bounds(scene), self._surface.get_size())
+        lit = rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset[str]()
+        game = rules.view_state(frame.time) if isinstance(rules, HasViewState) else None
+        flames = active_thrusters(scene, bodies, throttles, frame.time)
+        snapshot = Snapshot(scene, bodies, frame, flames=flames, lit=lit, game=game)
+        self._renderer.draw(self._surface, camera, snapshot, hud=False)
+        self._inset.draw(self._surface, camera, snapshot, self._surface.get_rect())
+        return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import pygame
 
 from sandbox.games.contract import HasRanking
-from sandbox.games.high_scores import BEST, LETTERS, Entry, HighScores, initials_of, opened, table_of
+from sandbox.games.high_scores import LETTERS, MAX_SCORES, Entry, HighScores, initials_of, opened, table_of
 from sandbox.window.game_host import GameHost
 from sandbox.window.input.keymap import latin_key
 from sandbox.window.render.palette import FAINT, GREEN, INK
@@ -56,7 +56,7 @@ class HighScoreEntry:
         if self.saved is not None:
             return self.saved
         own = Entry(self.letters.ljust(LETTERS, "_"), self.score)
-        return (*self.others[: self.rank - 1], own, *self.others[self.rank - 1 :])[:BEST]
+        return (*self.others[: self.rank - 1], own, *self.others[self.rank - 1 :])[:MAX_SCORES]
 
 
 def _initials(text: str) -> str:

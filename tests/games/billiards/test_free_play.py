@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from sandbox.games.billiards.rules.base import GameError
-from sandbox.games.billiards.rules.pool import ALWAYS, FreePlay
+from sandbox.games.billiards.rules.pool import FREE_PLAY_DECISIONS, FreePlay
 from tests.games.billiards.shot_by_hand import judge
 
 RULES = FreePlay()
@@ -29,7 +29,7 @@ def test_potted_cue_ball_is_in_hand_and_passes_the_turn() -> None:
 def test_ball_in_hand_and_rerack_are_always_available() -> None:
     state = judge(RULES, START, "cue hits 3", "3 in left").state
     taken = RULES.decide(state, "in hand").state
-    assert (taken.in_hand, taken.decisions) == ("anywhere", ALWAYS)
+    assert (taken.in_hand, taken.decisions) == ("anywhere", FREE_PLAY_DECISIONS)
     reracked = RULES.decide(taken, "rerack")
     assert reracked.rerack
     assert reracked.state == START

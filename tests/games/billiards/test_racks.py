@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from sandbox.games.billiards.tables import HAIR
+from sandbox.games.billiards.tables import RACK_GAP
 from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import from_document
 
@@ -82,7 +82,7 @@ def test_rack_without_gap_touches_and_has_its_first_ball_on_the_spot(game: str) 
     distances = gaps(positions, RADIUS)
     contacts = 30 if count == 15 else 16  # along the three directions of a triangle of five rows; of a diamond of three
     assert distances[0] >= 0.0
-    assert distances[contacts - 1] <= HAIR + ROUNDING
+    assert distances[contacts - 1] <= RACK_GAP + ROUNDING
     assert distances[contacts] > RADIUS
     assert positions["1"] == FOOT
 
@@ -105,7 +105,7 @@ def test_snooker_rack_follows_the_rules() -> None:
     assert len(positions) == 22
     assert positions["blue"] == (0.889, 1.7845)
     assert positions["black"] == (0.889, 3.569 - 0.324)
-    assert gaps(positions, radius)[29] <= HAIR + ROUNDING
+    assert gaps(positions, radius)[29] <= RACK_GAP + ROUNDING
     # the first red is in line with the pink, as near as possible without touching
     assert positions["red-1"][0] == positions["pink"][0]
     assert 0.0 < math.dist(positions["red-1"], positions["pink"]) - 2.0 * radius < 0.002

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from sandbox.games.billiards.rules.base import GameError, Situation
-from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, remaining
+from sandbox.games.billiards.rules.snooker import COLOUR_VALUES, COLOURS, REDS, Snooker, remaining
 from tests.games.billiards.shot_by_hand import Case, assert_case, assert_verdict, judge, potted_lines
 
 RULES = Snooker()
@@ -141,7 +141,9 @@ def test_start_is_in_the_d_with_reds_on_and_147_points_remaining() -> None:
 @pytest.mark.parametrize("colour", COLOURS)
 def test_potted_colour_scores_its_value_is_respotted_and_red_is_next(colour: str) -> None:
     verdict = judge(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
-    assert_verdict(verdict, points=(VALUES[colour], 0), on="red", continues=True, table=COLOUR.table, respot=(colour,))
+    assert_verdict(
+        verdict, points=(COLOUR_VALUES[colour], 0), on="red", continues=True, table=COLOUR.table, respot=(colour,)
+    )
     others = ("black", "pink", "blue", "brown", "green", "yellow")
     assert verdict.respot[0].spots == (colour, *(each for each in others if each != colour))
 

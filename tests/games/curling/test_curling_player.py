@@ -9,7 +9,7 @@ from sandbox.games.contract import UnsuitableSceneError
 from sandbox.games.curling.bot import CurlingBot
 from sandbox.games.curling.delivery import Ice
 from sandbox.games.curling.player import CurlingPlayer
-from sandbox.games.curling.rules import HARDER, MAX_BROOM_OFFSET, SIDEWAYS, WEIGHTS, CurlingAim, broom_offset
+from sandbox.games.curling.rules import HARDER, MAX_BROOM_OFFSET, SIDEWAYS, WEIGHT_LIMITS, CurlingAim, broom_offset
 from sandbox.games.curling.sheet import RELEASE
 from sandbox.games.players import POLICIES
 from sandbox.measure.run.sessions import play_out
@@ -53,8 +53,8 @@ def test_broom_lies_on_the_line_of_aim() -> None:
 
 
 def test_aim_is_limited_to_what_the_controls_reach() -> None:
-    assert CurlingAim(9.0, 99.0, 1).limited() == (MAX_BROOM_OFFSET, WEIGHTS[1], 1)
-    assert CurlingAim(-9.0, -99.0, -1).limited() == (-MAX_BROOM_OFFSET, WEIGHTS[0], -1)
+    assert CurlingAim(9.0, 99.0, 1).limited() == (MAX_BROOM_OFFSET, WEIGHT_LIMITS[1], 1)
+    assert CurlingAim(-9.0, -99.0, -1).limited() == (-MAX_BROOM_OFFSET, WEIGHT_LIMITS[0], -1)
 
 
 @pytest.mark.nightly

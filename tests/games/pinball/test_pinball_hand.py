@@ -5,7 +5,7 @@ import pytest
 from sandbox import game_names
 from sandbox.game_spec import GameSpec
 from sandbox.games.contract import StepInfo, UnsuitableSceneError
-from sandbox.games.pinball.bot import HELD, PULL, PinballBot
+from sandbox.games.pinball.bot import HOLD_TIME, PULL_TIME, PinballBot
 from sandbox.games.players import POLICIES
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
@@ -39,7 +39,7 @@ def test_ball_within_reach_is_flipped_once_and_the_flipper_released() -> None:
     pressed = let_play(ball_at_flipper(), PinballBot(1, 1.0), 1.0)
     (down, *_), (up, *_) = pressed
     assert [(control, value) for _, control, value in pressed] == [("left flipper", 1.0), ("left flipper", 0.0)]
-    assert up - down == pytest.approx(HELD, abs=0.0101)  # the first step after that time
+    assert up - down == pytest.approx(HOLD_TIME, abs=0.0101)  # the first step after that time
 
 
 @pytest.mark.parametrize(("position", "velocity"), [(None, (0.0, 1.0)), (OPEN, (0.0, -0.1))], ids=["rising", "far"])
@@ -61,11 +61,11 @@ def test_skill_is_the_fraction_of_balls_that_are_flipped() -> None:
 
 def test_ball_in_the_lane_is_plunged() -> None:
     game = Table(table())
-    pressed = let_play(game, PinballBot(1, 1.0), PULL + 0.9)
+    pressed = let_play(game, PinballBot(1, 1.0), PULL_TIME + 0.9)
     (down, control, strength), (up, *_) = pressed[:2]
     assert control == "plunger"
     assert 0.85 <= strength <= 1.0
-    assert up - down == pytest.approx(PULL, abs=0.0101)  # the first step after that time
+    assert up - down == pytest.approx(PULL_TIME, abs=0.0101)  # the first step after that time
     assert len(pressed) == 2  # the bot waits for the spring
 
 

@@ -5,8 +5,8 @@ import copy
 import pytest
 
 from sandbox.games.contract import HasLamps
-from sandbox.games.pinball.devices import FLASH
-from sandbox.games.pinball.drop_targets import FALL
+from sandbox.games.pinball.devices import FLASH_TIME
+from sandbox.games.pinball.drop_targets import FALL_TIME
 from sandbox.games.pinball.rules import BLINK_PERIOD
 from tests.games.pinball.pinball_by_hand import DT, OPEN, Table, table
 
@@ -34,7 +34,7 @@ def lit_lamps_over(game: Table, seconds: float = BLINK_PERIOD) -> list[frozenset
 def test_hit_flashes_the_lamp(game: Table, name: str) -> None:
     game.advance((name, 0.5))
     assert game.game.lit_lamps() == {name}
-    game.wait(FLASH + DT)
+    game.wait(FLASH_TIME + DT)
     assert game.game.lit_lamps() == frozenset()
 
 
@@ -52,7 +52,7 @@ def test_drop_target_is_lit_while_it_is_down_and_a_full_bank_blinks(game: Table)
     game.advance(("drop 1", 0.5))
     assert lit_lamps_over(game)[-1] == {"drop 1"}
     game.advance(("drop 2", 0.5))
-    game.wait(FALL)
+    game.wait(FALL_TIME)
     lit = [each & {"drop 1", "drop 2"} for each in lit_lamps_over(game)]
     assert set(lit) == {frozenset(), frozenset({"drop 1", "drop 2"})}
     # half of the time, within a step at either end

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, Force, Impulse
-from sandbox.games.pinball.tilt import GRAVITY, JOLT, JOLT_TIME, SAME_PUSH_TIME, TiltBob
+from sandbox.games.pinball.tilt import GRAVITY, JOLT_ACCELERATION, JOLT_TIME, SAME_PUSH_TIME, TiltBob
 from tests.games.pinball.pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
 pytestmark = pytest.mark.fail_slow(60)  # whole games
@@ -122,7 +122,7 @@ def test_bob_has_the_acceleration_of_the_balls(game: Table) -> None:
     game.wait(0.04)
     # In steps of 10 ms, though the push ends within one; a nudge to the right pushes the bob to the left.
     expected = TiltBob(trip=np.inf)
-    expected.swing(JOLT_TIME, -JOLT)
+    expected.swing(JOLT_TIME, -JOLT_ACCELERATION)
     expected.swing(0.04 - JOLT_TIME, 0j)
     assert game.game.nudge.bob.angle == pytest.approx(expected.angle, rel=1e-9)  # rounding of times near 8 s
 

@@ -14,7 +14,7 @@ from sandbox.engines.switching import start
 from sandbox.games.contract import Policy
 from sandbox.games.pinball.ball_control import SEARCH_AFTER
 from sandbox.games.pinball.bot import PinballBot
-from sandbox.games.pinball.playfield import MARGIN
+from sandbox.games.pinball.playfield import TABLE_MARGIN
 from sandbox.games.pinball.rules import PinballRules
 from sandbox.games.players import RandomInput
 from sandbox.games.session import GameSession
@@ -50,7 +50,9 @@ class BallChecker:
 
     def __init__(self, rules: PinballRules, dt: float) -> None:
         self.rules, self.dt, self.rest = rules, dt, dict.fromkeys(rules.board.balls, 0.0)
-        self.low, self.high = np.add(rules.board.corners, [[MARGIN], [-MARGIN]])  # bounds of the static elements
+        self.low, self.high = np.add(
+            rules.board.corners, [[TABLE_MARGIN], [-TABLE_MARGIN]]
+        )  # bounds of the static elements
 
     def check(self, frame: Frame) -> None:
         rules, balls = self.rules, list(self.rules.board.balls)

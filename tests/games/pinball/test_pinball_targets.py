@@ -5,8 +5,8 @@ import math
 import pytest
 
 from sandbox.action import Move
-from sandbox.games.pinball.devices import DECAY, HOLD_TIME, PLATE_RADIUS
-from sandbox.games.pinball.drop_targets import FALL, REST
+from sandbox.games.pinball.devices import HOLD_TIME, PLATE_RADIUS, SPIN_DECAY
+from sandbox.games.pinball.drop_targets import FALL_TIME, REST_TIME
 from tests.games.pinball.pinball_by_hand import OPEN, Table, is_launch, moves, table, toggles
 
 
@@ -65,7 +65,7 @@ def test_drop_target_falls_after_260_ms(game: Table) -> None:
     fall_time = game.time - 0.01  # the step that reported it
     assert down == [("drop 1", False)]
     # the first step after that time; rounding of sums of steps
-    assert FALL - 1e-9 <= fall_time - hit < FALL + 0.01 + 1e-9
+    assert FALL_TIME - 1e-9 <= fall_time - hit < FALL_TIME + 0.01 + 1e-9
     game.advance(("drop 1", 0.5))
     assert game.game.score == 2_500  # the target is down
 
@@ -77,10 +77,10 @@ def test_soft_touch_leaves_a_drop_target_standing(game: Table) -> None:
 
 def test_full_bank_scores_and_rises_after_its_rest_time(game: Table) -> None:
     game.advance(("drop 1", 0.5), ("drop 2", 0.5))
-    actions = game.wait(FALL + 0.02)
+    actions = game.wait(FALL_TIME + 0.02)
     assert toggles(actions) == [("drop 1", False), ("drop 2", False)]
     assert game.game.score == 2 * 2_500 + 25_000
-    assert toggles(game.wait(REST - 0.05)) == []
+    assert toggles(game.wait(REST_TIME - 0.05)) == []
     assert toggles(game.wait(0.1)) == [("drop 1", True), ("drop 2", True)]
     game.advance(("drop 1", 0.5))
     assert game.game.score == 3 * 2_500 + 25_000
@@ -101,11 +101,11 @@ def test_number_of_spinner_turns_is_the_closed_form(game: Table) -> None:
     first = game.wait(0.2)
     assert not first
     omega = speed / PLATE_RADIUS
-    turned = omega / DECAY * (1.0 - math.exp(-DECAY * 0.2)) / (2.0 * math.pi)
+    turned = omega / SPIN_DECAY * (1.0 - math.exp(-SPIN_DECAY * 0.2)) / (2.0 * math.pi)
     assert game.cues.count("spinner") == math.floor(turned)
     game.wait(10.0)
     # It turns until it is slower than 4 rad/s: an angle of (Ω₀ − 4)/k. The step that detects this may be one turn late.
-    whole = (omega - 4.0) / DECAY / (2.0 * math.pi)
+    whole = (omega - 4.0) / SPIN_DECAY / (2.0 * math.pi)
     assert math.floor(whole) <= game.cues.count("spinner") <= math.floor(whole) + 1
     assert game.game.score == 250 * game.cues.count("spinner")
 

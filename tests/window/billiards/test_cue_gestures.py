@@ -5,7 +5,7 @@ import math
 import pytest
 
 from sandbox.games.billiards.game import MAX_CUE_SPEED, MAX_TIP_OFFSET
-from sandbox.games.billiards.view.controls import DIAL, FINE, ROOM, CueControls
+from sandbox.games.billiards.view.controls import DIAL_RADIUS, FINE_FACTOR, MAX_DRAW_BACK, CueControls
 from sandbox.games.billiards.view.player import BilliardsPlayer
 from tests.window.billiards.seated import FREE, NINE, controls_at
 
@@ -47,18 +47,18 @@ def test_fine_aim_scales_the_angle_and_does_not_jump_afterwards() -> None:
     move(controls, CUE, (1.0, 0.5))
     controls.move((1.0, 0.5), (1.0, 0.6), (0.0, 0.0), True, 0.0)
     turned = math.atan2(0.1, 0.5)
-    assert game.cue.aim == pytest.approx(FINE * turned, abs=1e-12)  # rounding
+    assert game.cue.aim == pytest.approx(FINE_FACTOR * turned, abs=1e-12)  # rounding
     move(controls, (1.0, 0.6), (1.0, 0.7))
-    assert game.cue.aim == pytest.approx(math.atan2(0.2, 0.5) - (1 - FINE) * turned, abs=1e-12)  # no jump
+    assert game.cue.aim == pytest.approx(math.atan2(0.2, 0.5) - (1 - FINE_FACTOR) * turned, abs=1e-12)  # no jump
 
 
 def test_english_is_limited_to_the_circle_without_miscue() -> None:
     game = player_at(FREE)
     controls = cue_controls(game)
     controls.begin("english")
-    controls.move(CUE, EMPTY_POINT, (0.2 * DIAL, -0.1 * DIAL), False, 0.0)
+    controls.move(CUE, EMPTY_POINT, (0.2 * DIAL_RADIUS, -0.1 * DIAL_RADIUS), False, 0.0)
     assert (game.cue.side, game.cue.height) == pytest.approx((0.2, 0.1), abs=1e-12)  # rounding
-    controls.move(CUE, EMPTY_POINT, (5.0 * DIAL, 5.0 * DIAL), False, 0.0)
+    controls.move(CUE, EMPTY_POINT, (5.0 * DIAL_RADIUS, 5.0 * DIAL_RADIUS), False, 0.0)
     assert math.hypot(game.cue.side, game.cue.height) == pytest.approx(MAX_TIP_OFFSET, abs=1e-12)  # rounding
     controls.end()
     game.shoot()  # no engine refuses the stroke
@@ -69,7 +69,7 @@ def test_power_follows_the_mouse_up() -> None:
     controls = cue_controls(game)
     game.cue.power = 0.5
     controls.begin("power")
-    controls.move(CUE, EMPTY_POINT, (0.0, -0.4 * DIAL), False, 0.0)
+    controls.move(CUE, EMPTY_POINT, (0.0, -0.4 * DIAL_RADIUS), False, 0.0)
     assert game.cue.power == pytest.approx(0.7, abs=1e-12)  # rounding
 
 
@@ -107,7 +107,7 @@ def test_stroke_speed_is_proportional_to_the_draw_back_distance() -> None:
     game.cue.aim = math.pi / 2
     controls = cue_controls(game)
     assert controls.press(EMPTY_POINT, 0.0)
-    back = EMPTY_POINT[0], EMPTY_POINT[1] - 0.5 * ROOM
+    back = EMPTY_POINT[0], EMPTY_POINT[1] - 0.5 * MAX_DRAW_BACK
     move(controls, EMPTY_POINT, back)
     controls.release(back, moved=True)
     assert game.strokes == 1

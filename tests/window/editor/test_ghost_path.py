@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.scene.files.load import loads
-from sandbox.window.editor.ghost_path import SECONDS, GhostPath, GhostPredictor, predict_path
+from sandbox.window.editor.ghost_path import PREDICTED_TIME, GhostPath, GhostPredictor, predict_path
 from tests.toml_text import toml
 
 pytestmark = pytest.mark.fail_slow(60)  # compiles kernels of `exact`
@@ -19,7 +19,7 @@ def test_path_of_a_flight_is_its_parabola() -> None:
     assert path is not None
     assert path.engine == "exact"
     t = np.arange(len(path.points)) * path.interval
-    assert t[-1] == pytest.approx(SECONDS)
+    assert t[-1] == pytest.approx(PREDICTED_TIME)
     parabola = np.column_stack((3 * t, 10 + 4 * t - 0.5 * 9.81 * t**2))
     assert np.abs(path.points - parabola).max() < 1e-12  # closed form, up to rounding
 
@@ -42,7 +42,7 @@ def test_path_of_many_bodies_is_shorter() -> None:
     grid = "[[grid]]\norigin = [0, 20]\ncolumns = 29\nrows = 10\nspacing = [1, 1]\nradius = 0.1\n"
     path = predict_path(loads(FLIGHT + grid), 0)
     assert path is not None
-    assert len(path.points) * path.interval < SECONDS
+    assert len(path.points) * path.interval < PREDICTED_TIME
     crowd = predict_path(loads(FLIGHT + grid.replace("rows = 10", "rows = 30")), 0)
     assert crowd is not None
     assert crowd.engine == "pymunk"
@@ -67,11 +67,11 @@ def test_predictor_predicts_the_latest_scene() -> None:
         until = time.monotonic() + 20.0
         while time.monotonic() < until:
             path = predictor.path
-            if path is not None and path.points[-1, 0] == pytest.approx(19 * SECONDS):
+            if path is not None and path.points[-1, 0] == pytest.approx(19 * PREDICTED_TIME):
                 break
             time.sleep(0.01)
         assert predictor.path is not None
-        assert predictor.path.points[-1, 0] == pytest.approx(19 * SECONDS)
+        assert predictor.path.points[-1, 0] == pytest.approx(19 * PREDICTED_TIME)
         predictor.submit(scenes[-1], None)
         assert predictor.path is None
         assert predictor.fault is None

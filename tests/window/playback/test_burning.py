@@ -10,7 +10,7 @@ from sandbox.scene.files.load import loads
 from sandbox.window.camera import Camera
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
-from sandbox.window.playback.snapshot import LONG, active_thrusters
+from sandbox.window.playback.snapshot import FLAME_LENGTH, active_thrusters
 from sandbox.window.render.palette import ORANGE
 from tests.toml_text import toml
 from tests.window.render.drawn import render, snapshot
@@ -37,13 +37,13 @@ def test_flame_of_a_throttled_thrust_scales_with_its_level() -> None:
     assert flame.body == 0
     assert flame.origin == pytest.approx((-1.0, 0.0))  # relative to the centre of mass
     # Against the force; the length is proportional to the square root of 0.25.
-    assert flame.direction == pytest.approx((-0.5 * LONG * REACH, 0.0))
+    assert flame.direction == pytest.approx((-0.5 * FLAME_LENGTH * REACH, 0.0))
 
 
 def test_timed_thrust_has_a_flame_only_in_its_interval() -> None:
     assert [len(active_thrusters(SCENE, SCENE.bodies, {}, time)) for time in (0.99, 1.0, 1.99, 2.0)] == [0, 1, 1, 0]
     (flame,) = active_thrusters(SCENE, SCENE.bodies, {}, 1.0)
-    assert flame.direction == pytest.approx((0.0, -0.5 * LONG * REACH))  # a quarter of the strongest force
+    assert flame.direction == pytest.approx((0.0, -0.5 * FLAME_LENGTH * REACH))  # a quarter of the strongest force
 
 
 def test_snapshot_of_a_live_view_contains_active_flames() -> None:
@@ -51,7 +51,7 @@ def test_snapshot_of_a_live_view_contains_active_flames() -> None:
     assert live.snapshot(frozenset({"shapes"})).flames == ()
     live.apply(Throttle(time=0.0, thrust="main", level=1.0))
     (flame,) = live.snapshot(frozenset({"shapes"})).flames
-    assert flame.direction == pytest.approx((-LONG * REACH, 0.0))
+    assert flame.direction == pytest.approx((-FLAME_LENGTH * REACH, 0.0))
     live.close()
 
 
@@ -62,6 +62,6 @@ def test_flame_is_drawn_behind_the_nozzle_and_rotates_with_the_body() -> None:
     centre = SCENE.bodies.position[0]
     along = np.array((math.cos(0.5), math.sin(0.5)))
     for fraction, is_flame in ((0.9, True), (1.2, False)):  # of its length behind the edge of the body
-        point = centre - along * (1.0 + fraction * LONG * REACH)
+        point = centre - along * (1.0 + fraction * FLAME_LENGTH * REACH)
         x, y = camera.to_screen(point[None])[0].round().astype(int)
         assert orange[x - 3 : x + 4, y - 3 : y + 4].any() == is_flame

@@ -8,7 +8,7 @@ import pytest
 from sandbox.games.billiards.tables import TABLES
 from sandbox.games.billiards.view.balls import IVORY, BallOrientations, paint_texture, texture_of
 from sandbox.games.billiards.view.prediction import CueAim
-from sandbox.games.billiards.view.table import CAROM, DEPTH, HOLE, POOL, SNOOKER, cushion_outlines, other_walls
+from sandbox.games.billiards.view.table import CAROM, CUSHION_WIDTH, HOLE, POOL, SNOOKER, cushion_outlines, other_walls
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
@@ -107,7 +107,7 @@ def test_every_cushion_is_found_between_playing_area_and_rail(name: str) -> None
     found = cushion_outlines(scene, area)
     assert len(found) == (4 if name.startswith("carom") else 6)
     (left, bottom), (right, top) = area
-    depth = DEPTH * shorter_side(area)
+    depth = CUSHION_WIDTH * shorter_side(area)
     for each in found:
         for x, y in each.outline:
             # A facing may end behind the edge of the rail, at its pocket.

@@ -325,7 +325,7 @@ class FreePlayState(RulesState):
     """the cue ball"""
 
 
-ALWAYS: tuple[Decision, ...] = ("play", "in hand", "rerack")
+FREE_PLAY_DECISIONS: tuple[Decision, ...] = ("play", "in hand", "rerack")
 """decisions before every shot of free play"""
 
 
@@ -350,7 +350,13 @@ class FreePlay(Ruleset[FreePlayState]):
         if cue in balls:
             raise GameError(f"{cue!r} cannot be both the cue ball and an object ball")
         return FreePlayState(
-            players=players, scores=scores, table=balls, rack=balls, cue=cue, in_hand="anywhere", decisions=ALWAYS
+            players=players,
+            scores=scores,
+            table=balls,
+            rack=balls,
+            cue=cue,
+            in_hand="anywhere",
+            decisions=FREE_PLAY_DECISIONS,
         )
 
     def cue_ball(self, state: FreePlayState) -> str:
@@ -372,7 +378,7 @@ class FreePlay(Ruleset[FreePlayState]):
             table=table,
             opening=False,
             in_hand="anywhere" if shot.scratched else None,
-            decisions=ALWAYS,
+            decisions=FREE_PLAY_DECISIONS,
         )
         messages = ("scratch: cue ball in hand",) if shot.scratched else ()
         if table or not state.rack:
@@ -386,4 +392,8 @@ class FreePlay(Ruleset[FreePlayState]):
     def _decide(self, state: FreePlayState, decision: Decision) -> Ruling[FreePlayState]:
         if decision == "rerack":
             return Ruling(replace(self.start(state.players, state.rack, state.cue), turn=state.turn), rerack=True)
-        return Ruling(replace(state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=ALWAYS))
+        return Ruling(
+            replace(
+                state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=FREE_PLAY_DECISIONS
+            )
+        )

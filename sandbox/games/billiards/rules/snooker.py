@@ -24,9 +24,9 @@ from sandbox.games.billiards.rules.base import (
 )
 
 REDS = tuple(f"red-{number}" for number in range(1, 16))
-VALUES = {"yellow": 2, "green": 3, "brown": 4, "blue": 5, "pink": 6, "black": 7}
+COLOUR_VALUES = {"yellow": 2, "green": 3, "brown": 4, "blue": 5, "pink": 6, "black": 7}
 """values of the colours, in the order of play after the reds"""
-COLOURS = tuple(VALUES)
+COLOURS = tuple(COLOUR_VALUES)
 SNOOKER_NAMES = (*REDS, *COLOURS)
 MIN_FOUL_POINTS = 4
 """minimum points of a foul"""
@@ -34,12 +34,12 @@ MIN_FOUL_POINTS = 4
 
 def value(ball: str) -> int:
     """Return the value of a ball; 1 for a red."""
-    return VALUES.get(ball, 1)
+    return COLOUR_VALUES.get(ball, 1)
 
 
 def reds(table: tuple[str, ...]) -> tuple[str, ...]:
     """Return the reds among some balls."""
-    return tuple(ball for ball in table if ball not in VALUES)
+    return tuple(ball for ball in table if ball not in COLOUR_VALUES)
 
 
 def colours(table: tuple[str, ...]) -> tuple[str, ...]:
@@ -107,7 +107,7 @@ class SnookerShot:
             if ball not in self.fair
         ]
         if found and not self.on:  # Penalties: a foul after a red before a colour was nominated
-            found = [(VALUES["black"], reason) for _, reason in found]
+            found = [(COLOUR_VALUES["black"], reason) for _, reason in found]
         return tuple(found)
 
     @property
@@ -171,7 +171,7 @@ class SnookerState(RulesState):
 
 def remaining(state: SnookerState) -> int:
     """Return the points that can still be made without fouls and free balls, with a black after each red."""
-    black = VALUES["black"]
+    black = COLOUR_VALUES["black"]
     points = sum(value(ball) for ball in colours(state.table)) + (1 + black) * len(reds(state.table))
     return points + (black if state.on == "colour" else 0)
 
@@ -217,7 +217,7 @@ class Snooker(Ruleset[SnookerState]):
         if state.over or not situation.snookered:
             return Ruling(after)
         if state.freed is not None and state.freed in situation.by and set(state.table) != {"pink", "black"}:
-            penalty = max(MIN_FOUL_POINTS, VALUES.get(state.on, 1))
+            penalty = max(MIN_FOUL_POINTS, COLOUR_VALUES.get(state.on, 1))
             reason = f"the free ball, {state.freed}, snookers the opponent"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
@@ -247,7 +247,7 @@ class Snooker(Ruleset[SnookerState]):
         """Return the result of a fair stroke."""
         down, points = played.shot.down, played.points
         last = state.on not in ("red", "colour")
-        removed = tuple(ball for ball in down if ball not in VALUES or (last and ball == state.on))
+        removed = tuple(ball for ball in down if ball not in COLOUR_VALUES or (last and ball == state.on))
         respotted = tuple(ball for ball in down if ball not in removed)
         table = state.without(removed)
         gained = tuple(points * (each == state.turn) for each in range(state.players))
@@ -279,7 +279,7 @@ class Snooker(Ruleset[SnookerState]):
             after, decisions=_replies(after, missed), before=replace(state, before=None) if missed else None
         )
         messages = (text, "foul and a miss: the shot may be replayed from the same position") if missed else (text,)
-        colours_down = tuple(ball for ball in down if ball in VALUES)
+        colours_down = tuple(ball for ball in down if ball in COLOUR_VALUES)
         return Ruling(after, reasons, gained, respot=respots(colours_down), messages=messages)
 
     def _decide(self, state: SnookerState, decision: Decision) -> Ruling[SnookerState]:
@@ -322,7 +322,7 @@ def _claimable(state: SnookerState) -> SnookerState:
     """Return the state, with a `claim` offered if only the black is left and the lead exceeds its value."""
     if state.table != ("black",) or state.players == 1:
         return state
-    if state.scores[state.turn] - state.scores[state.other] <= VALUES["black"]:
+    if state.scores[state.turn] - state.scores[state.other] <= COLOUR_VALUES["black"]:
         return state
     return replace(state, decisions=("play", "claim"))
 

@@ -172,7 +172,7 @@ MAX_MOVING_RADIUS, MAX_RESTING_RADIUS = 48.0, 160.0
 """px: largest radius at which sprites of moving and of resting balls are shaded; larger balls are scaled up"""
 MAX_SHADOWED_RADIUS = 1_000.0
 """px: the shadow of a larger ball would cover the view"""
-OFFSETS = 4
+SUBPIXEL_OFFSETS = 4
 """subpixel positions of a sprite along each axis, so that slow balls move smoothly"""
 SINK_TIME = 0.18
 """s: duration of the animation of a pocketed ball"""
@@ -268,8 +268,8 @@ class BallRenderer:
         finest = MAX_MOVING_RADIUS if moving else MAX_RESTING_RADIUS
         size = max(round(min(radius, finest) * 8.0), 4)
         scale = radius / finest if radius > finest else 1.0
-        subpixel = [math.floor(each * OFFSETS + 0.5) for each in centre]
-        offset = (subpixel[0] % OFFSETS, subpixel[1] % OFFSETS) if scale == 1.0 else (0, 0)
+        subpixel = [math.floor(each * SUBPIXEL_OFFSETS + 0.5) for each in centre]
+        offset = (subpixel[0] % SUBPIXEL_OFFSETS, subpixel[1] % SUBPIXEL_OFFSETS) if scale == 1.0 else (0, 0)
         key = (size, scale, offset, int(self._rolling.version[number]), view.camera.turned, bright)
         cached = self._sprites.get(number)
         if cached is None or cached[0] != key:
@@ -283,7 +283,7 @@ class BallRenderer:
         if scale != 1.0:
             corner = centre[0] - half * scale, centre[1] - half * scale
         else:
-            corner = subpixel[0] // OFFSETS - half, subpixel[1] // OFFSETS - half
+            corner = subpixel[0] // SUBPIXEL_OFFSETS - half, subpixel[1] // SUBPIXEL_OFFSETS - half
         view.surface.blit(cached[1], (round(corner[0]), round(corner[1])))
 
 
@@ -309,14 +309,14 @@ def _globe(size: int, offset: tuple[int, int]) -> ShadedBall:
 
     Args:
         size: radius, in eighths of a pixel.
-        offset: subpixel offset of the centre, in units of 1/`OFFSETS` px.
+        offset: subpixel offset of the centre, in units of 1/`SUBPIXEL_OFFSETS` px.
     """
     radius = size / 8.0
     half = math.ceil(radius) + 1
     side = 2 * half + 1
     along = np.arange(side) + 0.5
-    x = (along[:, None] - half - offset[0] / OFFSETS) / radius
-    y = -(along[None, :] - half - offset[1] / OFFSETS) / radius
+    x = (along[:, None] - half - offset[0] / SUBPIXEL_OFFSETS) / radius
+    y = -(along[None, :] - half - offset[1] / SUBPIXEL_OFFSETS) / radius
     distance = np.hypot(x, y)
     cover = np.clip((1.0 - distance) * radius + 0.5, 0.0, 1.0)
     inside = cover > 0.0

@@ -13,7 +13,7 @@ from sandbox.scene.description.surface import Stroke
 
 AIM_TIME, DRAW_TIME = 0.9, 0.45
 """s, duration of the aiming and of the draw-back animation"""
-DRAW_BACK = 0.02
+DRAW_BACK_PER_SPEED = 0.02
 """m of draw-back per m/s of cue speed"""
 
 
@@ -68,7 +68,7 @@ class BotPlayer:
         cue.tip_at(side + (stroke.side - side) * progress, height + (stroke.height - height) * progress)
         cue.speed = stroke.speed
         drawn = min(max(self._since - AIM_TIME, 0.0) / DRAW_TIME, 1.0)
-        cue.back = DRAW_BACK * stroke.speed * drawn
+        cue.back = DRAW_BACK_PER_SPEED * stroke.speed * drawn
         return self._since > AIM_TIME + 1.15 * DRAW_TIME
 
     def reset(self) -> None:

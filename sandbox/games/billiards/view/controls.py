@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import pygame
 
@@ -26,15 +26,15 @@ from sandbox.window.playback.snapshot import Snapshot
 
 CueMode = Literal["aim", "stroke", "draw", "english", "power"]
 
-FINE = 0.08
+FINE_FACTOR = 0.08
 """factor of mouse movements with Shift"""
-ROOM = 0.5
+MAX_DRAW_BACK = 0.5
 """m, greatest draw-back of the cue"""
 MIN_DRAW_BACK = 0.015
 """m, least draw-back for a stroke"""
 SPEED_WINDOW = 0.07
 """s over which the speed of a stroke is measured"""
-DIAL = 90.0
+DIAL_RADIUS = 90.0
 """px at unit 1 of mouse movement from the centre of the ball to its edge, and for half of the power"""
 MIN_AIM_DISTANCE = 1.5
 """distance of the pointer from the cue ball, in radii, below which it does not aim"""
@@ -76,11 +76,11 @@ class CueControls:
             return
         if not player.is_own_turn:
             return
-        cue, factor = player.cue, FINE if fine else 1.0
+        cue, factor = player.cue, FINE_FACTOR if fine else 1.0
         if self.mode == "english":
-            cue.tip_at(cue.side + factor * pixels[0] / DIAL, cue.height - factor * pixels[1] / DIAL)
+            cue.tip_at(cue.side + factor * pixels[0] / DIAL_RADIUS, cue.height - factor * pixels[1] / DIAL_RADIUS)
         elif self.mode == "power":
-            cue.power -= factor * pixels[1] / (2.0 * DIAL)
+            cue.power -= factor * pixels[1] / (2.0 * DIAL_RADIUS)
         elif self.mode == "aim":
             self._aim(before, now, fine)
         else:
@@ -96,7 +96,7 @@ class CueControls:
             self._offset, self._strokes = 0.0, player.strokes
         if fine:
             turned = math.remainder(angle - math.atan2(before[1] - y, before[0] - x), math.tau)
-            self._offset = math.remainder(cue.aim + FINE * turned - angle, math.tau)
+            self._offset = math.remainder(cue.aim + FINE_FACTOR * turned - angle, math.tau)
         cue.aim = angle + self._offset
 
     def turn(self, change: float) -> None:
@@ -112,7 +112,7 @@ class CueControls:
 
     def _push(self, forward: float, time: float) -> None:
         """Move the cue along its direction, m; reaching the ball after a draw-back is a stroke."""
-        self._drawn = min(self._drawn - forward, ROOM)
+        self._drawn = min(self._drawn - forward, MAX_DRAW_BACK)
         self._deepest = max(self._deepest, self._drawn)
         self._recent.append((time, forward))
         while self._recent and self._recent[0][0] < time - SPEED_WINDOW:
@@ -120,7 +120,7 @@ class CueControls:
         cue = self.player.cue
         cue.back = max(self._drawn, 0.0)
         if self.mode == "draw":
-            cue.power = min(cue.back / ROOM, 1.0)
+            cue.power = min(cue.back / MAX_DRAW_BACK, 1.0)
         elif self._drawn <= 0.0 and self._deepest >= MIN_DRAW_BACK:
             speed = sum(each for _, each in self._recent) / SPEED_WINDOW
             self.end()
@@ -195,47 +195,59 @@ TURN_STEP, FINE_TURN_STEP = 0.002, 0.0001
 POWER_STEP = 0.02
 """fraction of the greatest power by which an arrow key changes it"""
 
-CUE_KEY_HELP = (
-    ("Mouse", "aim; Shift: fine"),
-    ("Left or Right", "fine aim; Shift: finer"),
-    ("Up or Down", "power"),
-    ("S (hold)", "stroke: pull back, push forward"),
-    ("Left-drag", "draw the cue back, release"),
-    ("E (hold)", "english: where the tip hits"),
-    ("X (hold)", "set the power"),
-    ("Space", "shoot"),
-    ("G", "cue ball in hand"),
-    ("Z", "undo shot"),
-    ("Click", "call a ball, or a pocket"),
-    ("C", "call a safety"),
-    ("D", "next choice, if any"),
-    ("Enter", "confirm the choice"),
+
+class CueKey(NamedTuple):
+    """Keys at a table, or use of the mouse, as a line of the help page."""
+
+    label: str
+    about: str
+    actions: Mapping[int, Callable[[CueControls], object]] = {}
+    """handlers of presses by pygame key code"""
+    is_held: bool = False
+    """whether the mode of the mouse that a press begins ends with the release"""
+
+
+def _hold(label: str, about: str, key: int, mode: CueMode) -> CueKey:
+    return CueKey(f"{label} (hold)", about, {key: lambda cue: cue.begin(mode)}, is_held=True)
+
+
+CUE_KEYS = (
+    CueKey("Mouse", "aim; Shift: fine"),
+    CueKey(
+        "Left or Right",
+        "fine aim; Shift: finer",
+        {pygame.K_LEFT: lambda cue: cue.turn(_angle_step()), pygame.K_RIGHT: lambda cue: cue.turn(-_angle_step())},
+    ),
+    CueKey(
+        "Up or Down",
+        "power",
+        {
+            pygame.K_UP: lambda cue: cue.change_power(POWER_STEP),
+            pygame.K_DOWN: lambda cue: cue.change_power(-POWER_STEP),
+        },
+    ),
+    _hold("S", "stroke: pull back, push forward", pygame.K_s, "stroke"),
+    CueKey("Left-drag", "draw the cue back, release"),
+    _hold("E", "english: where the tip hits", pygame.K_e, "english"),
+    _hold("X", "set the power", pygame.K_x, "power"),
+    CueKey("Space", "shoot", {pygame.K_SPACE: lambda cue: cue.player.shoot()}),
+    CueKey("G", "cue ball in hand", {pygame.K_g: lambda cue: cue.player.toggle_in_hand()}),
+    CueKey("Z", "undo shot", {pygame.K_z: lambda cue: cue.player.undo()}),
+    CueKey("Click", "call a ball, or a pocket"),
+    CueKey("C", "call a safety", {pygame.K_c: lambda cue: cue.player.toggle_safety()}),
+    CueKey("D", "next choice, if any", {pygame.K_d: lambda cue: cue.player.choose_next()}),
+    CueKey("Enter", "confirm the choice", {pygame.K_RETURN: lambda cue: cue.player.take_choice()}),
 )
+CUE_KEY_HELP = tuple((row.label, row.about) for row in CUE_KEYS)
 """keys and their descriptions in the help overlay"""
 
 
 def cue_bindings(cue: CueControls) -> ControlBindings:
     """Return the key bindings at a table."""
-    player = cue.player
-    modes: tuple[tuple[int, CueMode], ...] = (
-        (pygame.K_s, "stroke"),
-        (pygame.K_e, "english"),
-        (pygame.K_x, "power"),
+    pressed = {key: partial(action, cue) for row in CUE_KEYS for key, action in row.actions.items()}
+    return ControlBindings(
+        pressed, {key: cue.end for row in CUE_KEYS if row.is_held for key in row.actions}, CUE_KEY_HELP
     )
-    pressed: dict[int, Callable[[], object]] = {
-        pygame.K_SPACE: player.shoot,
-        pygame.K_g: player.toggle_in_hand,
-        pygame.K_z: player.undo,
-        pygame.K_LEFT: lambda: cue.turn(_angle_step()),
-        pygame.K_RIGHT: lambda: cue.turn(-_angle_step()),
-        pygame.K_UP: lambda: cue.change_power(POWER_STEP),
-        pygame.K_DOWN: lambda: cue.change_power(-POWER_STEP),
-        pygame.K_c: player.toggle_safety,
-        pygame.K_d: player.choose_next,
-        pygame.K_RETURN: player.take_choice,
-        **{key: partial(cue.begin, mode) for key, mode in modes},
-    }
-    return ControlBindings(pressed, {key: cue.end for key, _ in modes}, CUE_KEY_HELP)
 
 
 def _angle_step() -> float:

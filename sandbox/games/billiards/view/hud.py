@@ -30,14 +30,14 @@ from sandbox.window.render.palette import (
     hex_colour,
     mix_colours,
 )
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
 
 MAX_SCOREBOARD_WIDTH = 470.0
 """px at a UI scale of 1"""
 MIN_SCOREBOARD_WIDTH = 300.0
 """px at a UI scale of 1; if the top has less room, the scoreboard is at the bottom"""
-RIGHT = 66.0
+FRAME_RATE_WIDTH = 66.0
 """px at a UI scale of 1: free width to its right, for the frame rate"""
 
 
@@ -70,7 +70,7 @@ def layout_scoreboard(
         occupied: occupied width at the bottom right, px.
     """
     size, pad, margin = 13.0 * ui_scale, round(9 * ui_scale), round(10 * ui_scale)
-    right = free.right - round(RIGHT * ui_scale)
+    right = free.right - round(FRAME_RATE_WIDTH * ui_scale)
     at_top = right - left >= MIN_SCOREBOARD_WIDTH * ui_scale
     if not at_top:
         left, right = free.left + margin, free.right - max(margin, occupied)
@@ -263,7 +263,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale
     """Draw the english dial: the ball, the miscue limit, and the contact point of the tip."""
     (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
     draw_box(surface, tip_box(rect, ui_scale), 10 * ui_scale, opacity=170)
-    _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * ui_scale))
+    draw_sdf_disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * ui_scale))
     faint = mix_colours(IVORY, PANEL, 0.28)
     for a, b in (((x - radius, y), (x + radius, y)), ((x, y - radius), (x, y + radius))):
         pygame.draw.line(surface, faint, a, b)
@@ -273,7 +273,8 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale
             points = [(x + MISCUE * radius * math.cos(t), y + MISCUE * radius * math.sin(t)) for t in turns]
             pygame.draw.aalines(surface, mix_colours(IVORY, VERMILION, 0.75), False, points)
     at = x + cue.side * radius, y - cue.height * radius
-    _disc(surface, at, TIP_RADIUS * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * ui_scale, opacity=0.95))
+    style = ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * ui_scale, opacity=0.95)
+    draw_sdf_disc(surface, at, TIP_RADIUS * radius, style)
     if cue.side or cue.height:
         text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
         draw_text(
@@ -315,13 +316,7 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_sca
     )
 
 
-def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, style: ShapeStyle) -> None:
-    side = math.ceil(radius) + 2
-    within = pygame.Rect(math.floor(at[0]) - side, math.floor(at[1]) - side, 2 * side + 1, 2 * side + 1)
-    draw_sdf(surface, disc_distance(*at, radius), style, within)
-
-
-SIDE, GAP = 92.0, 14.0
+DIAL_SIDE, DIAL_GAP = 92.0, 14.0
 """px at a UI scale of 1: side of the english dial, and gap between dials"""
 POWER_BAR = 18.0
 """px at a UI scale of 1: width of the power bar"""
@@ -406,11 +401,11 @@ def _scale(free: pygame.Rect, ui_scale: float) -> float:
 
 def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
     """Return the rectangles of the english dial and the power bar, px."""
-    side, gap, bar = round(SIDE * scale), round(GAP * scale), round(POWER_BAR * scale)
+    side, gap, bar = round(DIAL_SIDE * scale), round(DIAL_GAP * scale), round(POWER_BAR * scale)
     power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
     return pygame.Rect(power.left - gap - side, power.top, side, side), power
 
 
 def _dials_width(scale: float) -> int:
     """Return the width of the dials at the right, px."""
-    return round(SIDE * scale) + round(POWER_BAR * scale) + 3 * round(GAP * scale)
+    return round(DIAL_SIDE * scale) + round(POWER_BAR * scale) + 3 * round(DIAL_GAP * scale)

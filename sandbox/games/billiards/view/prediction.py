@@ -66,7 +66,7 @@ class CueState:
         self.side = self.height = self.back = 0.0
 
 
-SPACING = 0.05
+POINT_SPACING = 0.05
 """m between the points of a path"""
 
 
@@ -135,10 +135,10 @@ class ShotPredictor:
             ratio = own_radius / other_radius  # in which the contact point divides the line of centres
             ghost = x + (x - bx) * ratio, y + (y - by) * ratio
         return ShotPrediction(
-            outcome.path_of(name, SPACING),
+            outcome.path_of(name, POINT_SPACING),
             ghost,
             hit,
-            outcome.path_of(names[hit], SPACING) if hit is not None else None,
+            outcome.path_of(names[hit], POINT_SPACING) if hit is not None else None,
             tuple(k for k in (ball, hit) if k is not None and names[k] in outcome.pocketed),
         )
 

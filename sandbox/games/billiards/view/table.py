@@ -17,15 +17,15 @@ from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.render.draw_context import Canvas
-from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
+from sandbox.window.render.lines import Pixel, draw_line, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, RgbColour, mix_colours
-from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, draw_sdf_disc
 from sandbox.window.render.static_geometry import draw_static_bodies
-from sandbox.window.view_bounds import RAIL, shorter_side
+from sandbox.window.view_bounds import RAIL_WIDTH, shorter_side
 
-DEPTH = 0.036
+CUSHION_WIDTH = 0.036
 """width of a cushion from the nose to the wood, as a fraction of the table width"""
-TOUCH = 1e-6
+TOUCH_DISTANCE = 1e-6
 """m: objects whose distance is smaller touch"""
 ARC_STEP = math.radians(6.0)
 """rad between consecutive points of a jaw"""
@@ -44,7 +44,7 @@ class CushionOutline(NamedTuple):
 
 def cushion_outlines(scene: Scene, area: ViewBox) -> tuple[CushionOutline, ...]:
     """Return the cushions among the walls of a scene."""
-    depth = DEPTH * shorter_side(area)
+    depth = CUSHION_WIDTH * shorter_side(area)
     noses = {k: out for k, wall in enumerate(scene.walls) if (out := _outward(wall, area)) is not None}
     facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
@@ -63,7 +63,9 @@ def other_walls(scene: Scene, area: ViewBox) -> tuple[tuple[Wall, ...], tuple[Po
 
 def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
     """Return the post that the end of a nose touches; None if there is none."""
-    return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
+    return next(
+        (post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH_DISTANCE), None
+    )
 
 
 def _outward(wall: Wall, area: ViewBox) -> Vector | None:
@@ -78,14 +80,14 @@ def _outward(wall: Wall, area: ViewBox) -> Vector | None:
         (bottom, ay, by, (0.0, -1.0)),
         (top, ay, by, (0.0, 1.0)),
     ):
-        if abs(a - edge) < TOUCH and abs(b - edge) < TOUCH:
+        if abs(a - edge) < TOUCH_DISTANCE and abs(b - edge) < TOUCH_DISTANCE:
             return out
     return None
 
 
 def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> CushionOutline:
     a, b = wall.points
-    length = max(math.dist(a, b), TOUCH)
+    length = max(math.dist(a, b), TOUCH_DISTANCE)
     along = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     back = -along[0], -along[1]
     first, last = _end(a, back, out, scene, facings, depth), _end(b, along, out, scene, facings, depth)
@@ -125,8 +127,8 @@ def _facing_ends(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
     """Return the ends of a wall that leaves a jaw tangentially, the end on the jaw first; None for other walls."""
     for first_end, far in (wall.points, wall.points[::-1]):
         x, y = first_end[0] - jaw.position[0], first_end[1] - jaw.position[1]
-        leaves = abs(x * (far[0] - first_end[0]) + y * (far[1] - first_end[1])) < TOUCH
-        if leaves and abs(math.hypot(x, y) - jaw.radius) < TOUCH:
+        leaves = abs(x * (far[0] - first_end[0]) + y * (far[1] - first_end[1])) < TOUCH_DISTANCE
+        if leaves and abs(math.hypot(x, y) - jaw.radius) < TOUCH_DISTANCE:
             return first_end, far
     return None
 
@@ -230,12 +232,8 @@ class _TablePen:
     def disc(
         self, at: Point, radius: float, colour: RgbColour, rim: RgbColour | None = None, line: float = 0.0
     ) -> None:
-        ((x, y),), r = self.at((at,)), radius * self.canvas.camera.scale
-        if clip_segment((x, y), (x, y), self.canvas.surface.get_rect(), r + 4.0) is None:
-            return
-        within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
         style = ShapeStyle(colour, rim or colour, line * self.canvas.ui_scale, antialias=self.canvas.antialias)
-        draw_sdf(self.canvas.surface, disc_distance(x, y, r), style, within)
+        draw_sdf_disc(self.canvas.surface, self.at((at,))[0], radius * self.canvas.camera.scale, style)
 
 
 def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
@@ -246,7 +244,7 @@ def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
 
 def _draw_rails(pen: _TablePen, area: ViewBox, width: float) -> None:
     """Draw the rails as nested boxes: a dark outer edge, a light bevel, the wood, and a dark inner edge."""
-    rim, depth = RAIL * width, DEPTH * width
+    rim, depth = RAIL_WIDTH * width, CUSHION_WIDTH * width
     for out, colour in (
         (rim, WOOD_DARK),
         (rim - 0.004 * width, WOOD_LIGHT),
@@ -274,7 +272,7 @@ def _draw_pocket_mouth(
 def _draw_light(canvas: Canvas, area: ViewBox) -> None:
     """Brighten the middle of the bed and darken its corners."""
     (left, top), (right, bottom) = _corners(canvas.camera, area)
-    depth = DEPTH * shorter_side(area) * canvas.camera.scale
+    depth = CUSHION_WIDTH * shorter_side(area) * canvas.camera.scale
     window_rect = canvas.surface.get_rect()
     rect = pygame.Rect(0, 0, 0, 0)
     rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
@@ -331,7 +329,7 @@ def _draw_diamonds(pen: _TablePen, scene: Scene, area: ViewBox, width: float) ->
         return
     (left, bottom), (right, top) = area
     tall = top - bottom > right - left
-    offset, size = (RAIL + DEPTH) / 2.0 * width, 0.0062 * width
+    offset, size = (RAIL_WIDTH + CUSHION_WIDTH) / 2.0 * width, 0.0062 * width
     columns, rows = (4, 8) if tall else (8, 4)
     positions = [
         (left + (right - left) * k / columns, y) for k in range(1, columns) for y in (bottom - offset, top + offset)
