@@ -54,16 +54,20 @@ class WorkerProcess:
             OSError: no process can be started.
         """
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115, closed in `end`
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._stderr,
-            text=True,
-            encoding="utf-8",
-            env={**os.environ, **SINGLE_THREADED, **(environment or {})},
-            start_new_session=True,
-        )
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._stderr,
+                text=True,
+                encoding="utf-8",
+                env={**os.environ, **SINGLE_THREADED, **(environment or {})},
+                start_new_session=True,
+            )
+        except OSError:
+            self._stderr.close()
+            raise
         self._lines: SimpleQueue[str | None] = SimpleQueue()
         threading.Thread(target=self._read_lines, daemon=True).start()
 
@@ -98,7 +102,8 @@ class WorkerProcess:
             line = self._lines.get(timeout=max(seconds, 0.0))
         except Empty:
             raise TimeoutError from None
-        if line is None:
+        if line is None or not line.endswith("\n"):  # it has ended, perhaps within a line
+            self._lines.put(None)
             raise ProcessEndedError
         answer: JsonObject = json.loads(line)
         return answer

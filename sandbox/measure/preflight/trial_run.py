@@ -25,7 +25,7 @@ from sandbox.measure.preflight.diagnostic import Detail, Details, Diagnostic, fl
 from sandbox.measure.preflight.initial_contacts import initial_contacts
 from sandbox.measure.preflight.predictability import event_warning
 from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
-from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
+from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY, collide_with_all
 from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
@@ -110,10 +110,19 @@ class TrialRun:
         return MAX_SPEED_UP * fastest * self.settings.h > reach
 
     def is_blind_to(self, predicted: Diagnostic) -> bool:
-        """Return whether the audit could not follow the ends of slender bodies, which may be what tunnels."""
+        """Return whether the audit could not follow all bodies that may be what tunnels.
+
+        It does not follow bodies whose centre of mass lies outside of them, nor the ends of slender bodies between
+        frames in which they turn too far.
+        """
         bodies, run = self.scene.bodies, self.run
-        slender = is_slender(bodies) & ~bodies.fixed
-        if predicted.kind != "tunnelling" or predicted.details["thing"] != ANOTHER_BODY or not slender.any():
+        if predicted.kind != "tunnelling" or predicted.details["thing"] != ANOTHER_BODY:
+            return False
+        colliding = collide_with_all(bodies)
+        if (colliding & ~bodies.fixed & (bodies.core <= 0.0)).any():
+            return True
+        slender = colliding & is_slender(bodies)
+        if not slender.any():
             return False
         turn = np.abs(np.diff(run.angle[:, slender], axis=0))
         return bool(run.info["settings"]["record_every"] > 1) or bool((turn > MAX_TURN).any())

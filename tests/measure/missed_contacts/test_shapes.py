@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sandbox
+from sandbox.action import Move
 from sandbox.measure.missed_contacts.contact_history import ContactHistory
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.document import to_document
@@ -175,3 +176,45 @@ def test_end_of_a_turning_bar_that_passes_a_ball_within_a_step_is_missed(engine:
     assert run(scene, engine, record_every=2).missed_contacts == 0  # a lower bound: not followed
     apart = from_document({**to_document(scene), "ball": [{**ball, "collides": "fixed"}]})
     assert run(apart, engine).missed_contacts == 0
+
+
+ROD = {"name": "rod", "size": [0.04, 1.0], "position": [0.0, 0.75], "fixed": True}
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
+def test_bounce_under_the_end_of_a_bar_within_a_frame_is_no_passage(engine: str) -> None:
+    """The chord of the frame crosses the bar, whose lower end is 0.15 m above the ball when that bounces."""
+    document = {
+        "world": {"gravity": [0.0, 0.0], "duration": 0.2},
+        "solver": {"dt": 0.05, "substeps": 25},
+        "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": 1.0}],
+        "box": [ROD],
+        "ball": [{"position": [-0.5, 0.55], "velocity": [20.0, -20.0], "radius": 0.05}],
+    }
+    assert run(from_document(document), engine).missed_contacts == 0
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
+def test_actions_that_place_a_body_are_no_passages(engine: str) -> None:
+    ball = {"name": "ball", "position": [-1.0, 0.75], "radius": 0.05}
+    scene = from_document({"world": {"gravity": [0.0, 0.0], "duration": 0.3}, "box": [ROD], "ball": [ball]})
+    moved = run(scene, engine, actions=(Move(time=0.1, body="ball", position=(1.0, 0.75)),))
+    assert (moved.status, moved.missed_contacts) == ("ok", 0)
+    failed = run(scene, engine, actions=(Move(time=0.1, body="x", position=(2.0, 1.0)),))
+    assert failed.status == "failed"
+
+
+def test_capsules_that_are_squeezed_together_do_not_pass_each_other() -> None:
+    heap = [
+        {"length": 1.2, "radius": 0.05, "position": [0.3 * (k % 4), 0.2 + 0.3 * (k // 4)], "angle": 0.4 * k}
+        for k in range(24)
+    ]
+    document = {
+        "world": {"gravity": [0.0, -9.8], "duration": 1.0},
+        "solver": {"dt": 0.0166},
+        "wall": [{"points": [[-2.0, 8.0], [-2.0, 0.0], [3.0, 0.0], [3.0, 8.0]]}],
+        "capsule": heap,
+    }
+    found = run(from_document(document))
+    assert len(found.contact_time) > 50
+    assert found.missed_contacts == 0

@@ -114,6 +114,18 @@ def test_trial_that_cannot_see_the_ends_of_a_bar_refutes_nothing(engine: str) ->
     assert "tunnelling" in {each.kind for each in run_preflight(scene, engine=engine).warnings}
 
 
+def test_trial_that_cannot_follow_a_body_around_its_centre_refutes_nothing() -> None:
+    """A boomerang, whose centre of mass lies outside of it, is not audited."""
+    arms = [
+        {"length": 1.6, "radius": 0.02, "position": [x, 0.5], "angle": angle} for x, angle in ((0.6, 0.8), (-0.6, -0.8))
+    ]
+    boomerang = {"name": "boomerang", "position": [0.0, 0.0], "angular_velocity": 30.0, "capsule": arms}
+    ball = {"name": "b", "position": [3.0, 0.6], "velocity": [-60.0, 0.0], "radius": 0.02}
+    scene = scene_of(0.0, 0.3, body=[boomerang], ball=[ball])
+    assert scene.bodies.core.min() == 0.0
+    assert "tunnelling" in {each.kind for each in run_preflight(scene, engine="pymunk").warnings}
+
+
 def test_slow_bar_is_refuted() -> None:
     found = run_preflight(bar(4.0, 0.5), engine="pymunk")
     assert "tunnelling" not in {each.kind for each in found.warnings}
