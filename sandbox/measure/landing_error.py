@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.contract import Refusal
+from sandbox.engines.contract import Divergence, Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES, start
 from sandbox.games.artillery.ballistics import MAX_FLIGHT, NO_DISCS, ShellImpact, landing
@@ -109,6 +109,9 @@ def landing_error_table(
         except Refusal as refusal:
             refused[engine, integrator] = "; ".join(refusal.reasons)
             continue
+        except Divergence as error:
+            refused[engine, integrator] = str(error)
+            continue
         except KeyboardInterrupt:
             interrupted = True
             break
@@ -154,6 +157,7 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
 
     Raises:
         Refusal: the engine does not support the shot.
+        Divergence: the shot leaves the bounds of the engine.
         ValueError: the shot does not land within the limit of time.
     """
     vx, vy = velocity.tolist()

@@ -57,3 +57,10 @@ def test_invalid_shot_scene_or_option_is_refused(capfd: pytest.CaptureFixture[st
     assert "world.gravity: the shot does not come down" in err[0]
     status, _, err = lines_of(capfd, "miss", air, "--speed", "1000")  # 1414 m/s / 9.81 m/s² is 144 s
     assert (status, err) == (2, [f"{air}: the shot does not come down within 120 s and 1e+06 m"])
+
+
+def test_engine_whose_bounds_the_shot_leaves_is_named_with_the_reason(capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = lines_of(capfd, "miss", "bounce", "--speed", "1e6", "--angle", "1e-300", "--dt", "1")
+    assert status == 0
+    assert any(line.startswith("box2d: at 1 s: ") for line in out)
+    assert any(line.startswith("pymunk ") for line in out)
