@@ -219,8 +219,43 @@ class Row:
         return self.contacts("phantom")[:MAX_EVENTS]
 
 
+class StudyAgainstTruth(HtmlRepr):
+    """Study of a scene whose errors are measured against its truth: `Comparison` and `Tradeoff`."""
+
+    scene: Scene
+    best: Truth | None
+    """the truth; None if there is none"""
+    doubt: str | None
+    """reason why there is no truth"""
+
+    @property
+    def truth(self) -> str | None:
+        """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
+        return None if self.best is None else self.best.kind
+
+    @property
+    def title(self) -> str:
+        """Title of the scene."""
+        return self.scene.title
+
+    @property
+    def duration(self) -> float:
+        """Duration of the scene, s."""
+        return self.scene.world.duration
+
+    @property
+    def truth_about(self) -> str | None:
+        """Source of the truth, or the reason why there is none."""
+        return self.doubt if self.best is None else self.best.about
+
+    @property
+    def trusted_until(self) -> float | None:
+        """Time up to which errors are measured, s; None if there is no truth."""
+        return None if self.best is None else self.best.trusted_until
+
+
 @dataclass(frozen=True, eq=False)
-class Comparison(HtmlRepr):
+class Comparison(StudyAgainstTruth):
     """Scores of one scene on several engines, or with several values of a setting."""
 
     scene: Scene = field(metadata=in_json(omit=True))
@@ -276,26 +311,6 @@ class Comparison(HtmlRepr):
         return "\n  ".join(lines) + ">"
 
     @property
-    def truth(self) -> str | None:
-        """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
-        return None if self.best is None else self.best.kind
-
-    @property
-    def title(self) -> str:
-        """Title of the scene."""
-        return self.scene.title
-
-    @property
-    def duration(self) -> float:
-        """Duration of the scene, s."""
-        return self.scene.world.duration
-
-    @property
-    def truth_about(self) -> str | None:
-        """Source of the truth, or the reason why there is none."""
-        return self.doubt if self.best is None else self.best.about
-
-    @property
     def truth_confirmed_by(self) -> str | None:
         """Method that confirms the truth."""
         return None if self.best is None else self.best.witness
@@ -304,11 +319,6 @@ class Comparison(HtmlRepr):
     def truth_difference(self) -> float:
         """Distance of a refined truth from the previous halving of dt, m; 0 of the others."""
         return 0.0 if self.best is None else self.best.difference
-
-    @property
-    def trusted_until(self) -> float | None:
-        """Time up to which errors are measured, s; None if there is no truth."""
-        return None if self.best is None else self.best.trusted_until
 
     def sentence(self) -> str:
         """Return a sentence with the kind and source of the truth, its end and the tolerance."""

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, NamedTuple
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
-from sandbox.html_repr import HtmlRepr
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import Metric
+from sandbox.measure.compare.result import StudyAgainstTruth
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
@@ -57,7 +57,7 @@ class Conclusion(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Tradeoff(HtmlRepr):
+class Tradeoff(StudyAgainstTruth):
     """Error and cost of engines and settings for one scene."""
 
     scene: Scene = field(metadata=in_json(omit=True))
@@ -138,31 +138,6 @@ class Tradeoff(HtmlRepr):
         head = f"<Tradeoff {short_repr(self.scene.title)}: {len(self.points):,} settings of {engines or 'no engine'}"
         lines = [f"{head}, {len(self.pareto):,} on the Pareto front; error: {self.metric.name}"]
         return "\n  ".join([*lines, *self.sentences[:MAX_SHOWN]]) + ">"
-
-    @property
-    def truth(self) -> str | None:
-        """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
-        return None if self.best is None else self.best.kind
-
-    @property
-    def title(self) -> str:
-        """Title of the scene."""
-        return self.scene.title
-
-    @property
-    def duration(self) -> float:
-        """Duration of the scene, s."""
-        return self.scene.world.duration
-
-    @property
-    def truth_about(self) -> str | None:
-        """Source of the truth, or the reason why there is none."""
-        return self.doubt if self.best is None else self.best.about
-
-    @property
-    def trusted_until(self) -> float | None:
-        """Time up to which errors are measured, s; None without a truth."""
-        return None if self.best is None else self.best.trusted_until
 
     @property
     def metric_name(self) -> str:
