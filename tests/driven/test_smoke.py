@@ -20,7 +20,7 @@ from sandbox.window.app import EMPTY_VIEW
 from sandbox.window.camera import Camera
 from sandbox.window.mouse import ZOOM_PER_NOTCH
 from sandbox.window.render.palette import BACKGROUND, ORANGE, SKY, WARNING
-from sandbox.window.ui.panel import PANEL_WIDTH
+from sandbox.window.ui.scroll_column import COLUMN_WIDTH
 from sandbox.window.ui.timeline import TIMELINE_HEIGHT
 from tests.driven.driving import LIMIT, SCREEN, SIZE, DrivenWindow, OpenWindow, Shot, command, environment
 from tests.driven.looking import (
@@ -195,11 +195,11 @@ def test_screenshot_file_equals_the_displayed_picture(drive: OpenWindow, tmp_pat
 
 
 def test_scene_is_drawn_run_edited_and_saved(drive: OpenWindow, tmp_path: Path) -> None:
-    camera = Camera.fitting(EMPTY_VIEW, SIZE, inset=PANEL_WIDTH, foot=TIMELINE_HEIGHT)  # of a new scene
+    camera = Camera.fitting(EMPTY_VIEW, SIZE, inset=COLUMN_WIDTH, foot=TIMELINE_HEIGHT)  # of a new scene
 
     def is_drawn(shot: Shot, colour: tuple[int, int, int], area: float) -> bool:
         """Return whether a colour covers about an area, m²; edges and marks cover some of it."""
-        found = count_pixels(shot[:, 60 : SIZE[0] - PANEL_WIDTH], colour)
+        found = count_pixels(shot[:, 60 : SIZE[0] - COLUMN_WIDTH], colour)
         return 0.5 * area * camera.scale**2 < found < 1.6 * area * camera.scale**2
 
     window = drive("play", "--edit")
