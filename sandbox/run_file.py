@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from sandbox.action import Action, Spawn
+from sandbox.action import Action, Spawn, Switch
 from sandbox.arrays import state_hash
 from sandbox.echo import MAX_NAMED, printable, shorten
 from sandbox.resource_limits import CONTACTS, FREE_FRACTION, SESSION_SIZE, TooLargeError, free_memory
@@ -193,7 +193,7 @@ def read_run_file(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
                 stated = _read_info(archive, headers.pop("info"))
                 _check_lengths(lengths, stated)
                 arrays = {name: _read(archive, header) for name, header in headers.items()}
-            _check_contents(arrays, stated.scene)
+            _check_contents(arrays, stated.scene, stated.info)
             _check_completed(arrays, stated)
         except TooLargeError as error:
             raise TooLargeError(f"{path}: {error}") from None
@@ -383,7 +383,7 @@ def _check_lengths(lengths: Mapping[str, int], stated: _Stated) -> None:
         raise ValueError(f"account has {causes:,} causes, but info.causes names {len(info.causes):,}")
 
 
-def _check_contents(arrays: Mapping[str, Array], scene: Scene) -> None:
+def _check_contents(arrays: Mapping[str, Array], scene: Scene, info: Info) -> None:
     """Check the contents of the arrays. States of bodies may be any numbers here, because a run may have diverged.
 
     Raises:
@@ -394,8 +394,11 @@ def _check_contents(arrays: Mapping[str, Array], scene: Scene) -> None:
         times = arrays[name]
         if not (np.isfinite(times).all() and (times >= 0.0).all() and (times[1:] >= times[:-1]).all()):
             raise ValueError(f"{name}: its times do not increase from 0")
+    # Engines that make whole steps only end up to a step after the duration.
+    steps = (each.settings.get("dt") for each in info.actions if isinstance(each, Switch))
+    longest = max([info.settings.dt, *(dt for dt in steps if isinstance(dt, float))])
     end = scene.world.duration * (1.0 + 1e-6)  # rounding
-    if len(time) and time[-1] > end:
+    if len(time) and (time[-1] > end + longest or (time[:-1] > end).any()):
         raise ValueError(f"time ends at {time[-1]:g} s, after the scene's duration of {scene.world.duration:g} s")
     if not (arrays["missed_time"] >= 0.0).all():
         raise ValueError("missed_time: a time is not a number ≥ 0")

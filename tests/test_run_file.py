@@ -380,3 +380,13 @@ def test_run_whose_steps_miss_the_duration_by_rounding_is_loaded(tmp_path: Path)
     found = run(loads(text + "[[ball]]\nposition = [0, 0]\nradius = 1\nvelocity = [1, 0]\n"), "pymunk")
     assert found.time[-1] != 25 * found.info["settings"]["dt"]  # by 4e-16 s
     assert Trajectory.load(found.save(tmp_path / "run.npz")).time[-1] == found.time[-1]
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference", "exact"])
+def test_run_whose_duration_is_no_whole_number_of_steps_is_read_back(engine: str, tmp_path: Path) -> None:
+    """Engines that make whole steps only end up to a step after the duration."""
+    scene = loads("[world]\nduration = 0.0155\n[solver]\ndt = 0.001\n[[ball]]\nposition = [0, 0]\nradius = 0.3\n")
+    found = run(scene, engine)
+    assert found.time[-1] == pytest.approx(0.016 if engine in ("pymunk", "box2d") else 0.0155, rel=1e-12)
+    loaded = Trajectory.load(found.save(tmp_path / "run.npz"))
+    assert loaded.time.tolist() == found.time.tolist()
