@@ -3,7 +3,7 @@
 A session is a scene and its actions. It can be stored, and replayed on the same or another engine.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from typing import Annotated, Any, Literal, Self
 
@@ -357,3 +357,12 @@ def check_speed(speed: float, subject: str) -> None:
     """
     if not speed <= MAX_SPEED:
         raise ActionError(f"{subject}: a speed of {speed:g} m/s is out of range; the limit is {MAX_SPEED:g}")
+
+
+def dt_changes(actions: Iterable[Action]) -> Iterator[tuple[float, float]]:
+    """Yield time and new value of each change of dt, s."""
+    for action in actions:
+        if isinstance(action, Switch):
+            dt = action.settings.get("dt")
+            if isinstance(dt, (int, float)) and dt > 0:  # else the action will be refused
+                yield action.time, float(dt)

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from sandbox.action import Action, Spawn, Switch
+from sandbox.action import Action, Spawn, dt_changes
 from sandbox.arrays import state_hash
 from sandbox.echo import MAX_NAMED, printable, shorten
 from sandbox.resource_limits import CONTACTS, FREE_FRACTION, SESSION_SIZE, TooLargeError, free_memory
@@ -395,8 +395,7 @@ def _check_contents(arrays: Mapping[str, Array], scene: Scene, info: Info) -> No
         if not (np.isfinite(times).all() and (times >= 0.0).all() and (times[1:] >= times[:-1]).all()):
             raise ValueError(f"{name}: its times do not increase from 0")
     # Engines that make whole steps only end up to a step after the duration.
-    steps = (each.settings.get("dt") for each in info.actions if isinstance(each, Switch))
-    longest = max([info.settings.dt, *(dt for dt in steps if isinstance(dt, float))])
+    longest = max([info.settings.dt, *(dt for _, dt in dt_changes(info.actions))])
     end = scene.world.duration * (1.0 + 1e-6)  # rounding
     if len(time) and (time[-1] > end + longest or (time[:-1] > end).any()):
         raise ValueError(f"time ends at {time[-1]:g} s, after the scene's duration of {scene.world.duration:g} s")

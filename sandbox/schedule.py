@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from sandbox.action import Action, Switch
+from sandbox.action import Action, dt_changes
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
@@ -35,7 +35,7 @@ def schedule(duration: float, dt: float, actions: Sequence[Action] = ()) -> list
 
 def _stretches(duration: float, dt: float, actions: Sequence[Action]) -> Iterator[Stretch]:
     begin = 0.0
-    for time, changed in _changes(actions):
+    for time, changed in dt_changes(actions):
         steps = math.ceil((time - begin) / dt - ROUNDING)
         if begin + steps * dt >= duration * (1.0 - ROUNDING):
             break
@@ -51,15 +51,6 @@ def _stretches(duration: float, dt: float, actions: Sequence[Action]) -> Iterato
         yield Stretch(whole, dt)
     else:
         yield Stretch(math.floor(steps_left), dt, steps_left - math.floor(steps_left))
-
-
-def _changes(actions: Sequence[Action]) -> Iterator[tuple[float, float]]:
-    """Yield when dt changes, and to what."""
-    for action in actions:
-        if isinstance(action, Switch):
-            dt = action.settings.get("dt")
-            if isinstance(dt, (int, float)) and dt > 0:  # else the action will be refused
-                yield action.time, float(dt)
 
 
 def frame_count(scene: Scene, settings: Settings, actions: Sequence[Action] = ()) -> tuple[int, float]:

@@ -159,7 +159,7 @@ class _Refinement:
         """Make the first run; None if it does not reach its end.
 
         Raises:
-            RunTimeoutError: it costs more than a fifth of `COST_LIMIT`.
+            RunTimeoutError: the run exceeds a fifth of `COST_LIMIT`.
         """
         first, _ = bounded_run(scene, engine, settings, COST_LIMIT / 5.0, audit=False)
         if first.status != "ok":
@@ -173,7 +173,7 @@ class _Refinement:
         """Make a run with half the step; return the reason why it is the last one, or None.
 
         Raises:
-            RunTimeoutError: it costs more than what is left.
+            RunTimeoutError: the run exceeds the remaining cost.
         """
         scene, finer, work = self.scene, halve_step(self.settings), 2 * self.step_work
         if self.halvings == MAX_HALVINGS:

@@ -41,9 +41,9 @@ CHUNK = 1 << 14
 class _Encounters(NamedTuple):
     """Intervals, slender bodies and other bodies, (K,) each."""
 
-    when: IntArray
-    body: IntArray
-    other: IntArray
+    when: IntArray = np.empty(0, np.int64)
+    body: IntArray = np.empty(0, np.int64)
+    other: IntArray = np.empty(0, np.int64)
 
     def some(self, which: BoolArray | slice) -> "_Encounters":
         return _Encounters(self.when[which], self.body[which], self.other[which])
@@ -90,7 +90,7 @@ class _Passages:
 
     def find(self, can_collide: CanCollide) -> _Encounters:
         """Return the passages."""
-        found = [_Encounters(*np.empty((3, 0), np.int64))]
+        found = [_Encounters()]
         pending, count = list[_Encounters](), 0
         for when in range(len(self._run.time) - 1):
             near = self._near(when)
@@ -109,7 +109,7 @@ class _Passages:
         position, move = run.position[when], run.position[when + 1] - run.position[when]
         present = np.isfinite(move).all(axis=1)
         if not present.any():
-            return _Encounters(*np.empty((3, 0), np.int64))
+            return _Encounters()
         move -= np.median(move[present], axis=0)  # bodies that fall together do not meet
         path = np.where(present, np.hypot(move[:, 0], move[:, 1]), 0.0)
         turn = np.abs(run.angle[when + 1, slender] - run.angle[when, slender])

@@ -122,10 +122,9 @@ class TrialRun:
         if (colliding & ~bodies.fixed & (bodies.core <= 0.0)).any():
             return True
         slender = colliding & is_slender(bodies)
-        if not slender.any():
-            return False
         turn = np.abs(np.diff(run.angle[:, slender], axis=0))
-        return bool(run.info["settings"]["record_every"] > 1) or bool((turn > MAX_TURN).any())
+        is_sparse = run.info["settings"]["record_every"] > 1
+        return bool(slender.any() and (is_sparse or (turn > MAX_TURN).any()))
 
     def findings(self) -> Iterator[Diagnostic]:
         """Yield a diagnostic for each problem that occurred."""

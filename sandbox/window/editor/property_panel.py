@@ -377,8 +377,8 @@ class PropertyPanel(ScrollColumn):
         self._editing.is_touched = self._is_dirty = True
         return True
 
-    def _turn_wheel(self, notches: int, pointer: tuple[int, int]) -> None:
-        super()._turn_wheel(notches, pointer)
+    def _turn_wheel(self, notches: int) -> None:
+        super()._turn_wheel(notches)
         self._update_hover()
 
     def _press(self, button: int, at: tuple[int, int]) -> None:
@@ -447,10 +447,12 @@ class PropertyPanel(ScrollColumn):
 
     # Drawing
 
-    def _hint(self, pointer: tuple[int, int]) -> str:
+    def _hint(self) -> str:
         """Return the tooltip: at a label the description, after a truncated key; at a truncated value the whole."""
-        row_id = self._hovered
+        row_id, pointer = self._hovered, self._pointer
         item = None if row_id is None else self._item_of(row_id)
+        if pointer is None:
+            return ""
         if item is not None and self._is_on_button(item, pointer):
             is_add = item.section.button == "add"
             return f"add a {item.section.key}" if is_add else f"remove {item.section.title}"

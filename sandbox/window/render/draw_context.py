@@ -87,7 +87,7 @@ class GameView:
     these methods that does not derive from this one is a view too; it may lack `hud`.
     """
 
-    def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002
+    def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002, views that draw it use it
         """Draw ground and static bodies on an empty surface; return False to use the default drawing.
 
         The surface is cached until the scene or the camera changes. `ctx` contains no bodies.
@@ -97,7 +97,7 @@ class GameView:
     def below(self, ctx: DrawContext) -> None:
         """Draw the layer below the bodies."""
 
-    def bodies(self, ctx: DrawContext) -> IntArray:  # noqa: ARG002
+    def bodies(self, ctx: DrawContext) -> IntArray:  # noqa: ARG002, views that draw some use it
         """Draw some bodies; return their indices, which the renderer then skips."""
         return np.empty(0, np.int64)
 

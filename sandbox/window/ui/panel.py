@@ -276,11 +276,13 @@ class SidePanel(ScrollColumn):
             widget.handle_event(moved)
         self._report_events()
 
-    def _turn_wheel(self, notches: int, pointer: tuple[int, int]) -> None:
+    def _turn_wheel(self, notches: int) -> None:
         """Change the parameter under the pointer, or scroll."""
         self.used = self._is_dirty = True
+        assert self._pointer is not None
+        pointer = self._pointer
         if notches and not any(widget.scroll(notches, pointer) for widget in self._parameter_widgets.values()):
-            super()._turn_wheel(notches, pointer)
+            super()._turn_wheel(notches)
         self._report_events()
 
     def _report_events(self) -> None:
@@ -322,7 +324,7 @@ class SidePanel(ScrollColumn):
             if widget.rect.bottom >= -40 * ui_scale and widget.rect.top <= self.size[1] + 40 * ui_scale:
                 widget.draw()
 
-    def _hint(self, pointer: tuple[int, int]) -> str:  # noqa: ARG002
+    def _hint(self) -> str:
         """Return the tooltip of the widget under the pointer; empty without one."""
         return next((widget.hint for widget in self.widgets if widget.hovered and widget.hint), "")
 

@@ -75,7 +75,7 @@ class ScrollColumn:
                 self.release()
             return False
         if event.type == pygame.MOUSEWHEEL and self._pointer is not None:
-            self._turn_wheel(int(event.y), self._pointer)
+            self._turn_wheel(int(event.y))
             return True
         if event.type not in (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
             return False
@@ -97,7 +97,8 @@ class ScrollColumn:
     def _handle_mouse(self, event: pygame.event.Event, at: tuple[int, int], is_ours: bool) -> None:
         """Process a mouse event at a position; `is_ours` is false for events that belong to the scene view."""
 
-    def _turn_wheel(self, notches: int, pointer: tuple[int, int]) -> None:  # noqa: ARG002
+    def _turn_wheel(self, notches: int) -> None:
+        """Scroll."""
         self._scroll_to(self._scroll - round(notches * SCROLL_STEP * self.ui_scale))
 
     def release(self) -> None:
@@ -114,12 +115,12 @@ class ScrollColumn:
             self._draw_sheet()
         surface.blit(self._sheet, (self.column_left, 0))
         if self._pointer is not None and not self._pressed:
-            hint = self._hint(self._pointer)
+            hint = self._hint()
             if hint:
                 draw_hint(surface, hint, (self.column_left + self._pointer[0], self._pointer[1]), self.ui_scale)
 
-    def _hint(self, pointer: tuple[int, int]) -> str:  # noqa: ARG002
-        """Return the tooltip at a position; empty without one."""
+    def _hint(self) -> str:
+        """Return the tooltip of what is under the pointer; empty without one."""
         return ""
 
     def _draw_sheet(self) -> None:
