@@ -33,7 +33,6 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 from sandbox.batch.executors import (
     AnyTask,
@@ -58,7 +57,6 @@ from sandbox.batch.job import (
     with_earlier_audit,
 )
 from sandbox.batch.plan import Plan, PlannedRun
-from sandbox.batch.run_row import RunRow
 from sandbox.batch.store import Store, StoreError
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
@@ -90,21 +88,6 @@ class JobError(Exception):
     def __init__(self, label: str, error: Exception) -> None:
         super().__init__(f"{label}: {error}")
         self.label, self.error = label, error
-
-
-@dataclass(frozen=True)
-class Result:
-    """A completed run of the plan."""
-
-    index: int
-    """in the order of the plan, from 0"""
-    record: RunRecord
-    options: RunOptions
-
-    @cached_property
-    def row(self) -> RunRow:
-        """Figures of the run; made when they are first asked for, which takes as long as storing a row."""
-        return self.record.row(self.options.final, self.options.ledger)
 
 
 @dataclass
@@ -163,7 +146,7 @@ class Driver:
         executor: Executor,
         options: RunOptions,
         store: Store | None,
-        done: Callable[[Result], None],
+        done: Callable[[int, RunRecord], None],
         started: Callable[[str], None] = lambda _: None,
         faulty: Callable[[SceneError], None] | None = None,
         computed: Callable[[str, str], None] = lambda _label, _engine: None,
@@ -330,7 +313,7 @@ class Driver:
 
     def _report(self, run: _Run, record: RunRecord) -> None:
         """Report a run that is done."""
-        self._done(Result(run.index, record, self._options))
+        self._done(run.index, record)
 
     def _handle(self, future: "Future[tuple[JobOutcome, ...]]") -> None:
         """Store the outcomes of a task, and queue what was lost again."""

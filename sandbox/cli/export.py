@@ -13,7 +13,7 @@ from sandbox.atomic_write import atomic_write
 from sandbox.batch.find_run import find_run, read_run
 from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows
 from sandbox.cli.export_options import TABLES, Options, check_options, check_times
-from sandbox.cli.options import json_option, quiet_option, set_option
+from sandbox.cli.options import json_option, quiet_option, set_option, takes
 from sandbox.cli.progress import ProgressBars, progress_bars
 from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
@@ -58,7 +58,8 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="replace an existing .py or .toml")
 @json_option
 @quiet_option("print no file names and no progress")
-def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
+@takes(Options)
+def export_command(options: Options) -> int:
     """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png; or a scene as .py or .toml.
 
     RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json). With --runs it is a folder with any
@@ -66,14 +67,13 @@ def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
     is a program that needs only pymunk, with make_space() and step() to use in a game, which computes the same states
     as the engine pymunk.
     """
-    options = Options(**given)
-    faults: list[Fault] = []
+    run, faults = options.run, list[Fault]()
     with collect_errors(faults):
         check_options(options)
     if options.has_program:
-        return _export_program(run, options, faults, as_json, quiet)
+        return _export_program(options, faults)
     if options.runs:
-        return _export_runs(run, options, faults, as_json, quiet)
+        return _export_runs(options, faults)
     source: Trajectory | Recording | None = None
     with collect_errors(faults):
         source = read_run(find_run(run), run)
@@ -82,12 +82,12 @@ def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
         with collect_errors(faults):
             check_times(options, end)
     if source is None or faults:
-        return exit_with_errors(faults, as_json, run=run, files=[])
+        return exit_with_errors(faults, options.as_json, run=run, files=[])
 
     files: list[dict[str, Any]] = []
     status = 0
     try:
-        with collect_errors(faults), progress_bars(quiet or as_json) as bars:
+        with collect_errors(faults), progress_bars(options.is_silent) as bars:
             status, trajectory = _trajectory(run, source, bars)
             if len(trajectory.time):
                 _export(run, options, trajectory, files, bars)
@@ -103,30 +103,28 @@ def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
         click.echo(str(fault), err=True)
     remarks = remarks_on(source) if isinstance(source, Recording) else ()
     report_remarks(run, remarks)
-    _print_files(run, files, faults, as_json, quiet, remarks)
+    _print_files(options, files, faults, remarks)
     return 2 if faults else status
 
 
 def _print_files(
-    run: str,
+    options: Options,
     files: list[dict[str, Any]],
     faults: list[Fault],
-    as_json: bool,
-    quiet: bool,
     remarks: Sequence[str] = (),
 ) -> None:
-    if as_json:
+    if options.as_json:
         more: dict[str, Any] = {"faults": fault_rows(faults)} if faults else {}
-        print_json({"run": run, "files": files} | more | ({"remarks": remarks} if remarks else {}))
-    elif not quiet:
+        print_json({"run": options.run, "files": files} | more | ({"remarks": remarks} if remarks else {}))
+    elif not options.quiet:
         for file in files:
             counts = [format_plural(file[f"{noun}s"], noun) for noun in ("row", "frame", "line") if f"{noun}s" in file]
             click.echo(f"written: {file['path']} ({counts[0]})")
 
 
-def _export_program(name: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
+def _export_program(options: Options, faults: list[Fault]) -> int:
     """Write a scene as a program or as TOML, and return the exit status."""
-    texts: dict[str, str] = {}
+    name, texts = options.run, dict[str, str]()
     remarks: tuple[str, ...] = ()
     divided: tuple[str, ...] = ()
     with collect_errors(faults):
@@ -138,7 +136,7 @@ def _export_program(name: str, options: Options, faults: list[Fault], as_json: b
                 else:
                     texts[kind] = dumps(scene)
     if faults:
-        return exit_with_errors(faults, as_json, run=name, files=[])
+        return exit_with_errors(faults, options.as_json, run=name, files=[])
     files: list[dict[str, Any]] = []
     for target in options.targets:
         kind = Path(target).suffix.lower()
@@ -154,8 +152,8 @@ def _export_program(name: str, options: Options, faults: list[Fault], as_json: b
             if divided and kind == ".py":
                 files[-1]["divided_walls"] = list(divided)
     report_remarks(name, remarks)
-    _print_files(name, files, faults, as_json, quiet, remarks)
-    if files and divided and not as_json and not quiet:
+    _print_files(options, files, faults, remarks)
+    if files and divided and not options.is_silent:
         click.echo(f"note: {_note_of_division(divided)}")
     return 2 if faults else 0
 
@@ -195,13 +193,14 @@ def _program_text(name: str, scene: "Scene") -> tuple[str, tuple[str, ...]]:
     return program_text(scene, view=view, step_reason=reason, warnings=warnings, note=note), divided
 
 
-def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bool, quiet: bool) -> int:
+def _export_runs(options: Options, faults: list[Fault]) -> int:
     """Write a table of all runs of a folder, and return the exit status."""
     from sandbox.batch.query import open_store
     from sandbox.batch.store import StoreError
 
+    folder = options.run
     if faults:
-        return exit_with_errors(faults, as_json, run=folder, files=[])
+        return exit_with_errors(faults, options.as_json, run=folder, files=[])
     files: list[dict[str, Any]] = []
     with collect_errors(faults, folder, (StoreError,)), open_store(folder) as runs:
         if not len(runs):
@@ -217,7 +216,7 @@ def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bo
     faults = [replace(fault, message=fault.message.removeprefix(f"{folder}: ")) for fault in faults]
     for fault in faults:
         click.echo(str(fault), err=True)
-    _print_files(folder, files, faults, as_json, quiet)
+    _print_files(options, files, faults)
     return 2 if faults else 0
 
 

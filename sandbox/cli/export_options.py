@@ -6,6 +6,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from sandbox.cli.common import reasons_not_writable
+from sandbox.cli.options import OutputOptions
 from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.window.playback.snapshot import OVERLAYS
@@ -23,10 +24,12 @@ MAX_FRAMES = 1_000_000
 """Largest number of frames of a film: nine hours at 30 frames/s."""
 
 
-@dataclass(frozen=True)
-class Options:
+@dataclass(frozen=True, kw_only=True)
+class Options(OutputOptions):
     """The command line as typed; None for an option that was left out."""
 
+    run: str
+    """stored run, its folder, session or scene"""
     targets: tuple[str, ...]
     contacts: bool = False
     runs: bool = False

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from sandbox.action import Spawn
-from sandbox.batch.driver import Driver, JobError, Result
+from sandbox.batch.driver import Driver, JobError
 from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor
 from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
 from sandbox.batch.plan import Plan
@@ -303,13 +303,13 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
     if batch.is_large and options.as_json:
         batch.spool = JsonSpool()
     is_chosen = options.engines is not None
-    compiled: set[tuple[str, str]] = set()
+    run_options, compiled = _run_options(batch, options), set[tuple[str, str]]()
     try:
         with RunMonitor(batch.count, options.is_silent) as monitor:
 
-            def done(result: Result) -> None:
-                record, stored = result.record, result.record.stored
-                batch.add(result, is_chosen)
+            def done(index: int, record: RunRecord) -> None:
+                stored = record.stored
+                batch.add(index, record, run_options, is_chosen)
                 name = _name(record.label, stored.engine, dict(record.values))
                 monitor.add(name, seconds=stored.seconds, is_ok=stored.status == "ok", is_stored=record.repeated)
 
@@ -318,7 +318,7 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
                 batch.plan,
                 batch.count,
                 executor,
-                _run_options(batch, options),
+                run_options,
                 store,
                 done,
                 monitor.start,

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import click
 
-from sandbox.batch.driver import Result
-from sandbox.batch.job import RunRecord
+from sandbox.batch.job import RunOptions, RunRecord
 from sandbox.batch.plan import Plan
 from sandbox.batch.run_row import RunRow
 from sandbox.batch.study import Study
@@ -62,13 +61,12 @@ class RunBatch:
         """Number of completed runs."""
         return self.statuses.total()
 
-    def add(self, result: Result, is_engine_chosen: bool) -> None:
-        """Add a completed run."""
-        index, record = result.index, result.record
+    def add(self, index: int, record: RunRecord, options: RunOptions, is_engine_chosen: bool) -> None:
+        """Add a completed run, by its index in the plan."""
         self.statuses[record.stored.status] += 1
         if self.is_large and self.spool is None and record.is_plain:
             return
-        row = result.row
+        row = record.row(options.final, options.ledger)  # takes as long as storing it
         if len(self.warnings) < MAX_PROBLEMS:
             # Of runs that differ in their seeds or values only, each warning is printed once.
             self.warnings |= dict.fromkeys(f"{row.scene}: {each}" for each in row.warnings)

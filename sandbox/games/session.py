@@ -156,7 +156,7 @@ class GameSession:
         self.step_info, self._done = StepInfo(time, frame, contacts, tuple(self._done)), []
         return () if self.rules.game_over is not None else _timed(self.rules.on_step(self.step_info), time)
 
-    def press(self, time: float, control: str, value: float) -> tuple[Action, ...]:
+    def record_input(self, time: float, control: str, value: float) -> tuple[Action, ...]:
         """Set a control now, and return the actions that result; inputs after now are discarded."""
         if self.rules.game_over is not None:
             return ()
@@ -247,7 +247,7 @@ class HeadlessGame:
         pressed: list[Action] = []
         if not last and session.rules.game_over is None and session.step_info is not None:
             for control, value in policy.decide(session.step_info, session.rules):
-                pressed += session.press(time, control, value)
+                pressed += session.record_input(time, control, value)
         played = [*pressed, *given]
         session.note_actions(played)
         return [*own, *played]
@@ -318,13 +318,13 @@ class SteppedGame:
             self._frame = self.simulation.frame()
         return self._frame
 
-    def press(self, control: str, value: float) -> None:
+    def set_control(self, control: str, value: float) -> None:
         """Set a control, and apply the actions that result.
 
         Raises:
             ActionError: an action is invalid.
         """
-        self.act(self.session.press(self.time, control, value))
+        self.act(self.session.record_input(self.time, control, value))
 
     def act(self, actions: Sequence[Action]) -> None:
         """Apply actions of the player.

@@ -126,7 +126,7 @@ class GameHost:
             sources[source] = value
         now = max(sources.values(), default=0.0)
         if now != before:
-            self.press(control, now)
+            self.set_control(control, now)
 
     def apply(self, action: Action) -> None:
         """Apply an action of the player.
@@ -137,7 +137,7 @@ class GameHost:
         self.touched = True
         self.live.apply(action)
 
-    def press(self, control: str, value: float) -> None:
+    def set_control(self, control: str, value: float) -> None:
         """Set a control to a value, 0 to 1.
 
         Raises:
@@ -146,11 +146,11 @@ class GameHost:
         self.touched = True
         game = self.live.session.game
         past = game is not None and bool(game.future_presses)
-        self.live.press(control, value)
+        self.live.apply_input(control, value)
         if past:  # releases in the discarded future are applied now, except for controls that are held
             for name in self._pressed():
                 if not self._held[name] and name != control:
-                    self.live.press(name, 0.0)
+                    self.live.apply_input(name, 0.0)
 
     def _pressed(self) -> list[str]:
         """Return the names of the controls that are held according to the input log."""

@@ -3,11 +3,12 @@
 import random
 from collections.abc import Callable
 from concurrent.futures import Future
+from operator import itemgetter
 from pathlib import Path
 
 import pytest
 
-from sandbox.batch.driver import ATTEMPTS, Driver, JobError, Result
+from sandbox.batch.driver import ATTEMPTS, Driver, JobError
 from sandbox.batch.executors import (
     ExecutorError,
     JobFailure,
@@ -17,7 +18,7 @@ from sandbox.batch.executors import (
     VersionMismatchError,
     run_task,
 )
-from sandbox.batch.job import CompletedRun, RunOptions, failed_run
+from sandbox.batch.job import CompletedRun, RunOptions, RunRecord, failed_run
 from sandbox.batch.plan import Plan
 from sandbox.batch.store import Store
 from sandbox.batch.sweep import SweepAxis, parse_sweep
@@ -73,13 +74,13 @@ def plan(tmp_path: Path) -> Callable[[int], Plan]:
 
 def driven(
     plan: Plan, executor: ScriptedExecutor, store: Store | None = None, options: RunOptions = DEFAULT
-) -> list[Result]:
+) -> list[RunRecord]:
     """Run a plan, check that each of its runs is reported once, and return the results in the order of the plan."""
-    found: list[Result] = []
-    Driver(plan, len(plan), executor, options, store, found.append).run()
-    assert sorted(result.index for result in found) == list(range(len(plan)))
+    found: list[tuple[int, RunRecord]] = []
+    Driver(plan, len(plan), executor, options, store, lambda *each: found.append(each)).run()
+    assert sorted(index for index, _ in found) == list(range(len(plan)))
     assert executor.is_shut_down
-    return sorted(found, key=lambda result: result.index)
+    return [record for _, record in sorted(found, key=itemgetter(0))]
 
 
 def quick(task: RunTask) -> tuple[JobOutcome, ...]:
@@ -120,14 +121,14 @@ def test_lost_job_is_tried_again_and_then_recorded_as_failed(plan: Callable[[int
     executor = ScriptedExecutor(answer)
     with Store(tmp_path / "runs") as store:
         results = driven(plan(9), executor, store)
-        assert [result.row.status for result in results] == ["ok", "ok", "failed", *["ok"] * 6]
-        reason = results[2].row.reason or ""
+        assert [result.row().status for result in results] == ["ok", "ok", "failed", *["ok"] * 6]
+        reason = results[2].row().reason or ""
         assert reason.startswith(f"the process was killed by SIGKILL, in the last of {ATTEMPTS} attempts")
         assert len(store.rows()) == 9
         assert sum(any(mass_of(task, k) == 3.0 for k in range(len(task.jobs))) for task in executor.tasks) == ATTEMPTS
         again = driven(plan(9), ScriptedExecutor(run_task), store)  # only the failed one is made again
-        assert [result.row.repeated for result in again] == [True, True, False, *[True] * 6]
-        assert {result.row.status for result in again} == {"ok"}
+        assert [result.row().repeated for result in again] == [True, True, False, *[True] * 6]
+        assert {result.row().status for result in again} == {"ok"}
 
 
 def test_job_that_hangs_is_recorded_as_failed_at_once(plan: Callable[[int], Plan]) -> None:
@@ -138,7 +139,7 @@ def test_job_that_hangs_is_recorded_as_failed_at_once(plan: Callable[[int], Plan
 
     executor = ScriptedExecutor(answer)
     results = driven(plan(4), executor, options=RunOptions(time_limit=1.0))
-    assert results[2].row.reason == "stopped at the time limit of 1 s"
+    assert results[2].row().reason == "stopped at the time limit of 1 s"
     assert len(executor.tasks) == 4
 
 
@@ -152,8 +153,8 @@ def test_group_that_is_lost_is_divided_to_find_the_job_at_fault(plan: Callable[[
 
     executor = ScriptedExecutor(answer)
     results = driven(plan(100), executor)
-    assert [k for k, result in enumerate(results) if result.row.reason != "not run"] == [76]
-    assert results[76].row.reason == "the workers that ran it died"
+    assert [k for k, result in enumerate(results) if result.row().reason != "not run"] == [76]
+    assert results[76].row().reason == "the workers that ran it died"
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -186,7 +187,7 @@ def test_worker_that_cannot_run_anything_ends_the_batch(error, message, plan):
 
     executor = ScriptedExecutor(fail)
     with pytest.raises(ExecutorError, match=message):
-        Driver(plan(3), 3, executor, RunOptions(), None, lambda _: None).run()
+        Driver(plan(3), 3, executor, RunOptions(), None, lambda *_: None).run()
     assert executor.is_shut_down
 
 
@@ -194,14 +195,14 @@ def test_job_with_faults_ends_the_batch(plan: Callable[[int], Plan]) -> None:
     error = SceneError([Fault("a.toml", 1, "b", "c")])
     executor = ScriptedExecutor(lambda _: (JobFailure("a.toml:1: b: c", error),))
     with pytest.raises(JobError, match=r"scene: a\.toml:1: b: c"):
-        Driver(plan(3), 3, executor, RunOptions(), None, lambda _: None).run()
+        Driver(plan(3), 3, executor, RunOptions(), None, lambda *_: None).run()
 
 
 def test_interrupt_keeps_what_is_complete_and_shuts_the_executor_down(plan, tmp_path):
-    found: list[Result] = []
+    found: list[RunRecord] = []
 
-    def interrupt(result: Result) -> None:
-        found.append(result)
+    def interrupt(_index: int, record: RunRecord) -> None:
+        found.append(record)
         if len(found) == 3:
             raise KeyboardInterrupt
 
@@ -210,18 +211,18 @@ def test_interrupt_keeps_what_is_complete_and_shuts_the_executor_down(plan, tmp_
         with pytest.raises(KeyboardInterrupt):
             Driver(plan(9), 9, executor, RunOptions(), store, interrupt).run()
         assert executor.is_shut_down
-        assert {row.id for row in store.rows()} == {result.row.id for result in found}
-        assert sum(result.row.repeated for result in driven(plan(9), ScriptedExecutor(run_task), store)) == 3
+        assert {row.id for row in store.rows()} == {result.row().id for result in found}
+        assert sum(result.row().repeated for result in driven(plan(9), ScriptedExecutor(run_task), store)) == 3
 
 
 def test_scene_with_faults_that_was_not_checked_is_reported_and_left_out(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(SCENE)
     unchecked = Plan([("scene", str(path))], ["pymunk"], (), [SweepAxis.of(*parse_sweep("ball.a.mass=1,-1,2"))])
-    results: list[Result] = []
+    found: dict[int, RunRecord] = {}
     faults: list[SceneError] = []
-    Driver(unchecked, 3, ScriptedExecutor(quick), RunOptions(), None, results.append, faulty=faults.append).run()
-    assert sorted(result.index for result in results) == [0, 2]
+    Driver(unchecked, 3, ScriptedExecutor(quick), RunOptions(), None, found.__setitem__, faulty=faults.append).run()
+    assert sorted(found) == [0, 2]
     assert "is -1" in str(faults[0])
 
 
@@ -230,9 +231,9 @@ def test_audit_of_a_stored_run_is_kept_when_the_run_is_replaced(plan: Callable[[
     with Store(tmp_path / "runs") as store:
         driven(plan(2), ScriptedExecutor(run_task), store)
         results = driven(plan(4), ScriptedExecutor(run_task), store, RunOptions(audit=False, ledger=True))
-        assert [result.row.repeated for result in results] == [False] * 4
-        assert [result.row.missed_contacts for result in results] == [0, 0, None, None]
-        assert all(result.row.repeated for result in driven(plan(4), ScriptedExecutor(run_task), store, without))
+        assert [result.row().repeated for result in results] == [False] * 4
+        assert [result.row().missed_contacts for result in results] == [0, 0, None, None]
+        assert all(result.row().repeated for result in driven(plan(4), ScriptedExecutor(run_task), store, without))
 
 
 def test_equal_runs_of_a_plan_are_made_once(tmp_path: Path) -> None:
@@ -245,7 +246,7 @@ def test_equal_runs_of_a_plan_are_made_once(tmp_path: Path) -> None:
     executor = ScriptedExecutor(run_task, slots=8)
     with Store(tmp_path / "runs") as store:
         results = driven(planned, executor, store)
-        assert [result.row.scene for result in results] == ["one", "one", "other", "other", "third", "third"]
-        assert [result.row.repeated for result in results] == [False, False, True, True, True, True]
-        assert len({result.row.id for result in results}) == len(store.rows()) == 2
+        assert [result.row().scene for result in results] == ["one", "one", "other", "other", "third", "third"]
+        assert [result.row().repeated for result in results] == [False, False, True, True, True, True]
+        assert len({result.row().id for result in results}) == len(store.rows()) == 2
     assert sum(len(task.jobs) for task in executor.tasks) == 2

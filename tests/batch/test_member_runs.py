@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,9 @@ from hypothesis import strategies as st
 import sandbox
 from sandbox.arrays import BoolArray
 from sandbox.batch import member_runs
-from sandbox.batch.driver import MAX_MEMBERS, Driver, Result
+from sandbox.batch.driver import MAX_MEMBERS, Driver
 from sandbox.batch.executors import AnyTask, InProcessExecutor, JobOutcome, TaskLostError, run_task
-from sandbox.batch.job import CompletedRun, RunOptions
+from sandbox.batch.job import CompletedRun, RunOptions, RunRecord
 from sandbox.batch.member_runs import MemberTask
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
@@ -72,18 +73,18 @@ def scene(tmp_path: Path) -> Path:
 
 def driven(
     plan: Plan, store: Store | None, executor: Any = None, options: RunOptions = END
-) -> tuple[list[Result], set[str]]:
+) -> tuple[list[RunRecord], set[str]]:
     """Run a plan; return the results in its order, and the engines that computed members."""
-    found: list[Result] = []
+    found: list[tuple[int, RunRecord]] = []
     computed: set[str] = set()
     executor = executor or InProcessExecutor()
 
     def note(_label: str, engine: str) -> None:
         computed.add(engine)
 
-    Driver(plan, len(plan), executor, options, store, found.append, computed=note).run()
-    assert sorted(result.index for result in found) == list(range(len(plan)))
-    return sorted(found, key=lambda result: result.index), computed
+    Driver(plan, len(plan), executor, options, store, lambda *each: found.append(each), computed=note).run()
+    assert sorted(index for index, _ in found) == list(range(len(plan)))
+    return [record for _, record in sorted(found, key=itemgetter(0))], computed
 
 
 def outcome(row: StoredRun) -> StoredRun:
@@ -101,8 +102,8 @@ def test_rows_are_those_of_ordinary_runs(scene: Path, tmp_path: Path, workers: i
     ordinary, none = driven(plan_of(scene, engines, sweeps, 12, keeps_ends=False), stores[1])
     assert (computed, none) == ({"exact", "reference"}, set())
     assert len(members) == 3 * 2 * 12 * 3
-    assert [result.row.id for result in members] == [result.row.id for result in ordinary]
-    assert [result.row.set for result in members] == [result.row.set for result in ordinary]
+    assert [result.row().id for result in members] == [result.row().id for result in ordinary]
+    assert [result.row().set for result in members] == [result.row().set for result in ordinary]
     rows = [sorted((outcome(row) for row in store.rows()), key=lambda row: row.id) for store in stores]
     assert rows[0] == rows[1]
     assert {row.contacts for row in rows[0]} == {None}
@@ -115,14 +116,14 @@ def test_resume_makes_the_missing_runs_only(scene: Path, tmp_path: Path) -> None
     with Store(tmp_path / "runs") as store:
         driven(plan_of(scene, ["exact"], [], 10), store)
         results, _ = driven(plan_of(scene, ["exact"], [], 30), store)
-        assert [result.record.repeated for result in results] == [True] * 10 + [False] * 20
+        assert [result.repeated for result in results] == [True] * 10 + [False] * 20
         assert len(store.rows()) == 30
         more, _ = driven(
             plan_of(scene, ["exact"], [], 30, keeps_ends=False), store, options=replace(END, keep="summary")
         )
-        assert not any(result.record.repeated for result in more)  # contacts are wanted now
+        assert not any(result.repeated for result in more)  # contacts are wanted now
         again, _ = driven(plan_of(scene, ["exact"], [], 30), store)
-        assert all(result.record.repeated for result in again)
+        assert all(result.repeated for result in again)
         assert {row.contacts is None for row in store.rows()} == {False}
 
 
@@ -130,7 +131,7 @@ def test_starts_that_an_engine_refuses_are_ordinary_runs(scene: Path, tmp_path: 
     sweeps = ["ball.a.position=[0,0.3],[0.1,0.3],[0.5,0.2],[0,0.4]"]  # the third is inside a ball of the grid
     plan = plan_of(scene, ["exact"], sweeps, 9)
     results, computed = driven(plan, None)
-    statuses = [result.row.status for result in results]
+    statuses = [result.row().status for result in results]
     assert statuses == (["ok"] * 18 + ["refused"] * 9 + ["ok"] * 9)
     assert computed == {"exact"}
 
@@ -139,8 +140,8 @@ def test_faults_of_scenes_that_were_not_checked_are_reported(scene: Path) -> Non
     values = ",".join(f"[{k},0.3]" for k in range(1200)) + ",[0,-2000]"
     plan = plan_of(scene, ["exact"], [f"ball.a.position={values}"])
     faults: list[SceneError] = []
-    results: list[Result] = []
-    Driver(plan, 1201, InProcessExecutor(), END, None, results.append, faulty=faults.append).run()
+    results: dict[int, RunRecord] = {}
+    Driver(plan, 1201, InProcessExecutor(), END, None, results.__setitem__, faulty=faults.append).run()
     assert len(results) == 1200
     assert "behind the plane" in str(faults[0].faults[0])
 
@@ -154,7 +155,7 @@ def test_members_of_a_lost_task_are_run_again(scene: Path, tmp_path: Path) -> No
     executor = ScriptedExecutor(answer)
     with Store(tmp_path / "runs") as store:
         results, _ = driven(plan_of(scene, ["exact"], [], 40), store, executor)
-        assert [result.row.status for result in results] == ["ok"] * 40
+        assert [result.row().status for result in results] == ["ok"] * 40
         assert len(store.rows()) == 40
     assert sum(isinstance(task, MemberTask) for task in executor.tasks) == 2
 

@@ -65,7 +65,7 @@ def sweeping(milliseconds: int, runs: int) -> Timed:
         times: list[float] = []
         with _planned(scene, runs) as (plan, folder), Store(folder) as store:
             executor = ProcessExecutor(WORKERS)
-            Driver(plan, runs, executor, SUMMARY, store, lambda _: times.append(time.perf_counter())).run()
+            Driver(plan, runs, executor, SUMMARY, store, lambda *_: times.append(time.perf_counter())).run()
         return _latest(times)
 
     return work
@@ -124,7 +124,7 @@ def seed_sweep(engine: str, runs: int, *, keeps_ends: bool) -> Timed:
     def work() -> float:
         times: list[float] = []
         with _planned(scene, runs, engine, keeps_ends) as (plan, folder), Store(folder) as store:
-            note = lambda _result: times.append(time.perf_counter())  # noqa: E731
+            note = lambda _index, _record: times.append(time.perf_counter())  # noqa: E731
             Driver(plan, runs, ProcessExecutor(WORKERS), options, store, note).run()
         return _latest(times) / (runs * MEASURED)
 
@@ -171,7 +171,7 @@ def storing(milliseconds: int, runs: int) -> Timed:
         times: list[float] = []
         with _planned(scene, runs) as (plan, folder), Store(folder) as store:
             driver = Driver(
-                plan, runs, InProcessExecutor(), SUMMARY, store, lambda _: times.append(time.perf_counter())
+                plan, runs, InProcessExecutor(), SUMMARY, store, lambda *_: times.append(time.perf_counter())
             )
             driver.run()
         return _latest(times)
@@ -204,7 +204,7 @@ def resuming(runs: int) -> tuple[Timed, Timed]:
         plan = Plan([("scene", str(path))], ["pymunk"], seeds=runs)
         with Store(Path(folder.name) / "runs") as store:
             plan.check(store.has_planned)
-            Driver(plan, runs, InProcessExecutor(), SUMMARY, store, lambda _: None).run()
+            Driver(plan, runs, InProcessExecutor(), SUMMARY, store, lambda *_: None).run()
 
     def read() -> None:
         with Store(Path(folder.name) / "runs") as store:

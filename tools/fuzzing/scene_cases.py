@@ -324,7 +324,7 @@ def _session(scene: Scene, actions: tuple[Action, ...], steps: int, engine: str)
             except ActionError as error:
                 check_error(error)
         if session.game is not None and controls and session.ended is None:
-            _attempt(partial(session.press, controls[step % len(controls)].name, float(step % 3 != 0)))
+            _attempt(partial(session.apply_input, controls[step % len(controls)].name, float(step % 3 != 0)))
         if session.ended is not None or session.advance() == 0 or time.process_time() - start_time > BUDGET:
             break
     return session

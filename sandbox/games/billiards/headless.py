@@ -157,7 +157,7 @@ def _decide(game: SteppedGame, rules: BilliardsRules, decision: Decision) -> Non
     options = rules.match.choices.decisions
     if decision not in options:
         raise GameError(f"{decision!r} is not offered now; options: {', '.join(options) or 'none'}")
-    game.press(*rules.decision_input(decision))
+    game.set_control(*rules.decision_input(decision))
 
 
 def play_shot(game: SteppedGame, rules: BilliardsRules, plan: FramePlan) -> None:
@@ -177,7 +177,7 @@ def play_shot(game: SteppedGame, rules: BilliardsRules, plan: FramePlan) -> None
         actions.append(Move(time=time, body=match.cue, position=plan.place, velocity=(0.0, 0.0)))
     actions.append(match.strike(plan.stroke, time))
     for control in rules.call_inputs(plan.call):
-        game.press(*control)
+        game.set_control(*control)
     game.act(actions)
     while True:
         game.step()

@@ -199,7 +199,7 @@ class Episode(SteppedGame):
             value = _value(control, level)
             if value != self._levels[k]:
                 self._levels[k] = value
-                self.press(control.name, value)
+                self.set_control(control.name, value)
 
     def advance(self, steps: int) -> None:
         """Advance by a number of steps dt, or to the end, and apply the actions of the rules after each.

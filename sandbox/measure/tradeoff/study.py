@@ -148,16 +148,13 @@ def tradeoff(
 
     on_progress(Progress("the truth"))
     seeding = _seeds(scene, seeds)
-    truth_tolerance = _truth_tolerance(scene, metric, tolerance)
+    truth_tolerance = _truth_tolerance(scene, metric, tolerance, zoom)
     contexts = _contexts(scene, base, truth_tolerance, seeding.search, zoom, truth)
-    if (
-        metric is not None
-        and metric_named(metric).unit == "px"
-        and tolerance
-        and tolerance / contexts[0].zoom < truth_tolerance
-    ):
-        truth_tolerance = tolerance / contexts[0].zoom
-        contexts = _contexts(scene, base, truth_tolerance, seeding.search, contexts[0].zoom)
+    zoom = contexts[0].zoom  # without a given one, that of the motion, for which a truth is needed
+    finer = _truth_tolerance(scene, metric, tolerance, zoom)
+    if finer < truth_tolerance:
+        truth_tolerance = finer
+        contexts = _contexts(scene, base, finer, seeding.search, zoom)
     objective = complete_objective(contexts[0], metric, tolerance, budget, fps)
     study = _Study(
         space=SearchSpace(
@@ -205,12 +202,12 @@ def _seeds(scene: Scene, count: int) -> _Seeding:
     return _Seeding(found[:count], found[count:])
 
 
-def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None) -> float:
-    """Return the error that a truth may have, m."""
-    truth_tolerance = default_tolerance(scene)
-    if tolerance is not None and tolerance > 0.0 and (metric is None or metric_named(metric).unit == "m"):
-        truth_tolerance = min(truth_tolerance, tolerance)
-    return truth_tolerance
+def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None, zoom: float | None) -> float:
+    """Return the error that a truth may have, m; `zoom` in px/m, None if it is not known yet."""
+    scale = {"m": 1.0, "px": zoom}.get("m" if metric is None else metric_named(metric).unit)
+    if not tolerance or scale is None:
+        return default_tolerance(scene)
+    return min(default_tolerance(scene), tolerance / scale)
 
 
 def _contexts(

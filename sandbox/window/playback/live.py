@@ -305,7 +305,7 @@ class LiveView:
         self._notify_replaced(before)
         self._read_contacts()
 
-    def press(self, control: str, value: float) -> None:
+    def apply_input(self, control: str, value: float) -> None:
         """Set a control of the game now.
 
         Raises:
@@ -314,7 +314,7 @@ class LiveView:
         self.finish_seek()
         before, simulation = self.session.replaced, self.session.simulation
         try:
-            actions = self.session.press(control, value)
+            actions = self.session.apply_input(control, value)
         finally:
             if self.session.simulation is not simulation:  # an action was refused, and the session was restored
                 self._restart_diagnostics()

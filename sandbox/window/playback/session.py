@@ -420,7 +420,7 @@ class Session:
             self.game.note_actions([timed])
         return timed
 
-    def press(self, control: str, value: float) -> tuple[Action, ...]:
+    def apply_input(self, control: str, value: float) -> tuple[Action, ...]:
         """Set a control of the game now, and apply the actions of its rules; later actions are discarded.
 
         Returns:
@@ -434,7 +434,7 @@ class Session:
             return ()
         self._check_not_ended()
         presses = self.game.all_presses
-        actions = self.game.press(self.simulation.time, control, value)
+        actions = self.game.record_input(self.simulation.time, control, value)
         try:
             for action in actions:
                 self.simulation.apply(action)

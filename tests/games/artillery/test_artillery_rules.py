@@ -149,7 +149,7 @@ def test_changes_of_gravity_and_drag_apply_to_the_exact_flight(time: float, dist
             actions.append(SetParameter(time=relay.time, path="world.gravity", value=[0.5, -6.0]))
             actions.append(SetParameter(time=relay.time, path="world.linear_drag", value=0.08))
         if abs(relay.time - 0.1) < 0.01:
-            actions += referee.press(relay.time, "fire", 1.0)
+            actions += referee.record_input(relay.time, "fire", 1.0)
         for action in actions:
             relay.apply(action)
         referee.note_actions(actions)

@@ -49,7 +49,7 @@ class Table:
         self.game.note_actions(actions)
 
     def press(self, name: str, value: float = 1.0) -> None:
-        self.do(*self.game.press(self.simulation.time, name, value))
+        self.do(*self.game.record_input(self.simulation.time, name, value))
 
     def step(self) -> None:
         self.simulation.step()

@@ -33,7 +33,7 @@ class Rink:
         actions = [*self.referee.on_step(simulation.time, simulation.frame(), simulation.contacts())]
         self.cues += self.rules.sounds()
         for control, value in presses:
-            played = self.referee.press(simulation.time, control, value)
+            played = self.referee.record_input(simulation.time, control, value)
             self.referee.note_actions(played)
             actions += played
         for action in actions:

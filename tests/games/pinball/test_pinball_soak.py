@@ -86,7 +86,7 @@ def play(scene: Scene, policy: Policy, seconds: float) -> Game:
         pressed = [
             action
             for control, value in policy.decide(referee.step_info, rules)
-            for action in referee.press(simulation.time, control, value)
+            for action in referee.record_input(simulation.time, control, value)
         ]
         if not messages or messages[-1][1] != rules.message[0]:
             messages.append((simulation.time, rules.message[0]))

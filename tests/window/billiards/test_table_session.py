@@ -128,7 +128,7 @@ def test_undo_keeps_decisions_and_calls_before_the_stroke() -> None:
     time = player.live.session.time
     inputs = tuple(player.rules.call_inputs(ShotCall(safety=True)))
     for control, value in inputs:
-        player.host.press(control, value)
+        player.host.set_control(control, value)
     before, called = player.match, player.call
     player.shoot(1.0)
     roll_out(table)
@@ -144,7 +144,7 @@ def test_undo_removes_the_control_inputs_of_a_stroke() -> None:
     table = controls_at(FREE)
     player, session = table.player, table.player.live.session
     for control, value in player.rules.stroke_inputs(player.cue.stroke):
-        player.host.press(control, value)
+        player.host.set_control(control, value)
     roll_out(table)
     assert session.game is not None
     assert len(session.game.all_presses) == 7

@@ -87,9 +87,9 @@ def test_seeking_restores_the_rules() -> None:
     states = {0: full_state(session)}
     for k in range(1, 241):
         if k == 50:
-            session.press("aim", 0.9)
+            session.apply_input("aim", 0.9)
         if k == 80:
-            (kick,) = session.press("kick", 1.0)
+            (kick,) = session.apply_input("kick", 1.0)
             assert kick.time == session.time
         session.advance()
         states[k] = full_state(session)
@@ -104,15 +104,15 @@ def test_seeking_restores_the_rules() -> None:
 def test_checkpoints_hold_the_game() -> None:
     scene = toy_scene(gravity=[0.0, -0.5])  # a long fall without contacts, so checkpoints are made
     session = Session(scene, "pymunk", game=toy_game(scene))
-    session.press("aim", 0.25)
+    session.apply_input("aim", 0.25)
     for _ in range(150):
         session.advance()
     assert session.history.keyframe_steps
-    session.press("kick", 1.0)
+    session.apply_input("kick", 1.0)
     session.advance(5)
     seek(session, 149)
     assert ("aim", "0.25") in rules_of(session).display_lines()
-    session.press("kick", 1.0)  # a different continuation
+    session.apply_input("kick", 1.0)  # a different continuation
     session.advance(100)
     assert rules_of(session).score == 0.5
     assert_replays(session)
@@ -121,11 +121,11 @@ def test_checkpoints_hold_the_game() -> None:
 def test_press_in_the_past_discards_later_presses_also_in_a_replay_on_another_engine() -> None:
     session = session_of()
     session.advance(30)
-    session.press("kick", 1.0)
+    session.apply_input("kick", 1.0)
     session.advance(30)
-    session.press("kick", 1.0)
+    session.apply_input("kick", 1.0)
     seek(session, 40)
-    session.press("aim", 0.1)
+    session.apply_input("aim", 0.1)
     session.advance(60)
     assert session.game is not None
     assert [press.control for press in session.game.presses] == ["kick", "aim"]
@@ -155,7 +155,7 @@ def test_game_that_is_over_ignores_presses() -> None:
     session._initial_game.rules.ends_at = 1.0  # type: ignore[attr-defined]
     session.advance(150)
     assert rules_of(session).game_over == "enough"
-    assert session.press("kick", 1.0) == ()
+    assert session.apply_input("kick", 1.0) == ()
     score = rules_of(session).score
     session.advance(100)
     assert rules_of(session).score == score
@@ -166,11 +166,11 @@ def test_game_that_is_over_ignores_presses() -> None:
 @pytest.mark.parametrize("steps", [0, 40])
 def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
     session = session_of()
-    session.press("aim", 0.3)
+    session.apply_input("aim", 0.3)
     session.advance(30)
-    session.press("kick", 1.0)
+    session.apply_input("kick", 1.0)
     session.advance(90)
-    session.press("aim", 0.7)  # at the same time as the refused one
+    session.apply_input("aim", 0.7)  # at the same time as the refused one
     seek(session, 90)
     seek(session, 120 - steps)  # 0: at the end; 40: with later presses and actions
 
@@ -189,7 +189,7 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(Toy, "on_input", kick_twice)
     with pytest.raises(ActionError, match="zzz"):
-        session.press("kick", 5.0)
+        session.apply_input("kick", 5.0)
     assert everything() == before
     assert session.recording() == recording
     assert_replays(session)
@@ -201,8 +201,8 @@ def test_press_does_not_copy_the_game(monkeypatch: pytest.MonkeyPatch) -> None:
     session = session_of()
     session.advance(10)
     monkeypatch.setattr(GameSession, "copy", lambda _: pytest.fail("copied"))
-    session.press("aim", 0.3)
-    session.press("kick", 1.0)
+    session.apply_input("aim", 0.3)
+    session.apply_input("kick", 1.0)
 
 
 def test_forged_action_of_a_recording_is_detected() -> None:
@@ -238,20 +238,20 @@ def test_any_order_of_operations_replays(operations: list[tuple[str, Any]]) -> N
         elif kind == "go":
             seek(session, value)
         else:
-            session.press(kind, value)
+            session.apply_input(kind, value)
     assert_replays(session)
 
 
 @pytest.mark.parametrize(("kept", "aim"), [((), "0.25"), ((2,), "0.75")])
 def test_retract_removes_the_inputs_since_the_action_except_the_stated_ones(kept: tuple[int, ...], aim: str) -> None:
     session = session_of()
-    session.press("aim", 0.25)
+    session.apply_input("aim", 0.25)
     session.advance(10)
-    session.press("aim", 0.75)
-    session.press("kick", 1.0)
+    session.apply_input("aim", 0.75)
+    session.apply_input("kick", 1.0)
     if not kept:  # otherwise at the same step as the kick
         session.advance(10)
-        session.press("kick", 0.0)
+        session.apply_input("kick", 0.0)
     assert session.game is not None
     kick = next(k for k, action in enumerate(session.actions) if action.time == pytest.approx(0.1))
     seek(session, session.retract(kick, *kept))

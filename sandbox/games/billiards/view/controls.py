@@ -273,9 +273,9 @@ class BilliardsControls:
             count = self._rules_of(host).match.state.players
             wanted = count if players is None else 1 + (players != "one player")
             if wanted != count:
-                host.press("players", select_value(wanted - 1, 2))
+                host.set_control("players", select_value(wanted - 1, 2))
             if options.get("misses") == "on":
-                host.press("misses", 1.0)
+                host.set_control("misses", 1.0)
         along = self._rules_of(host).match.layout.along
         has_own_shot = bool(file.shots) and not scene.shots
         cue = CueState.for_shot(file.shots[0]) if has_own_shot else CueState(math.atan2(along[1], along[0]))

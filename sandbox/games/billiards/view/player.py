@@ -213,7 +213,7 @@ class BilliardsPlayer:
         except GameError as error:
             raise ActionError(str(error)) from None
         self._turn.chosen = None
-        self.host.press(*self.rules.decision_input(decision))
+        self.host.set_control(*self.rules.decision_input(decision))
 
     def call_shot(self, call: ShotCall) -> None:
         """Call a ball, a pocket or a safety for the next stroke, in place of the call before.
@@ -230,9 +230,9 @@ class BilliardsPlayer:
 
     def _press_call(self, call: ShotCall) -> None:
         if self.call != ShotCall():
-            self.host.press("withdraw calls", 1.0)
+            self.host.set_control("withdraw calls", 1.0)
         for control, value in self.rules.call_inputs(call):
-            self.host.press(control, value)
+            self.host.set_control(control, value)
 
     def toggle_safety(self) -> None:
         """Call a safety, or withdraw the call.
@@ -367,7 +367,7 @@ class BilliardsPlayer:
                 return
             opponent.reset()
             if found.decision is not None:
-                self.host.press(*self.rules.decision_input(found.decision))
+                self.host.set_control(*self.rules.decision_input(found.decision))
             if found.plan is None:
                 return
             turn.plan = found.plan
