@@ -21,8 +21,11 @@ class Column(NamedTuple, Generic[R]):
     kind: Kind = "number"
     is_optional: bool = False
     """left out of a table whose rows all have 0 or no value"""
+    is_detail: bool = False
+    """left out of a short table"""
 
 
-def shown(columns: Iterable[Column[R]], rows: Sequence[R]) -> list[Column[R]]:
-    """Return the columns that a table of some rows has."""
-    return [column for column in columns if not column.is_optional or any(map(column.value, rows))]
+def shown(columns: Iterable[Column[R]], rows: Sequence[R], details: bool = True) -> list[Column[R]]:
+    """Return the columns that a table of some rows has; a short table is one without details."""
+    needed = (column for column in columns if details or not column.is_detail)
+    return [column for column in needed if not column.is_optional or any(map(column.value, rows))]

@@ -6,9 +6,6 @@ import sandbox
 from sandbox.engines.registry import able
 from sandbox.scene.files.shipped_scenes import ShippedScene, shipped
 
-FIRST = "tutorial"
-"""the folder that the gallery begins with; the others follow by name"""
-
 
 def thumbnail_name(scene: str) -> str:
     """Return the file of a scene's thumbnail, below `docs/images/scenes/`."""
@@ -18,8 +15,7 @@ def thumbnail_name(scene: str) -> str:
 def gallery() -> str:
     """Return the Markdown of all shipped scenes, by folder."""
     parts = []
-    ordered = sorted(shipped(), key=lambda scene: (folder_of(scene) != FIRST, scene.name))
-    for folder, scenes in groupby(ordered, folder_of):
+    for folder, scenes in groupby(shipped(), folder_of):
         cards = "\n\n".join(map(_card, scenes))
         parts.append(f"## {folder.capitalize()}\n\n:::::{{grid}} 1 2 3 3\n:gutter: 2\n\n{cards}\n\n:::::")
     return "\n\n".join(parts)

@@ -1,8 +1,6 @@
 """Command `advise`: which dt, how many iterations, which engine a game needs, on one page."""
 
 import re
-import shutil
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +29,7 @@ from sandbox.cli.options import (
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, report_remarks
 from sandbox.cli.streams import print_json
-from sandbox.cli.tables import add_columns, format_optional, new_table, print_line, print_table
+from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.measure.advice.result import Advice, Knob, MeasuredSetting, OtherEngine
@@ -308,57 +306,57 @@ def print_advice(scene: str, advice: Advice) -> None:
     name = f"{scene} ({advice.scene})" if advice.scene else scene
     coverage = coverage_sentence(advice)
     if coverage is not None:
-        _print_item(coverage, "")
+        print_item(coverage, "")
     _print_heading(f"{name}: {target_text(advice)}")
     for sentence in (*truth_sentences(advice), *recording_sentences(advice)):
-        _print_item(sentence, "")
+        print_item(sentence, "")
     _print_present(advice)
     _print_recommended(advice)
     _print_knobs(advice)
     _print_engines(advice)
     _print_code(advice)
     click.echo()
-    _print_item(f"{search_sentence(advice)}.", "")
+    print_item(f"{search_sentence(advice)}.", "")
 
 
 def _print_present(advice: Advice) -> None:
     present = advice.present
     _print_heading(f"1. Present setting: {setting_text(present, advice.fps)}", blank=True)
-    _print_item(figures_text(advice, present))
+    print_item(figures_text(advice, present), INDENT)
     if present.status != "refused" and not advice.risks:
-        _print_item("forecast: no problem")
+        print_item("forecast: no problem", INDENT)
     _print_risks(advice, advice.risks)
     for note in advice.notes:
-        _print_item(f"note: {note}")
+        print_item(f"note: {note}", INDENT)
 
 
 def _print_objections(setting: MeasuredSetting) -> None:
     for each in setting.objections[:MAX_RISKS]:
-        _print_item(f"objection: {each}")
+        print_item(f"objection: {each}", INDENT)
 
 
 def _print_risks(advice: Advice, risks: tuple[Any, ...]) -> None:
     for risk in risks[:MAX_RISKS]:
-        _print_item(f"{risk_label(risk)}: {risk_text(risk, advice.fps)}")
+        print_item(f"{risk_label(risk)}: {risk_text(risk, advice.fps)}", INDENT)
     if len(risks) > MAX_RISKS:
-        _print_item(f"… and {len(risks) - MAX_RISKS} more; --out and --json list all")
+        print_item(f"… and {len(risks) - MAX_RISKS} more; --out and --json list all", INDENT)
 
 
 def _print_recommended(advice: Advice) -> None:
     chosen = advice.recommended
     if chosen is not None:
         _print_heading(f"2. {cheapest_head(advice)}: {setting_text(chosen, advice.fps)}", blank=True)
-        _print_item(figures_text(advice, chosen))
+        print_item(figures_text(advice, chosen), INDENT)
     else:
         _print_heading(f"2. {cheapest_head(advice)}: {no_setting_text(advice)}", blank=True)
     if advice.fallback is not None:
-        _print_item(f"{fallback_head(advice)}: {setting_text(advice.fallback, advice.fps)}")
-        _print_item(figures_text(advice, advice.fallback))
+        print_item(f"{fallback_head(advice)}: {setting_text(advice.fallback, advice.fps)}", INDENT)
+        print_item(figures_text(advice, advice.fallback), INDENT)
         _print_objections(advice.fallback)
     elif chosen is not None and advice.fits_budget(chosen) is False:
-        _print_item("no setting that was tried is within the budget")
+        print_item("no setting that was tried is within the budget", INDENT)
     if advice.remaining_risks:
-        _print_item("formulas still forecast, although the measured run may not show it:")
+        print_item("formulas still forecast, although the measured run may not show it:", INDENT)
         _print_risks(advice, advice.remaining_risks)
 
 
@@ -419,7 +417,7 @@ def _print_engines(advice: Advice) -> None:
         print_table(table)
     for other in advice.others:
         if other.setting is None:
-            _print_item(f"{other.engine}: {engine_text(other)}")
+            print_item(f"{other.engine}: {engine_text(other)}", INDENT)
 
 
 def _engine_cells(advice: Advice, other: OtherEngine) -> list[Any]:
@@ -452,19 +450,10 @@ def _print_code(advice: Advice) -> None:
     for line in advice.code.lines:
         print_line(f"{INDENT} {line}")
     for remark in advice.code.remarks:
-        _print_item(remark)
+        print_item(remark, INDENT)
 
 
 def _print_heading(text: str, *, blank: bool = False) -> None:
     if blank:
         click.echo()
     print_line(text, style="bold")
-
-
-def _print_item(text: str, indent: str = INDENT) -> None:
-    """Print one item; on a terminal it is wrapped between words, otherwise it is one line."""
-    if sys.stdout.isatty():
-        width = shutil.get_terminal_size().columns
-        click.echo(click.wrap_text(text, width, initial_indent=indent, subsequent_indent=f"{indent}  "))
-    else:
-        click.echo(f"{indent}{text}")

@@ -1,7 +1,5 @@
 """Command `check`: validate scenes; print required physics, engines that can run them, and predicted problems."""
 
-import shutil
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -12,6 +10,7 @@ from sandbox.cli.common import exit_with_errors, expand_folders, print_faults
 from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.recordings import read_scene, report_remarks
 from sandbox.cli.streams import print_json
+from sandbox.cli.tables import print_descriptions, print_item
 from sandbox.echo import MAX_MESSAGE, shorten
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
 from sandbox.games.contract import Control
@@ -225,22 +224,22 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool) -> None:
             click.echo(f"{name}: warning: {warning.message}")
         return
     click.echo(f"{name}: {scene.title}" if scene.title else name)
-    for is_on, what, why in _demand_lines(document.bill):
-        mark = click.style("on ", fg="green", bold=True) if is_on else click.style("off", dim=True)
-        click.echo(f"  {mark}  {what:<16} {why}")
+    on, off = click.style("on ", fg="green", bold=True), click.style("off", dim=True)
+    demands = _demand_lines(document.bill)
+    print_descriptions({f"{on if is_on else off}  {what:<15}": why for is_on, what, why in demands}, "  ")
     for engine, support in document.engines.items():
-        _print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
-    _print_item(_step_text(scene, document))
+        print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
+    print_item(_step_text(scene, document))
     if (trial := document.trial) is not None and not trial.whole:
         covered = f"{trial.duration:.3g} s of {scene.world.duration:g} s"
-        _print_item(f"the trial run on {trial.engine} covered {covered}")
+        print_item(f"the trial run on {trial.engine} covered {covered}")
     if document.game is not None:
         keys = (f"{each.name} ({' or '.join(each.keys)})" for each in document.game.controls)
-        _print_item(f"game {document.game.name}: {', '.join(keys)}")
+        print_item(f"game {document.game.name}: {', '.join(keys)}")
     for note in document.notes:
-        _print_item(f"note: {note.message}")
+        print_item(f"note: {note.message}")
     for warning in document.warnings:
-        _print_item(f"warning: {warning.message}")
+        print_item(f"warning: {warning.message}")
 
 
 def _step_text(scene: Scene, document: CheckDocument) -> str:
@@ -266,12 +265,3 @@ def _demand_lines(items: Sequence[Item]) -> Iterator[tuple[bool, str, str]]:
         elif not (has_joints or is_listed):
             is_listed = True
             yield False, "joints", "none"
-
-
-def _print_item(text: str) -> None:
-    """Print one item; on a terminal it is wrapped between words, otherwise it is one line."""
-    if sys.stdout.isatty():
-        width = shutil.get_terminal_size().columns
-        click.echo(click.wrap_text(text, width, initial_indent="  ", subsequent_indent="    "))
-    else:
-        click.echo(f"  {text}")

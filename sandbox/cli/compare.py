@@ -61,10 +61,9 @@ MAX_LISTED = 5
 NO_EFFECT = 1e-6
 """Relative change of the error below which a setting counts as without effect."""
 LEGEND = (
-    "error: the largest, and the root mean square, of all bodies' distances from the truth while that is trusted",
-    "diverges: when a distance first exceeds the tolerance; energy, momentum: change without a cause, as a fraction",
-    "contacts: also in the truth; truth only, run only: in one of the two alone; "
-    "after: either, once a body has diverged",
+    "max error: largest distance of a body from the truth, while that is trusted",
+    "diverges: when it first exceeds the tolerance; energy: change without a cause, as a fraction",
+    "contacts: also in the truth; truth only, run only: in one of the two alone; -v: more columns",
 )
 """Short meanings of the columns."""
 NAMES = {
@@ -84,7 +83,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
         comparison: the comparison.
         why: print the settings with the largest effect.
         refusals: print the reasons of refusals.
-        verbose: explain every column, not only some in short.
+        verbose: print and explain all columns.
     """
     from rich.text import Text
 
@@ -92,26 +91,27 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
     add_columns(table, ["engine"])
     swept = [key for key in comparison.rows[0].set if key != "solver.dt"]
     add_columns(table, (*map(short_key, swept), "dt"), "right")
-    add_columns(table, ["status"])
-    columns = shown((*COLUMNS, SECONDS), comparison.rows)
+    has_status = verbose or any(row.status != "ok" for row in comparison.rows)
+    add_columns(table, ["status"] if has_status else [])
+    columns = shown((*COLUMNS, SECONDS), comparison.rows, verbose)
     add_value_columns(table, columns)
     for row in comparison.rows:
         table.add_row(
             row.engine,
             *(Text(value_text(row.set[key])) for key in swept),
             f"{row.settings['dt']:.4g}",
-            Text(row.status, style="green" if row.status == "ok" else "bold red"),
+            *([Text(row.status, style="green" if row.status == "ok" else "bold red")] if has_status else []),
             *(cell_text(column, row) for column in columns),
         )
     print_line(f"{scene}: {comparison.scene.title}" if comparison.scene.title else scene)
     print_line(comparison.sentence())
-    print_table(table)
+    print_table(table, keys=2 + len(swept))
     if verbose:
         meanings = {column.head: column.about for column in columns}
         meanings |= {short_key(key): f"value of {key!r}" for key in swept}
         print_legend(heads_of(table), NAMES | meanings)
     for line in _lines_below_table(comparison, why, refusals, not verbose):
-        click.echo(line)
+        print_line(line)
 
 
 def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
@@ -121,6 +121,10 @@ def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend
         lines.append(
             "energy: change since the start, which includes correct losses, because the truth ends before the run does"
         )
+    after = {row.name: count for row in comparison.rows if (count := row.count("after_divergence"))}
+    if legend and after:
+        counts = ", ".join(f"{name} {count:,}" for name, count in after.items())
+        lines.append(f"contacts after one of their bodies has diverged, which are not matched: {counts}")
     lines += [*_accuracy_lines(comparison), *_joint_order(comparison)]
     for row in comparison.rows:
         if refusals and row.status == "refused":

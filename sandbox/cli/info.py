@@ -10,7 +10,7 @@ import click
 
 from sandbox.cli.options import json_option
 from sandbox.cli.streams import print_json
-from sandbox.cli.tables import new_table, print_folded_table
+from sandbox.cli.tables import new_table, print_descriptions, print_folded_table, print_item, print_line, terminal_width
 from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.scene.files.shipped_scenes import SCHEMA, shipped
 
@@ -25,8 +25,7 @@ def engines_command(as_json: bool) -> int:
     if as_json:
         print_json({"engines": rows})
         return 0
-    for row in rows:
-        click.echo(f"{row['name']}  {row['about']}; models {', '.join(row['models'])}")
+    print_descriptions({e.name: f"{e.about}; models {', '.join(sorted(e.capabilities))}" for e in ENGINES.values()})
     return 0
 
 
@@ -41,9 +40,7 @@ def scenes_command(as_json: bool) -> int:
     if as_json:
         print_json({"scenes": rows})
         return 0
-    width = max((len(row["name"]) for row in rows), default=0)
-    for row in rows:
-        click.echo(f"{row['name']:<{width}}  {row['title']}. {row['about']}")
+    print_descriptions({row["name"]: f"{row['title']}. {row['about']}" for row in rows})
     return 0
 
 
@@ -168,17 +165,28 @@ def _print_table(root: Node, name: str, node: Node) -> None:
 
     kinds = _kinds(node)
     about = _line(node.get("description", "").partition("\n\n")[0])
-    click.echo(f"{name}{f', kind {kinds}' if kinds else ''}: {about}".rstrip(": "))
+    print_line(f"{name}{f', kind {kinds}' if kinds else ''}: {about}".rstrip(": "))
     table = new_table()
-    for head in ("key", "value", "default", ""):
-        table.add_column(head, no_wrap=head == "key")
+    rows = []
     for key, each in node["properties"].items():
         needed = "required" if key in node.get("required", ()) else json.dumps(each.get("default"))
         default = "–" if needed == "null" else needed
-        table.add_row(*map(Text, (key, _value(root, each), default, _line(each.get("description", "")))))
+        rows.append((key, _value(root, each), default, _line(each.get("description", ""))))
+    if (terminal_width() or WIDE) < WIDE:
+        for key, value, default, description in rows:
+            print_line(f"{key}: {value}" + ("" if default == "–" else f"; {default}"))
+            print_item(description, "    ")
+        return
+    for k, head in enumerate(("key", "value", "default", "")):
+        longest = max((len(word) for row in rows for word in row[k].split()), default=0)
+        table.add_column(head, no_wrap=head == "key", min_width=longest)
+    for row in rows:
+        table.add_row(*map(Text, row))
     print_folded_table(table)
 
 
+WIDE = 100
+"""Columns of a terminal that has room for a table of keys; on a narrower one each key is a paragraph"""
 LARGE = 1e5
 """Bounds beyond this, or below its reciprocal, only protect the engines from extreme values, and are not printed."""
 

@@ -66,7 +66,7 @@ class Decorator(Protocol):
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-verbose_option = click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="print all columns of the table, and explain each")
 sweep_option = click.option(
     "--sweep",
     "sweeps",

@@ -52,6 +52,7 @@ from sandbox.cli.recordings import report_remarks
 from sandbox.cli.run_batch import MAX_PROBLEMS, RunBatch, report_problems
 from sandbox.cli.run_tables import MAX_TIMED, RunsDocument, print_ledgers, print_runs, print_scores, score_rows
 from sandbox.cli.streams import JsonSpool, print_json
+from sandbox.cli.tables import print_line
 from sandbox.echo import short_repr
 from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
@@ -489,7 +490,7 @@ def _suggest_next(scene: str) -> None:
     """Suggest further commands after a plain run of one scene, on a terminal only."""
     if sys.stdout.isatty() and not scene.endswith(".json"):
         name = shlex.quote(scene)
-        click.secho(f"next: sandbox compare {name} (error of each engine), sandbox play {name} (window)", dim=True)
+        print_line(f"next: sandbox compare {name} (error of each engine), sandbox play {name} (window)", "dim")
 
 
 def _check_drawing(plot: Path | None, bodies: tuple[str, ...], count: int, scene: Scene | None) -> None:

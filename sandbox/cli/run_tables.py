@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.batch.run_row import RunRow
+from sandbox.batch.run_row import FinalBodyState, RunRow
 from sandbox.cli.tables import add_columns, heads_of, new_table, print_legend, print_line, print_table
 from sandbox.engines.energy_ledger import Cause
 from sandbox.formatting import format_number, format_quantity
@@ -27,9 +27,13 @@ STEP = ("dt", "substeps")
 MAX_TIMED = 20
 """Runs in a table that shows first contacts and final positions; in a longer table these columns are omitted."""
 
-MIN_NAME_WIDTH = 8
-"""Width to which the column of scene names is folded on a narrow terminal."""
-
+MAX_BODIES = 5
+"""Bodies of a single run whose final states are printed"""
+ROUNDING = 1e-12
+"""Values below this fraction of the largest, or of 1 m, m/s or rad, are rounding errors and printed as 0: sums of 1e4
+terms of double precision are exact to about that."""
+MAX_ROUNDING = 1e-6
+"""J, m, m/s or rad: a larger value is printed also beside one that has diverged"""
 
 LEGEND = {
     "scene": "the scene as given",
@@ -47,6 +51,7 @@ LEGEND = {
     "contacts": "contacts; one that lasts counts once",
     "missed": "contacts that the engine missed because a body passed through another within a step (tunnelling)",
     "final position, m": "position of the body at the end, m",
+    "final velocity, m/s": "velocity of the body at the end, m/s",
     "score": "final score of the game",
     "game": "how the game ended",
     "falls": "balls in pockets, and the pocket of each",
@@ -133,20 +138,17 @@ def print_runs(rows: Sequence[RunRow], verbose: bool = False) -> None:
 
     Args:
         rows: the runs.
-        verbose: explain every column below the table.
+        verbose: print all columns, and explain each below the table.
     """
-    from rich.text import Text
-
-    show = _Columns.of(rows)
+    show = _Columns.of(rows, verbose)
     table = new_table()
-    if show.scenes:
-        table.add_column("scene", overflow="fold", min_width=MIN_NAME_WIDTH)
-    add_columns(table, ["engine"])
+    add_columns(table, (*(["scene"] if show.scenes else []), "engine"))
     numbers = ("dt × substeps" if show.substeps else "dt", *show.swept, *show.differing)
     add_columns(table, (*numbers, *(["seed"] if show.seeds else [])), "right")
     add_columns(table, ["status"])
     joints = *(("joint error",) if show.joint_errors else ()), *(("broken",) if show.broken_joints else ())
-    ends = *(("first contact, s",) if show.first_contacts else ()), *(("final position, m",) if show.positions else ())
+    ends = [*(["first contact, s"] if show.first_contacts else []), *(["final position, m"] if show.positions else [])]
+    ends += ["final velocity, m/s"] if show.velocities else []
     add_columns(table, ("× real time", "energy, J", *joints, *ends, "contacts", "missed"), "right")
     if show.games:
         add_columns(table, ["score"], "right")
@@ -156,22 +158,19 @@ def print_runs(rows: Sequence[RunRow], verbose: bool = False) -> None:
     for row in rows:
         table.add_row(*_cells(row, show))
 
-    # A single scene is printed above its runs, because a long path would take the space of the numbers. With several
-    # scenes, only their names fold.
-    foldable = max(Text(row.scene).cell_len for row in rows) - MIN_NAME_WIDTH if show.scenes else 0
     if not show.scenes:
-        print_line(rows[0].scene)
-    print_table(table, max(foldable, 0))
-    if len(rows) == 1 and rows[0].first_contact is not None and not show.games:
-        position = _final_position(rows[0])
-        final = f"; final position {position} m" if position else ""
-        print_line(f"first contact at {_number(rows[0].first_contact, 6)} s{final}")
+        print_line(rows[0].scene)  # in the table, a long path would take the space of the numbers
+    print_table(table, keys=show.scenes + 1 + len(numbers) + show.seeds)
+    if len(rows) == 1 and not show.games:
+        if rows[0].first_contact is not None:
+            print_line(f"first contact at {_number(rows[0].first_contact, 6)} s")
+        _print_final(rows[0])
     if verbose:
         meanings = {key: f"setting `solver.{key}`" for key in show.differing}
         meanings |= {key: f"value of {key!r}" for key in show.swept}
         print_legend(heads_of(table), LEGEND | meanings)
     elif sys.stdout.isatty():  # without a terminal, every line of the output is a row of the table
-        print_line("; ".join(_legend(show)), "dim", fold=True)
+        print_line("; ".join(_legend(show)), "dim")
 
 
 class _Columns(NamedTuple):
@@ -188,18 +187,20 @@ class _Columns(NamedTuple):
     broken_joints: bool
     first_contacts: bool
     positions: bool
+    velocities: bool
     games: bool
     pocketed: bool
 
     @classmethod
-    def of(cls, rows: Sequence[RunRow]) -> "_Columns":
-        """Return the columns that are not empty or constant."""
+    def of(cls, rows: Sequence[RunRow], verbose: bool) -> "_Columns":
+        """Return the columns that are not empty or constant; final velocities are for `verbose` tables."""
         swept = [key for key in rows[0].set if key != "world.seed" and not key.startswith("solver.")]
         scenes = len({row.scene for row in rows}) > 1
         games = any(row.game is not None for row in rows)
         # Scores are the results of games, and runs of several scenes are not compared with each other.
         is_small = 1 < len(rows) <= MAX_TIMED and not games and not scenes
         is_timed = is_small and all(row.first_contact is not None for row in rows)
+        ends = [body for row in rows if (body := _only_body(row)) is not None]
         return cls(
             scenes=scenes,
             swept=[key for key in swept if len({str(row.set[key]) for row in rows}) > 1],
@@ -209,7 +210,8 @@ class _Columns(NamedTuple):
             joint_errors=any(row.joint_error is not None for row in rows),
             broken_joints=any(row.broken_joints for row in rows),
             first_contacts=is_timed or _first_contacts_differ(rows),
-            positions=is_small and len({_final_position(row) for row in rows} - {""}) > 1,
+            positions=is_small and len({_vector(body.position) for body in ends}) > 1,
+            velocities=verbose and is_small and len({_vector(body.velocity) for body in ends}) > 1,
             games=games,
             pocketed=any(row.pocketed for row in rows),
         )
@@ -233,7 +235,7 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     yield status.append(" stored", style="dim") if row.repeated else status
     yield _number(row.realtime_factor, 3)
     start, end = row.energy_start, row.energy_end
-    yield "–" if start is None else f"{_number(start)} → {_number(end)}"
+    yield "–" if start is None else " → ".join(map(_number, _without_rounding((start, end))))
     if show.joint_errors:
         yield _joint_error(row)
     if show.broken_joints:
@@ -241,7 +243,9 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     if show.first_contacts:
         yield _number(row.first_contact, 6)
     if show.positions:
-        yield _final_position(row) or "–"
+        yield "–" if (body := _only_body(row)) is None else _vector(body.position)
+    if show.velocities:
+        yield "–" if (body := _only_body(row)) is None else _vector(body.velocity)
     is_refused, missed = row.status == "refused", row.missed_contacts
     yield "–" if is_refused or row.contacts is None else f"{row.contacts:,}"
     yield "–" if is_refused else "?" if missed is None else f"{missed:,}"
@@ -264,12 +268,39 @@ def _legend(show: _Columns) -> Iterator[str]:
     yield "-v explains every column"
 
 
-def _final_position(row: RunRow) -> str:
-    """Return the position of the only body at the end, m; "" if the run has no body or several."""
-    if row.final is None or len(row.final) != 1:
-        return ""
-    (body,) = row.final.values()
-    return f"({', '.join(f'{x:.4g}' if math.isfinite(x) else '–' for x in body.position)})"
+def _only_body(row: RunRow) -> FinalBodyState | None:
+    """Return the state of the only body at the end; None if the run has no body or several."""
+    bodies = list((row.final or {}).values())
+    return bodies[0] if len(bodies) == 1 else None
+
+
+def _print_final(row: RunRow) -> None:
+    """Print where and how fast the bodies of a run end, if there are few."""
+    from rich.text import Text
+
+    bodies = row.final or {}
+    if not 1 <= len(bodies) <= MAX_BODIES:
+        return
+    has_turned = any(abs(each.angle) + abs(each.angular_velocity) > ROUNDING for each in bodies.values())
+    table = new_table()
+    add_columns(table, ["at the end"])
+    add_columns(table, ("position, m", "velocity, m/s", *(("angle, rad", "rad/s") if has_turned else ())), "right")
+    for name, body in bodies.items():
+        turned = _without_rounding((body.angle, body.angular_velocity), 1.0) if has_turned else ()
+        table.add_row(Text(name), _vector(body.position), _vector(body.velocity), *map(_number, turned))
+    print_table(table)
+
+
+def _vector(components: Sequence[float]) -> str:
+    """Return a position in m or a velocity in m/s as text."""
+    return f"({', '.join(_number(x) for x in _without_rounding(components, 1.0))})"
+
+
+def _without_rounding(values: Sequence[float | None], scale: float = 0.0) -> list[float | None]:
+    """Return values with 0 for those that are rounding errors beside the largest, or beside a scale."""
+    largest = max((abs(each) for each in values if each is not None and math.isfinite(each)), default=0.0)
+    bound = min(ROUNDING * max(scale, largest), MAX_ROUNDING)
+    return [0.0 if each is not None and abs(each) <= bound else each for each in values]
 
 
 def _first_contacts_differ(rows: Sequence[RunRow]) -> bool:
@@ -315,17 +346,13 @@ def _setting(value: object) -> str:
 
 
 def _number(value: float | None, digits: int = 4) -> str:
-    if value is None:
+    if value is None or not math.isfinite(value):
         return "–"
     return f"{value:,.0f}" if 10 ** (digits - 1) <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 MAX_LEDGERS = 5
 """Runs in one table of ledgers, which then fits a terminal; further runs are in another table."""
-
-ROUNDING = 1e-12
-"""Fraction of the largest energy below which an entry is a rounding error and has no line: sums of 1e4 terms of double
-precision are exact to about that."""
 
 
 def print_ledgers(rows: Sequence[RunRow]) -> None:
@@ -350,7 +377,7 @@ def print_ledgers(rows: Sequence[RunRow]) -> None:
         click.echo()
         print_table(table)
     if any(_ledger(row) is not None for row in rows):
-        print_line("%: of the largest kinetic energy or the largest entry, whichever is greater", "dim", fold=True)
+        print_line("%: of the largest kinetic energy or the largest entry, whichever is greater", "dim")
 
 
 def _ledger(row: RunRow) -> LedgerDocument | None:

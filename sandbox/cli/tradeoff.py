@@ -43,7 +43,7 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
-from sandbox.columns import Column
+from sandbox.columns import Column, shown
 from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
@@ -77,6 +77,12 @@ LONG = ">frame"
 """Mark of settings that are not recommended, because their dt is longer than a frame."""
 
 
+CODE = "    "
+"""Indentation of lines to paste into a file, which no terminal folds"""
+SETTING_COLUMNS = 4
+"""Number of columns that name a setting: engine, dt, substeps, iterations"""
+
+
 def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
     """Return the columns of the table."""
     unit = f", {found.metric.unit}" if found.metric.unit else ""
@@ -87,10 +93,10 @@ def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
         Column("dt", "time step of a frame, s", lambda point: point.settings.dt, "time"),
         Column("substeps", "solver steps per frame", lambda point: point.settings.substeps, "count"),
         Column("iterations", iterations, lambda point: point.settings.iterations, "count"),
-        Column("other settings", "further changes of [solver]", _other_settings, "text"),
+        Column("other settings", "further changes of [solver]", _other_settings, "text", is_optional=True),
         Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", lambda point: point.error),
         Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
-        Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time"),
+        Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time", is_detail=True),
     ]
 
 
@@ -100,14 +106,14 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     Args:
         scene: the scene as the user named it.
         found: the trade-off.
-        verbose: explain every column and mark below the table.
+        verbose: print and explain all columns, and explain every mark.
     """
     from rich.text import Text
 
-    table, columns = new_table(), _columns(found)
+    table, rows = new_table(), _rows(found)
+    columns = shown(_columns(found), rows, verbose)
     add_value_columns(table, columns)
     add_columns(table, [""])
-    rows = _rows(found)
     for point in rows:
         marks = [*_marks(point, found), *([LONG] if point.settings.dt > found.max_dt else [])]
         table.add_row(*(cell_text(column, point) for column in columns), Text(" ".join(marks), style="green"))
@@ -115,17 +121,19 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     print_line(f"{name}: {found.error_about}")
     print_line(_about(found))
     if rows:
-        print_table(table)
+        print_table(table, keys=SETTING_COLUMNS)
         if verbose:
             print_legend([*heads_of(table), *LEGEND], {column.head: column.about for column in columns} | LEGEND)
         else:
-            click.echo(_legend(rows, found))
+            print_line(_legend(rows, found))
         if any(point.settings.dt > found.max_dt for point in rows):
-            click.echo(_long_legend(found))
+            print_line(_long_legend(found))
     splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
     proposed = [each.sentence for each in found.proposals]
-    for line in [*_failures(found), *splits, *found.sentences, *_notes(found), *proposed, *_solver(found)]:
-        click.echo(line)
+    for line in [*_failures(found), *splits, *found.sentences, *_notes(found), *proposed]:
+        print_line(line)
+    for line in _solver(found):
+        (click.echo if line.startswith(CODE) else print_line)(line)
 
 
 def _rows(found: Tradeoff) -> list[Evaluation]:
@@ -163,7 +171,7 @@ def _marks(point: Evaluation, found: Tradeoff) -> list[str]:
 def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
     used = {mark for point in rows for mark in _marks(point, found)}
     repeats = max(point.repeats for point in rows)
-    times = f"minimum and median of {repeats} timings" if repeats else "from the run that was scored"
+    times = f"minimum of {repeats} timings" if repeats else "from the run that was scored"
     marks = "".join(f"; {mark}: {meaning}" for mark, meaning in LEGEND.items() if mark in used)
     return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
 
@@ -239,7 +247,7 @@ def _solver(found: Tradeoff) -> list[str]:
 
 
 def _indented(lines: Sequence[str]) -> list[str]:
-    return [f"    {line}" for line in lines]
+    return [f"{CODE}{line}" for line in lines]
 
 
 DEFAULT_FPS = 60.0

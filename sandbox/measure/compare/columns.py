@@ -12,8 +12,13 @@ def _error(name: str) -> Column[Row]:
     """Return the column of a metric."""
     metric = METRICS[name]
     about = f"{metric.about}, while that is trusted"
-    is_optional = metric.unit == "rad"  # nothing turns in many scenes
-    return Column(f"{metric.head}, {metric.unit}", about, lambda row: getattr(row.score, name), is_optional=is_optional)
+    return Column(
+        f"{metric.head}, {metric.unit}",
+        about,
+        lambda row: getattr(row.score, name),
+        is_optional=metric.unit == "rad",  # nothing turns in many scenes
+        is_detail=name not in ("max_position", "max_angle"),
+    )
 
 
 def _count(kind: str) -> Callable[[Row], int | None]:
@@ -38,7 +43,11 @@ COLUMNS: tuple[Column[Row], ...] = (
         "change",
     ),
     Column(
-        "momentum", "change of the momentum without a cause, as a fraction", lambda row: row.momentum_drift, "change"
+        "momentum",
+        "change of the momentum without a cause, as a fraction",
+        lambda row: row.momentum_drift,
+        "change",
+        is_detail=True,
     ),
     Column("contacts", "contacts that the truth has too", _count("matched"), "count"),
     Column("truth only", "contacts of the truth that the run does not have", _count("missed"), "count"),
@@ -48,6 +57,7 @@ COLUMNS: tuple[Column[Row], ...] = (
         "contacts of either after one of their bodies has diverged; these are not matched",
         _count("after_divergence"),
         "count",
+        is_detail=True,
     ),
 )
 """Columns of the table and of the page of a comparison, but for those that name a row."""

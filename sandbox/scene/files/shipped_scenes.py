@@ -15,6 +15,10 @@ SCHEMA = "scene.schema.json"
 """File next to the folders of shipped scenes, which identifies them."""
 
 
+FIRST = "tutorial/"
+"""Folder whose scenes are listed first"""
+
+
 class UnknownSceneError(LookupError):
     """No scene, or more than one, has a given name; `str()` lists them."""
 
@@ -36,10 +40,11 @@ def folder() -> Path | None:
 
 
 def shipped() -> tuple[ShippedScene, ...]:
-    """Return all shipped scenes, sorted by name."""
+    """Return all shipped scenes: those of the tutorial, then the others, each sorted by name."""
     root = folder()
     files = () if root is None else root.glob("*/*.toml")
-    return tuple(sorted(ShippedScene(f"{file.parent.name}/{file.stem}", file) for file in files))
+    scenes = (ShippedScene(f"{file.parent.name}/{file.stem}", file) for file in files)
+    return tuple(sorted(scenes, key=lambda scene: (not scene.name.startswith(FIRST), scene.name)))
 
 
 def find(text: str) -> Path:
