@@ -52,19 +52,19 @@ class Exercise:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What `check` says of an answer."""
+class Mark:
+    """Result of checking an answer."""
 
-    verdict: Literal["right", "nearly", "wrong"]
+    result: Literal["right", "nearly", "wrong"]
     hint: str
     """kind of mistake; "" if the answer is right, or if the mistake is not known"""
 
     def __bool__(self) -> bool:
-        return self.verdict == "right"
+        return self.result == "right"
 
     def __repr__(self) -> str:
         words = {"right": "right", "nearly": "nearly right", "wrong": "not right"}
-        return words[self.verdict] + (f": {self.hint}" if self.hint else "")
+        return words[self.result] + (f": {self.hint}" if self.hint else "")
 
 
 def _time_of_rest(restitution: float) -> float:
@@ -209,7 +209,7 @@ def exercises() -> dict[str, Exercise]:
     return dict(_EXERCISES)
 
 
-def check(name: str, value: float) -> Verdict:
+def check(name: str, value: float) -> Mark:
     """Check the answer to an exercise.
 
     Args:
@@ -234,16 +234,16 @@ def check(name: str, value: float) -> Verdict:
         raise ValueError(f"no exercise {name!r}; exercises: {', '.join(_EXERCISES)}") from None
     answer, value = exercise.answer(), float(value)
     if value == answer or (not exercise.is_count and _agrees(value, answer, RIGHT)):
-        return Verdict("right", "")
+        return Mark("right", "")
     known = [text for text, mistaken in exercise.mistakes.items() if _agrees(value, mistaken(), RIGHT)]
     if known:
-        return Verdict("wrong", known[0])
+        return Mark("wrong", known[0])
     if exercise.is_count and abs(value - answer) <= 1.0:
-        return Verdict("nearly", "one more or less" if value.is_integer() else "it is a whole number")
+        return Mark("nearly", "one more or less" if value.is_integer() else "it is a whole number")
     if not exercise.is_count and _agrees(value, answer, NEAR):
-        return Verdict("nearly", "give three digits, and check the rounding on the way")
+        return Mark("nearly", "give three digits, and check the rounding on the way")
     factors = [text for text, factor in MISTAKES.items() if _agrees(value, factor * answer, RIGHT)]
-    return Verdict("wrong", factors[0] if factors else "")
+    return Mark("wrong", factors[0] if factors else "")
 
 
 def _agrees(value: float, expected: float, tolerance: float) -> bool:

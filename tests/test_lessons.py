@@ -148,8 +148,8 @@ def test_answers_and_mistakes_are_told_apart(name: str) -> None:
     answer = exercise.answer()
     assert check(name, answer)
     for hint, mistaken in exercise.mistakes.items():
-        verdict = check(name, mistaken())
-        assert (verdict.verdict, verdict.hint) == ("wrong", hint)
+        mark = check(name, mistaken())
+        assert (mark.result, mark.hint) == ("wrong", hint)
 
 
 @pytest.mark.parametrize(
@@ -157,14 +157,14 @@ def test_answers_and_mistakes_are_told_apart(name: str) -> None:
     [(-1.0, "sign"), (2.0, "twice"), (0.5, "half"), (180.0 / math.pi, "degrees"), (1e3, "unit"), (1e-3, "unit")],
 )
 def test_kind_of_mistake_is_named(factor: float, word: str) -> None:
-    verdict = check("fireworks-1", 1.223 * factor)
-    assert not verdict
-    assert word in verdict.hint
+    mark = check("fireworks-1", 1.223 * factor)
+    assert not mark
+    assert word in mark.hint
 
 
 def test_nearly_right_is_not_right() -> None:
-    assert check("fireworks-1", 1.25).verdict == "nearly"
-    assert check("bounce-1", 20).verdict == "nearly"
+    assert check("fireworks-1", 1.25).result == "nearly"
+    assert check("bounce-1", 20).result == "nearly"
     assert check("bounce-1", 19.08).hint == "it is a whole number"
     assert repr(check("fireworks-1", 7.7)) == "not right"
 
