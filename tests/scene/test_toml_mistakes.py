@@ -85,6 +85,6 @@ def test_number_in_quotes_is_refused_with_the_number(value: str, right: str) -> 
     assert fault.message.endswith(right)
 
 
-@pytest.mark.parametrize("text", [f"a = {'1' * 200_000},", f"a = 1{' ' * 200_000}x", f"a{' a' * 200_000} 1"])
+@pytest.mark.parametrize("text", [f"a = 1{',' * 200_000}", f"a = 1{' ' * 200_000}x", f"a{' a' * 200_000} 1"])
 def test_long_line_takes_no_quadratic_time(text: str) -> None:
     assert [fault.line for fault in faults_of(text)] == [1]
