@@ -52,7 +52,7 @@ class Exercise:
 
 
 @dataclass(frozen=True)
-class Mark:
+class MarkedAnswer:
     """Result of checking an answer."""
 
     result: Literal["right", "nearly", "wrong"]
@@ -209,7 +209,7 @@ def exercises() -> dict[str, Exercise]:
     return dict(_EXERCISES)
 
 
-def check(name: str, value: float) -> Mark:
+def check(name: str, value: float) -> MarkedAnswer:
     """Check the answer to an exercise.
 
     Args:
@@ -234,16 +234,16 @@ def check(name: str, value: float) -> Mark:
         raise ValueError(f"no exercise {name!r}; exercises: {', '.join(_EXERCISES)}") from None
     answer, value = exercise.answer(), float(value)
     if value == answer or (not exercise.is_count and _agrees(value, answer, RIGHT)):
-        return Mark("right", "")
+        return MarkedAnswer("right", "")
     known = [text for text, mistaken in exercise.mistakes.items() if _agrees(value, mistaken(), RIGHT)]
     if known:
-        return Mark("wrong", known[0])
+        return MarkedAnswer("wrong", known[0])
     if exercise.is_count and abs(value - answer) <= 1.0:
-        return Mark("nearly", "one more or less" if value.is_integer() else "it is a whole number")
+        return MarkedAnswer("nearly", "one more or less" if value.is_integer() else "it is a whole number")
     if not exercise.is_count and _agrees(value, answer, NEAR):
-        return Mark("nearly", "give three digits, and check the rounding on the way")
+        return MarkedAnswer("nearly", "give three digits, and check the rounding on the way")
     factors = [text for text, factor in MISTAKES.items() if _agrees(value, factor * answer, RIGHT)]
-    return Mark("wrong", factors[0] if factors else "")
+    return MarkedAnswer("wrong", factors[0] if factors else "")
 
 
 def _agrees(value: float, expected: float, tolerance: float) -> bool:

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from sandbox.measure.preflight.tunnelling import largest_safe_dt
 
 import sandbox
 from sandbox.lessons import check, exercises
+from sandbox.measure.preflight.tunnelling import largest_safe_dt
 
 LESSONS = Path(__file__).parents[1] / "docs" / "lessons"
 DISC = "[[ball]]\nposition = {}\nvelocity = {}\nradius = {}\n"

@@ -87,7 +87,7 @@ def run_id(
     """Return the id of a run, 20 hex digits: a hash of everything that determines its outcome.
 
     `settings` are the resolved settings; the scene's own `[solver]` is ignored. `[play]` is ignored unless a game is
-    played; `game` then has the game and its player.
+    played, and its `speed` always; `game` then has the game and its player.
     """
     return id_of_document(to_document(scene), engine, settings, seed, versions, actions, game)
 
@@ -102,9 +102,11 @@ def id_of_document(
     game: Mapping[str, object] | None = None,
 ) -> str:
     """Return the id of a run as `run_id` does, from the document of its scene."""
-    left_out = ("solver",) if game is not None else ("solver", "play")
+    scene = {key: value for key, value in document.items() if key not in ("solver", "play")}
+    if game is not None and "play" in document:  # the rules read all of it but the speed of the window
+        scene["play"] = {key: value for key, value in document["play"].items() if key != "speed"}
     decides = {
-        "scene": {key: value for key, value in document.items() if key not in left_out},
+        "scene": scene,
         "engine": engine,
         "settings": settings.model_dump(mode="json"),
         "seed": seed,

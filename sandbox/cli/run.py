@@ -48,7 +48,7 @@ from sandbox.cli.options import (
     workers_option,
 )
 from sandbox.cli.progress import RunMonitor, status_line
-from sandbox.cli.recordings import report_remarks
+from sandbox.cli.recordings import is_recording, report_remarks
 from sandbox.cli.run_batch import MAX_PROBLEMS, RunBatch, report_problems
 from sandbox.cli.run_tables import MAX_TIMED, RunsDocument, print_ledgers, print_runs, print_scores, score_rows
 from sandbox.cli.streams import JsonSpool, print_json
@@ -57,6 +57,7 @@ from sandbox.echo import short_repr
 from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
 from sandbox.jsonable import to_json
+from sandbox.measure.preflight import likely_mistakes
 from sandbox.measure.run.recorder import TooLargeError, require_memory
 from sandbox.recording_remarks import remarks_on
 from sandbox.scene.compile.scene import Scene
@@ -180,6 +181,7 @@ def run_command(options: _Options) -> int:
             store.close()
     for name, remarks in _remarks(batch).items():
         report_remarks(name, remarks)
+    _report_mistakes(batch)
     status = report_problems(batch)
     _print_results(batch, options, status)
     return _draw(batch, options, status)
@@ -398,6 +400,15 @@ def _remarks(batch: RunBatch) -> dict[str, tuple[str, ...]]:
     """Return the remarks on each recording that has some."""
     found = {label: remarks_on(recording) for label, recording in batch.plan.recordings()}
     return {label: remarks for label, remarks in found.items() if remarks}
+
+
+def _report_mistakes(batch: RunBatch) -> None:
+    """Print the likely mistakes of the first scenes; recordings, which were captured, have none."""
+    for label, path in batch.plan.scenes[:MAX_PROBLEMS]:
+        if not is_recording(path):
+            with suppress(SceneError):  # of a scene that is stored and was changed since
+                for mistake in likely_mistakes(batch.scene or batch.plan.scene_of(label)):
+                    click.echo(f"* {label}: {mistake.message}", err=True)
 
 
 def _print_summary(batch: RunBatch) -> None:

@@ -9,7 +9,7 @@ import click
 
 from sandbox.batch.find_run import find_run, read_run
 from sandbox.cli.common import collect_errors, engine_advice, exit_with_errors, reasons_not_writable, scene_path
-from sandbox.cli.options import CommandFunction, set_option
+from sandbox.cli.options import CommandFunction, FiniteRange, set_option
 from sandbox.cli.recordings import report_remarks
 from sandbox.cli.streams import OutputError
 from sandbox.echo import MAX_NAMED, short_repr, shorten
@@ -20,6 +20,7 @@ from sandbox.games.registry import has_rules, rules_in_window, rules_of
 from sandbox.recording import Recording
 from sandbox.recording_remarks import remarks_on
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.play import MAX_PLAYBACK_SPEED, MIN_PLAYBACK_SPEED
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import load
@@ -58,6 +59,13 @@ def window_options(command: CommandFunction) -> CommandFunction:
         click.option("--size", type=SizeType(), metavar="WxH", help="size of the window in pixels"),
         click.option("--paused", is_flag=True, help="start paused"),
         click.option(
+            "--speed",
+            type=FiniteRange(MIN_PLAYBACK_SPEED, MAX_PLAYBACK_SPEED),
+            metavar="X",
+            help="playback speed at the start, as a multiple of real time; default: that of the scene, else 1, or less "
+            "so that it lasts at least 3 s",
+        ),
+        click.option(
             "--film",
             type=click.Choice(["gif", "mp4"]),
             default="gif",
@@ -91,6 +99,7 @@ class WindowOptions:
     size: tuple[int, int] | None
     """px"""
     paused: bool
+    speed: float | None
     film: str
     overlays: tuple[str, ...]
     ghost: bool
@@ -203,9 +212,10 @@ def play_command(scene: str | None, engine: str | None, overrides: tuple[str, ..
 
     from sandbox.window.app_state import AppState
 
-    app_state = AppState(engine, overrides)
+    options = WindowOptions(**window)
+    app_state = AppState(engine, overrides, options.speed)
     has_list = path is None and not edits
-    return run_window(app_state, lambda: path is None or app_state.open(path), WindowOptions(**window), has_list, edits)
+    return run_window(app_state, lambda: path is None or app_state.open(path), options, has_list, edits)
 
 
 @click.command(name="replay")
@@ -244,11 +254,12 @@ def replay_command(run: str, engine: str | None, **window: Any) -> int:
         report_remarks(run, remarks_on(source))
     from sandbox.window.app_state import AppState
 
-    app_state, first, known = AppState(show.engine), show, source
+    options = WindowOptions(**window)
+    app_state, first, known = AppState(show.engine, speed=options.speed), show, source
     return run_window(
         app_state,
         lambda: app_state.show(first, None, first.scene, again=lambda: _shown(known, engine)),
-        WindowOptions(**window),
+        options,
     )
 
 

@@ -27,6 +27,7 @@ from sandbox.window.game_controls import GameControls
 from sandbox.window.game_host import GameHost, controls_of, host_of
 from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes
+from sandbox.window.playback.clock import speed_for
 from sandbox.window.playback.diagnostics import GHOST_ENGINES, Diagnostics
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import ParameterValue, parameter_actions
@@ -112,6 +113,8 @@ class Preferences:
     overrides: tuple[Override, ...]
     """values set in every scene that is opened"""
     ghosted: bool = False
+    speed: float | None = None
+    """playback speed of every scene, as a multiple of real time; None for that of the scene"""
     trusting: bool | None = None
     """None if the user has not chosen"""
     parameters: dict[str, Any] = field(default_factory=dict)
@@ -122,6 +125,20 @@ class Preferences:
         diagnostics.watch_divergence(trusting if self.trusting is None else self.trusting)
         if self.ghosted and not diagnostics.has_ghost:
             diagnostics.show_ghost(True)
+
+    def initial_speed(self, view: LiveView | RecordedView, file: Scene) -> float:
+        """Return the playback speed at which a view of a scene starts.
+
+        Args:
+            view: the view.
+            file: its scene as read from its file.
+        """
+        if (speed := self.speed or file.play.speed) is not None:
+            return speed
+        if isinstance(view, RecordedView):
+            return speed_for(view.end_time - view.start_time)
+        has_controls = file.play.game or file.play.arrows or file.play.relaunch or file.drives or file.thrusts
+        return 1.0 if has_controls else speed_for(file.world.duration)
 
     def toggle_ghost(self, diagnostics: Diagnostics) -> None:
         """Start or stop the ghost, also for later scenes."""
@@ -191,12 +208,15 @@ def create_session(scene: Scene, engine: str, settings: Settings | None, message
 class AppState:
     """The open scene or stored run, and the operations on it."""
 
-    def __init__(self, engine: str | None = None, overrides: Iterable[Override] = ()) -> None:
+    def __init__(
+        self, engine: str | None = None, overrides: Iterable[Override] = (), speed: float | None = None
+    ) -> None:
         """Start without a scene.
 
         Args:
             engine: preferred engine of all scenes; by default `exact` for tables and `pymunk` for all other scenes.
             overrides: values set in every scene that is opened.
+            speed: playback speed at which every scene starts; by default that of the scene.
         """
         self.view: LiveView | RecordedView | None = None
         self.path: Path | None = None
@@ -239,7 +259,7 @@ class AppState:
         self.faults: tuple[str, ...] = ()
         self.on_scene_changed: Callable[[bool], None] | None = None
         """callback after a change of the view; its argument is whether the new view is of the same scene"""
-        self._preferences = Preferences(engine, tuple(overrides))
+        self._preferences = Preferences(engine, tuple(overrides), speed=speed)
         self._again: Callable[[], LiveView | RecordedView] | None = None
         self._tried: Path | None = None  # faulty file that was tried after the open one
 
@@ -286,6 +306,7 @@ class AppState:
         if self.view is not None:
             self.view.close()
         self.view, self.path, self.file = view, path, file
+        view.clock.speed = self._preferences.initial_speed(view, file)
         if isinstance(view, RecordedView):
             self.reach = view.run.bounds
         elif again is not None and not same:

@@ -330,6 +330,15 @@ def test_id_depends_on_every_input_of_a_run() -> None:
     assert len(ids) == 8
 
 
+def test_id_of_a_game_depends_on_the_rules_but_not_on_the_speed_of_the_window() -> None:
+    texts = ("players = 1", "players = 1\nspeed = 0.5", "players = 2")
+    scenes = [loads(f"{dumps(SCENE)}\n[play]\ngame = 'landing'\n{text}\n") for text in texts]
+    same, slow, other = [
+        run_id(scene, "pymunk", SCENE.solver, 7, VERSIONS, game={"name": "landing"}) for scene in scenes
+    ]
+    assert same == slow != other
+
+
 def test_scene_hash_depends_on_the_scene_alone(tmp_path: Path) -> None:
     other = loads(dumps(SCENE), overrides=["world.duration=3.0"])
     with Store(tmp_path) as store:

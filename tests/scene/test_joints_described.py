@@ -106,7 +106,7 @@ def test_faulty_force_is_refused_with_line_and_path(text: str, faults: list[str]
     assert_faults(f"{TWO}{text}\n", *faults)
 
 
-@pytest.mark.parametrize("joint", ["joint=5\n", "joint=[5]\n", "attraction={}\n"])
+@pytest.mark.parametrize("joint", ["joint=5\n", "joint=[5]\n", "attraction=3\n"])
 def test_joint_that_is_not_an_array_of_tables_is_refused(joint: str) -> None:
     (fault,) = faults_of(joint + TWO)
     assert fault.line == 1

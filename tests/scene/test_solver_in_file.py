@@ -119,7 +119,7 @@ def test_invalid_setting_or_text_is_refused() -> None:
         with_solver("[solver]\ndt = 0.01\n" + BALL, {"dt": -1.0}, "f.toml")
     with pytest.raises(SceneError, match=r"solver\.speed"):
         with_solver(BALL, {"speed": 1})
-    with pytest.raises(SceneError, match="not TOML"):
+    with pytest.raises(SceneError, match=r"\[solver\]"):
         with_solver("[solver\n", {"dt": 1.0})
 
 

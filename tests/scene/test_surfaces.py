@@ -10,7 +10,7 @@ from sandbox.measure.preflight import warnings
 from sandbox.scene.compile.contacts import contact_matrix, mix, pair_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from tests.scene.faults import assert_faults
+from tests.scene.faults import assert_faults, faults_of
 from tests.scene.touching import coefficient, elements, touching_scenes
 
 
@@ -121,6 +121,11 @@ FALLOFF = {"restitution_falloff": 0.1}
 )
 def test_fault_has_its_path_and_message(document: dict[str, Any], path: str, words: str) -> None:
     assert_faults(document, f"{path}: {words}")
+
+
+def test_kick_is_no_remedy_for_the_restitution_of_a_ball() -> None:
+    (fault,) = faults_of({"ball": [{**BALL, "restitution": 1.5}]})
+    assert "kick" not in fault.message
 
 
 def test_falloff_of_a_material_is_overridden_by_the_shape() -> None:

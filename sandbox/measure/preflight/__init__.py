@@ -2,6 +2,7 @@
 
 from sandbox.measure.preflight.checks import FAILED, warnings
 from sandbox.measure.preflight.diagnostic import Diagnostic, floor_3_digits
+from sandbox.measure.preflight.likely_mistakes import likely_mistakes
 from sandbox.measure.preflight.notes import notes
 from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds, unknown_speeds
 from sandbox.measure.preflight.trial_run import PreflightResult, TrialCoverage, run_preflight
@@ -16,6 +17,7 @@ __all__ = [
     "TunnellingRisk",
     "floor_3_digits",
     "largest_safe_dt",
+    "likely_mistakes",
     "notes",
     "run_preflight",
     "top_speeds",

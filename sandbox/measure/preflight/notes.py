@@ -11,6 +11,7 @@ from sandbox.engines.pymunk_adapter.contact_names import confused_elements
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, PymunkEngine, is_space_default, space_attributes
 from sandbox.formatting import format_fraction
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
+from sandbox.measure.preflight.likely_mistakes import likely_mistakes
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.seams import seam_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
@@ -27,7 +28,7 @@ MAX_OUTLINES = 20
 
 
 def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
-    """Return notes: names of settings, units that look like pixels, concave outlines, limits of the audit and others.
+    """Return notes: names of settings, likely mistakes of units, concave outlines, limits of the audit and others.
 
     Args:
         scene: the scene.
@@ -41,7 +42,7 @@ def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
         *_pymunk(scene, engine),
         *(_pymunk_dampers(scene) if engine == "pymunk" else ()),
         *(_contact_names(scene) if engine in (None, "pymunk") else ()),
-        *_pixels(scene),
+        *likely_mistakes(scene),
         *_flight(scene),
         *(_joint_order(scene) if engine in (None, "reference") else ()),
         *_outlines(scene),
@@ -50,26 +51,6 @@ def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
         *horizon_notes(scene),
         *break_notes(scene),
     ]
-
-
-def _pixels(scene: Scene) -> Iterator[Diagnostic]:
-    """Yield a note if bodies are metres wide, and gravity points up or is far stronger than on any planet."""
-    bodies, (_, upward) = scene.bodies, scene.world.gravity
-    pull, moves = math.hypot(*scene.world.gravity), ~bodies.fixed
-    if not moves.any() or pull == 0.0:
-        return
-    width = 2.0 * float(np.median(bodies.thin[moves]))
-    if width >= PIXEL_WIDTH and (pull >= PIXEL_GRAVITY or upward > 0.0):
-        points = ", and points up, as y does here" if upward > 0.0 else ""
-        message = (
-            f"bodies are {width:.3g} m wide, and gravity is {pull:.4g} m/s²{points}: are these pixels? Lengths are in "
-            "metres and y points up; for 100 pixels per metre, divide lengths, speeds and gravity by 100"
-        )
-        yield Diagnostic("pixels", message, {"width": width, "gravity": pull})
-
-
-PIXEL_WIDTH, PIXEL_GRAVITY = 5.0, 100.0
-"""Median width of bodies, m, and gravity, m/s², from which on numbers look like pixels."""
 
 
 FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")

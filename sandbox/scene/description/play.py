@@ -10,6 +10,8 @@ from sandbox.game_names import game_names, is_game
 from sandbox.scene.description.base import Colour, Name, Part, Point, Radius, Velocity
 from sandbox.scene.description.game_tables import with_game_tables
 
+MIN_PLAYBACK_SPEED, MAX_PLAYBACK_SPEED = 1e-9, 10.0
+PlaybackSpeed = Annotated[float, Field(ge=MIN_PLAYBACK_SPEED, le=MAX_PLAYBACK_SPEED)]
 LineWidth = Annotated[float, Field(ge=0, le=1e9)]
 
 
@@ -112,6 +114,9 @@ class _Header(Part):
     """distance that one key press moves it, m"""
     relaunch: Name | None = None
     """name of a generator whose bodies the Space key starts again with new random values"""
+    speed: PlaybackSpeed | None = None
+    """playback speed in the window at the start, as a multiple of real time; default: 1, or less, so that a scene
+    without controls lasts at least 3 s"""
     show: Literal["overlap"] | None = None
     """Colour bodies that overlap something."""
     game: Annotated[str, _GameName()] | None = None

@@ -12,9 +12,11 @@ from pydantic import ValidationError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Wording
 from sandbox.scene.description.game_tables import PRESETS, has_preset
-from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, shown
+from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, PathKey, shown
 from sandbox.scene.files.document import TAGGED, keys_of, list_tables, model_at, read_model
+from sandbox.scene.files.expressions import evaluated
 from sandbox.scene.files.presets import expanded_document, stated_location
+from sandbox.scene.files.toml_mistakes import number_remedy
 from sandbox.scene.validate.scene import crosscheck
 
 _RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
@@ -32,6 +34,18 @@ _DEGREES = 720
 
 _RAD = re.compile(r"\brad\b(?!/)")
 """rad, but not rad/s"""
+
+
+def faults_of(document: dict[str, Any], error: ValidationError) -> list[LocatedMessage]:
+    """Return the faults of a document that its model refuses, and those of its valid parts."""
+    errors = [each for each in error.errors(include_url=False) if not _is_long_enough(each)]
+    wrong = [tuple(details["loc"]) for details in errors]
+    return [*map(explain, errors), *check_valid_remainder(document, wrong)]
+
+
+def _is_long_enough(details: Any) -> bool:
+    """Return whether an array is long enough; pydantic counts only the elements without faults."""
+    return bool(details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"])
 
 
 def explain(details: Any) -> LocatedMessage:
@@ -77,9 +91,21 @@ def explain(details: Any) -> LocatedMessage:
     message = f"must be {expected}, is {shown(value)}"
     if kind in _RANGES and abs(value) <= _DEGREES and _is_angle(tuple(details["loc"])):
         message += f"; angles are in radians, {value:g}° is {math.radians(value):.4g}"
-    elif kind == "less_than_equal" and location[-1] == "restitution":
+    elif kind in ("float_type", "int_type") and isinstance(value, str):
+        message += _number_in_quotes(value)
+    elif kind == "less_than_equal" and location[-1] == "restitution" and location[0] in ("wall", "post"):
         message += "; walls and posts add speed with kick = { speed = … }, in m/s"
     return location, message
+
+
+def _number_in_quotes(text: str) -> str:
+    """Return the remedy for a number that is given as text, such as `"1/60"` or `"3 s"`; "" for other texts."""
+    if (remedy := number_remedy(text)) is not None:
+        return f"; {remedy[0]}: {remedy[1]}"
+    try:
+        return f"; write {evaluated(text):g} without quotes"
+    except ValueError:
+        return ""
 
 
 def explained(error: ValidationError, location: Location) -> list[LocatedMessage]:
@@ -289,14 +315,20 @@ NEUTRAL_VALUES: dict[str, dict[str, Any]] = {
 _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - {"title", "about"}
 
 
+_COMMON_LOCATIONS = {("world",), ("solver",), ("play",)}
+"""Tables that every scene has: one that is no table at all is taken as left out."""
+
 REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",)}
 """Tables that refer to bodies, and to which nothing refers: faulty ones are omitted."""
 
 PARTS = ("ball", "box", "capsule", "polygon")
 """Tables of the parts of a body, which needs at least one."""
 
-INDEPENDENT_KEYS = {("material",), ("name",), ("between",)}
-"""Keys that no placeholder affects: their faults are reported even for an element with other faults."""
+INDEPENDENT_KEYS = {
+    "material", "name", "between", "normal", "velocity", "angular_velocity", "kinematic", "fixed_rotation", "lift",
+    "kick", "closed",
+}  # fmt: skip
+"""Keys whose faults no placeholder causes: they are reported even for an element with other faults."""
 
 
 def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -> list[LocatedMessage]:
@@ -308,6 +340,9 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
     document = copy.deepcopy(document)
     touched: set[Location] = set()
     wrong = list(wrong)
+    single = [location[0] for location in wrong if _is_single_table(document, location)]
+    if single:
+        return _faults_within(document, single)
     if () in wrong or any(location[:1] == (key,) for location in wrong for key in PRESETS):
         return []  # the document, or the preset that makes most of it, cannot be read
     kept = _without_faulty(document, wrong)
@@ -319,6 +354,10 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
                 return []  # many references would appear to be missing
             del document[location[0]]  # an unknown key or a title: nothing depends on it
             continue
+        if location in _COMMON_LOCATIONS:
+            document[str(location[0])] = NEUTRAL_VALUES.get(str(location[0]), {})
+            touched.add(location)
+            continue
         depth = 2 if len(location) > 1 and isinstance(location[1], int) else 1
         holder: Any = document
         for key in location[:depth]:
@@ -327,7 +366,9 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
             return []
         holder.pop(location[depth], None)
         if "duration" not in holder:
-            holder.update(NEUTRAL_VALUES.get(str(location[0]), {}))
+            is_flat = location[0] == "plane" and holder.get("normal") in ([0, 0], [0.0, 0.0])  # a fault of its own
+            neutral = NEUTRAL_VALUES.get(str(location[0]), {})
+            holder.update({key: value for key, value in neutral.items() if key != "normal" or not is_flat})
         touched.add(location[:depth])
         if location[0] == "body" and not any(holder.get(part) for part in PARTS):
             holder["ball"] = [{"radius": 1.0}]
@@ -341,10 +382,32 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
         scene = read_model(document)
     except ValueError:
         return []
-    found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in INDEPENDENT_KEYS]
+    found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or _is_independent(f[0])]
     if document is not stated:
         found = [(stated_location(location, document, stated), message) for location, message in found]
     return [(_original_index(location, kept), message) for location, message in found]
+
+
+def _is_independent(location: Location) -> bool:
+    """Return whether no placeholder in an element can cause the fault at a location in it."""
+    return len(location) > 2 and (location[2] in INDEPENDENT_KEYS or (location[0], location[2]) == ("wall", "points"))
+
+
+def _is_single_table(document: dict[str, Any], location: Location) -> bool:
+    """Return whether a location is that of a table such as [ball] where a list of tables, [[ball]], is needed."""
+    return len(location) == 1 and location[0] in list_tables() and isinstance(document.get(str(location[0])), dict)
+
+
+def _faults_within(document: dict[str, Any], single: list[PathKey]) -> list[LocatedMessage]:
+    """Return the further faults of a document in which some tables are single that must be lists."""
+    listed = {key: [value] if key in single else value for key, value in document.items()}
+    try:
+        found = crosscheck(read_model(listed))
+    except ValidationError as error:
+        found = faults_of(listed, error)
+    except ValueError:
+        return []
+    return [((key, *location[2:]) if (key := location[:1][0]) in single else location, m) for location, m in found]
 
 
 def _without_faulty(document: dict[str, Any], wrong: list[Location]) -> dict[str, list[int]]:

@@ -4,7 +4,6 @@ tomllib parses; pydantic validates in strict mode on JSON, so that arrays become
 relations between elements, such as references to bodies by name.
 """
 
-import re
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -112,7 +111,9 @@ class SceneText:
             document = tomllib.loads(text)
             check_value(document)
         except tomllib.TOMLDecodeError as error:
-            raise SceneError([_syntax_fault(file, text, error)]) from None
+            from sandbox.scene.files.toml_mistakes import syntax_fault  # imported only if there are faults
+
+            raise SceneError([syntax_fault(file, text, error)]) from None
         except NestingError as error:
             raise SceneError([Fault(file, error.line, "", str(error))]) from None
         except ValueError as error:  # an integer of thousands of digits
@@ -173,11 +174,9 @@ def from_document(
         scene = read_model(document)
     except ValidationError as error:
         # imported only if there are faults
-        from sandbox.scene.files.diagnosis import check_valid_remainder, explain
+        from sandbox.scene.files.diagnosis import faults_of
 
-        errors = [e for e in error.errors(include_url=False) if not _is_long_enough(e)]
-        found = [explain(details) for details in errors]
-        found += check_valid_remainder(document, [tuple(details["loc"]) for details in errors])
+        found = faults_of(document, error)
     except ValueError as error:
         found = [((), f"the scene cannot be read: {error}")]
     else:
@@ -282,16 +281,3 @@ def _read(path: str | Path) -> str:
         else:
             reason = f"{error}; generators such as [[grid]] need less text"
         raise SceneError([Fault.of(file, reason)]) from None
-
-
-def _is_long_enough(details: Any) -> bool:
-    """Return whether an array is long enough; pydantic counts only the elements without faults."""
-    return bool(details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"])
-
-
-def _syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:
-    message = str(error)
-    at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
-    if at is None:  # at the end of the document
-        return Fault(file, text.rstrip("\n").count("\n") + 1, "", f"not TOML: {message}")
-    return Fault(file, int(at[1]), "", f"not TOML: {message[: at.start()]}, at column {at[2]}")

@@ -21,7 +21,6 @@ from sandbox.scene.description.play import Play
 from sandbox.scene.description.world import Kick, Pair, Settings, World
 from sandbox.scene.editing.fields import (
     FieldSpec,
-    evaluated,
     fields_of,
     format_number,
     format_value,
@@ -29,6 +28,7 @@ from sandbox.scene.editing.fields import (
     summary,
     unit_of,
 )  # fmt: skip
+from sandbox.scene.files.expressions import evaluated
 from tests.scene.models import models, models_in
 
 SPECS = tuple((model, spec) for model in models() for spec in fields_of(model))
