@@ -18,7 +18,7 @@ radius = 0.4
 BALL_START = (-1.0, 0.0)
 AT_REST = f'title = "Rest"\n[world]\nduration = 5.0\n{_ROOM}'
 """A ball at rest, without gravity."""
-MOVING = f'title = "Moving"\n[world]\nduration = 1.5\n{_ROOM}velocity = [1.0, 0.0]\nrestitution = 1.0\n'
+MOVING = f'title = "Moving"\n[world]\nduration = 5.0\n{_ROOM}velocity = [1.0, 0.0]\nrestitution = 1.0\n'
 """A ball that moves between two walls at 1 m/s without loss."""
 
 

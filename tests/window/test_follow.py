@@ -19,6 +19,7 @@ pytestmark = pytest.mark.fail_slow(60)  # every shipped scene
 LEAVING = (
     'title = "Leaving"\n'
     + toml("world", gravity=[0.0, -10.0], duration=1.0)
+    + toml("play", speed=1.0)
     + toml("solver", dt=0.01)
     + toml("ball", name="a", position=[0.0, 0.0], velocity=[5.0, 5.0], radius=0.2, collides="none")
     + toml("ball", name="b", position=[1.0, 0.0], velocity=[-5.0, 0.0], radius=0.2, collides="none")
