@@ -280,6 +280,7 @@ if TYPE_CHECKING:
         Material as Material,
         Pair as Pair,
         Settings as Settings,
+        SettingsChanges as SettingsChanges,
         World as World,
     )
     from sandbox.scene.errors import (
@@ -364,7 +365,7 @@ _NAMES = {
     ),
     "sandbox.scene.description.play": "Marking Play PlayPart Spot",
     "sandbox.scene.description.surface": "ContactModels Floor Pocket Shot Stroke",
-    "sandbox.scene.description.world": "Kick Material Pair Settings World",
+    "sandbox.scene.description.world": "Kick Material Pair Settings SettingsChanges World",
     "sandbox.scene.errors": "Fault SceneError SettingsError",
     "sandbox.scene.files.load": "dumps load loads",
     "sandbox.scene.geometry.shapes": "Shapes",

@@ -143,7 +143,7 @@ def _near(method: object) -> str:
     if not isinstance(method, str):
         return ""
     name = method.lower().replace("-", "_").replace(" ", "_")
-    known = {**{each: each for each in INTEGRATORS}, **SYNONYMS}
+    known: dict[str, str] = {**{str(each): str(each) for each in INTEGRATORS}, **SYNONYMS}
     containing = [each for each in known if name and name in each]
     close = containing or difflib.get_close_matches(name, known, n=1)
     return f"did you mean {known[close[0]]!r}? " if close else ""

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from threading import Event, Lock
-from typing import Any, Literal
+from typing import Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +34,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.random_streams import Stream, draws
 from sandbox.schedule import frame_count
@@ -112,7 +112,7 @@ def ensemble(
     threads: int = 1,
     seed: int | None = None,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Ensemble:
     """Run a scene many times from normally distributed starts.
 

@@ -3,7 +3,7 @@
 import difflib
 import math
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypedDict
 
 from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
@@ -80,6 +80,33 @@ MAX_STIFFNESS = 1e30
 """N/m"""
 MAX_SLEEP_TIME = 1e6
 """s"""
+
+
+class SettingsChanges(TypedDict, total=False):
+    """Changes to `Settings`, as keyword arguments; the keys and their types are those of its fields."""
+
+    dt: float
+    substeps: int
+    iterations: int
+    slop: float | None
+    bias: float | None
+    persistence: int | None
+    stiffness: float | None
+    damping: float | None
+    half_kick: bool
+    integrator: IntegratorName | None
+    detection: DetectionName | None
+    response: Response | None
+    impact: ImpactLaw | None
+    broad_phase: BroadPhaseName | None
+    joints: Joints | None
+    stretch: float | None
+    continuous: bool | None
+    sleeping: bool | None
+    sleep_time: float | None
+    idle_speed: float | None
+    workers: int | None
+    record_every: int
 
 
 class Settings(Part):
