@@ -148,6 +148,12 @@ def start(
         Refusal: the engine does not support something that the scene or a setting needs.
         SceneError: the name or path is not that of a valid scene.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> simulation = sandbox.start("bounce", dt=0.01)
+        >>> simulation.step()
+        >>> round(simulation.time, 3)
+        0.01
     """
     setup = Setup.of(scene if isinstance(scene, Setup) else as_scene(scene))
     if changes:

@@ -87,6 +87,11 @@ def compare(
             `settings` sets too.
         SceneError: a swept key or value is invalid.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> found = sandbox.compare("spring", "pymunk", dt=0.01)
+        >>> [row.engine for row in found.rows]
+        ['pymunk']
     """
     scene = as_scene(scene)
     both = [key for key in sweep or () if short_key(key) in settings]

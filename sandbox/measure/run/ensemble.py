@@ -138,6 +138,11 @@ def ensemble(
         SceneError: the name or path is not that of a valid scene.
         TooLargeError: the results would not fit into memory.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> ends = sandbox.ensemble("bounce", 3, vary={"ball.*.position": 0.001}, engine="pymunk", dt=0.01)
+        >>> ends.position.shape
+        (3, 1, 2)
     """
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
     engine_named(engine)

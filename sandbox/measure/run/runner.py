@@ -88,6 +88,11 @@ def run(
         SettingsError: a setting is invalid.
         UnsuitableSceneError: the scene of a recording lacks an element that its game needs.
         KeyboardInterrupt: Ctrl-C was pressed, even if a library converted it to another exception.
+
+    Example:
+        >>> run = sandbox.run("bounce", dt=0.01)
+        >>> run.status, run.position.shape
+        ('ok', (601, 1, 2))
     """
     if isinstance(scene, Recording):
         recording = scene if engine is None else scene.on(engine)

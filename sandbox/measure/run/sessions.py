@@ -131,6 +131,11 @@ def play_out(
         SceneError: the script has faults.
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
+
+    Example:
+        >>> played = sandbox.play_out(sandbox.load("landing"), "none")
+        >>> played.recording.presses
+        ()
     """
     rules = required_rules(scene)
     game = (
