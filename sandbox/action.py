@@ -10,7 +10,20 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from sandbox.echo import MAX_NAMED, short_repr, shorten
-from sandbox.scene.description.base import MAX_SPEED, Angle, AngularVelocity, BodySpec, Name, Part, Point, Velocity
+from sandbox.scene.description.base import (
+    MAX_SPEED,
+    Accepts,
+    Angle,
+    AngularVelocity,
+    BodySpec,
+    Coordinates,
+    Name,
+    OptionalPoint,
+    Part,
+    PointField,
+    Velocity,
+    default,
+)
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Course
@@ -56,7 +69,7 @@ class Impulse(Timed):
     kind: Literal["impulse"] = "impulse"
     body: Name
     """name of the body"""
-    impulse: tuple[Amount, Amount]
+    impulse: Accepts[tuple[Amount, Amount], Sequence[float]]
     """linear impulse at the centre of mass, N·s"""
     angular: Amount = 0.0
     """angular impulse, N·m·s"""
@@ -71,7 +84,7 @@ class Force(Timed):
     kind: Literal["force"] = "force"
     body: Name
     """name of the body"""
-    force: tuple[Amount, Amount]
+    force: Accepts[tuple[Amount, Amount], Sequence[float]]
     """force at the centre of mass, N"""
     torque: Amount = 0.0
     """torque, N·m"""
@@ -87,11 +100,11 @@ class Move(Timed):
     kind: Literal["move"] = "move"
     body: Name
     """name of the body"""
-    position: Point
+    position: PointField
     """new position of the centre of mass, m"""
     angle: Angle | None = None
     """new angle, rad; default: unchanged"""
-    velocity: Velocity | None = None
+    velocity: Accepts[Velocity | None, Sequence[float] | None] = default(None)
     """new velocity, m/s; default: unchanged"""
     angular_velocity: AngularVelocity | None = None
     """new angular velocity, rad/s; default: unchanged"""
@@ -167,9 +180,9 @@ class Pull(Timed):
     kind: Literal["pull"] = "pull"
     body: Name
     """name of the body"""
-    grip: Point = (0.0, 0.0)
+    grip: PointField = default((0.0, 0.0))
     """point at which the body is pulled, in its own frame about the centre of mass, m"""
-    target: Point | None = None
+    target: OptionalPoint = default(None)
     """point that the grip is pulled to, m; default: release the body"""
 
 
@@ -205,7 +218,7 @@ class Reshape(Timed):
     kind: Literal["reshape"] = "reshape"
     thing: Name
     """name of the wall"""
-    points: Course
+    points: Accepts[Course, Coordinates]
     """new corners of the wall, m"""
 
 

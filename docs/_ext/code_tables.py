@@ -9,7 +9,7 @@ from types import NoneType
 from typing import get_args, get_type_hints
 
 from gallery import gallery
-from python_tables import model_fields
+from python_tables import classes, model_fields
 from scene_tables import cell, scene_overview, scene_tables, top_keys
 
 import sandbox
@@ -238,6 +238,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "scene-overview": scene_overview,
     "scene-top": top_keys,
     "model": model_fields,
+    "classes": classes,
     "engines": engines,
     "solver-choices": solver_choices,
     "causes": causes,

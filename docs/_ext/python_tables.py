@@ -12,6 +12,12 @@ def model_fields(*names: str) -> str:
     return "\n\n".join(_model(name) for name in names)
 
 
+def classes(*names: str) -> str:
+    """Return the classes among the public names, each with its docstring only."""
+    lines = "\n".join(f".. autoclass:: sandbox.{name}\n   :no-members:" for name in names)
+    return f"```{{eval-rst}}\n{lines}\n```"
+
+
 def _model(name: str) -> str:
     model = getattr(sandbox, name)
     assert issubclass(model, BaseModel)

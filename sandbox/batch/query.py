@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, overload
 from urllib.parse import quote
 
 import numpy as np
@@ -35,6 +35,10 @@ from sandbox.measure.proportion import wilson_interval
 from sandbox.scene.description.world import Settings
 from sandbox.signals import reraise_interrupt
 from sandbox.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
 
 TableKind = Literal["pandas", "polars", "numpy"]
 Columns = dict[str, npt.NDArray[Any]]
@@ -179,6 +183,49 @@ class StoredRuns:
         """
         text = f"SELECT status, count(*) FROM {self._source}{self._filter(where)} GROUP BY status ORDER BY 2 DESC"
         return {str(status): int(count) for status, count in self._execute(text)}
+
+    @overload
+    def table(
+        self,
+        where: str | None = None,
+        columns: Sequence[str] | None = None,
+        sort: Sequence[str] = (),
+        limit: int | None = None,
+        *,
+        kind: Literal["numpy"],
+    ) -> Columns: ...
+
+    @overload
+    def table(
+        self,
+        where: str | None = None,
+        columns: Sequence[str] | None = None,
+        sort: Sequence[str] = (),
+        limit: int | None = None,
+        *,
+        kind: Literal["pandas"],
+    ) -> "pandas.DataFrame": ...
+
+    @overload
+    def table(
+        self,
+        where: str | None = None,
+        columns: Sequence[str] | None = None,
+        sort: Sequence[str] = (),
+        limit: int | None = None,
+        *,
+        kind: Literal["polars"],
+    ) -> "polars.DataFrame": ...
+
+    @overload
+    def table(
+        self,
+        where: str | None = None,
+        columns: Sequence[str] | None = None,
+        sort: Sequence[str] = (),
+        limit: int | None = None,
+        kind: TableKind | None = None,
+    ) -> "pandas.DataFrame | polars.DataFrame | Columns": ...
 
     def table(
         self,

@@ -132,8 +132,26 @@ def _is_scene(text: str) -> bool:
     return True
 
 
+def _show_version(context: click.Context, _: click.Parameter, is_given: bool) -> None:
+    """Print the version with the digest of the sources, and those of the libraries that numbers depend on."""
+    if not is_given or context.resilient_parsing:
+        return
+    from sandbox.provenance import versions
+
+    own, *others = sorted(versions().items(), key=lambda each: each[0] != "sandbox")
+    click.echo(f"sandbox, version {own[1]}\n{', '.join(f'{name} {version}' for name, version in others)}")
+    context.exit()
+
+
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(package_name="sandbox2d", prog_name="sandbox")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_show_version,
+    help="Show the versions of the sandbox and of its libraries.",
+)
 def cli() -> None:
     """2D game physics sandbox: run one scene file on several physics engines, and measure error and cost."""
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.fixed import AWAY, PlaneReach
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.validate.references import generators
@@ -127,7 +127,10 @@ def _first_body(scene: Scene, generator: BodySource) -> int:
 
 
 def start(
-    scene: Scene | Setup | str | Path, engine: str = "pymunk", settings: Settings | None = None
+    scene: Scene | Setup | str | Path,
+    engine: str = "pymunk",
+    settings: Settings | None = None,
+    **changes: Unpack[SettingsChanges],
 ) -> "SwitchableSimulation":
     """Start a scene on an engine, to be stepped by hand.
 
@@ -135,6 +138,7 @@ def start(
         scene: the scene, or its name or path, as `load` takes it; or a setup, to start from another state.
         engine: name of the engine.
         settings: settings of the solver; default: the `[solver]` of the scene.
+        changes: changes to these settings, such as `dt=0.001`.
 
     Returns:
         A `Simulation` that accepts every action, also `Switch`, `Launch` and `Pull`.
@@ -143,8 +147,18 @@ def start(
         UnknownEngineError: no engine has that name.
         Refusal: the engine does not support something that the scene or a setting needs.
         SceneError: the name or path is not that of a valid scene.
+        SettingsError: a setting is invalid.
+
+    Example:
+        >>> simulation = sandbox.start("bounce", dt=0.01)
+        >>> simulation.step()
+        >>> round(simulation.time, 3)
+        0.01
     """
-    return SwitchableSimulation(scene if isinstance(scene, Setup) else as_scene(scene), engine, settings)
+    setup = Setup.of(scene if isinstance(scene, Setup) else as_scene(scene))
+    if changes:
+        settings = (settings or setup.scene.solver).replace(**changes)
+    return SwitchableSimulation(setup, engine, settings)
 
 
 class SwitchableSimulation:

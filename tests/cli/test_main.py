@@ -9,6 +9,7 @@ import pytest
 
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
+from sandbox.provenance import versions
 from sandbox.scene.files.shipped_scenes import shipped
 from tests.cli.calling import json_of, lines_of, output_of, process, write_scene
 
@@ -38,6 +39,8 @@ def test_help_and_version_work_as_a_process() -> None:
     assert done.stdout.startswith("Usage: sandbox ")
     done = process("--version")
     assert (done.returncode, done.stdout.split()[0]) == (0, "sandbox,")
+    assert all(f"{name} {number}" in done.stdout for name, number in versions().items() if name != "sandbox")
+    assert versions()["sandbox"] in done.stdout
 
 
 def test_call_without_a_command_prints_suggestions_and_is_status_2(capfd: pytest.CaptureFixture[str]) -> None:

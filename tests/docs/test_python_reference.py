@@ -10,7 +10,7 @@ import sandbox
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/python.md").read_text(encoding="utf-8")
 DIRECTIVES = re.findall(r"^\.\. (?:auto\w+|py:data):: (\S+)$", PAGE, flags=re.MULTILINE)
-MODELS = re.findall(r"^```\{generated\} model (.+)$", PAGE, flags=re.MULTILINE)
+MODELS = re.findall(r"^```\{generated\} (?:model|classes) (.+)$", PAGE, flags=re.MULTILINE)
 DOCUMENTED = {*DIRECTIVES, *(f"sandbox.{name}" for line in MODELS for name in line.split())}
 
 

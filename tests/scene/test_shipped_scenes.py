@@ -13,6 +13,7 @@ import pytest
 from pydantic import BaseModel
 
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import is_required
 from sandbox.scene.files import shipped_scenes as module
 from sandbox.scene.files.json_schema import dumps, schema
 from sandbox.scene.files.load import load
@@ -151,7 +152,7 @@ def test_table_has_exactly_the_keys_of_its_model(part: type[BaseModel]) -> None:
     table = cached_schema() if part is Scene else cached_schema()["$defs"][part.__name__]
     fields = {field.alias or name: field for name, field in part.model_fields.items()}
     assert set(table["properties"]) == set(fields)
-    assert set(table.get("required", ())) == {key for key, field in fields.items() if field.is_required()}
+    assert set(table.get("required", ())) == {key for key, field in fields.items() if is_required(field)}
     assert table["additionalProperties"] is False
 
 

@@ -16,12 +16,13 @@ from PIL import Image
 
 import sandbox
 from sandbox.report.style import COLOURS
+from sandbox.scene.description.world import DetectionName, IntegratorName
 
 from .files import save_png
 
 COLOURS_OF_FILE = 64
 BLUE, ORANGE, GREEN, YELLOW, PINK, SKY = COLOURS
-INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4")
+INTEGRATORS: list[IntegratorName] = ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
 
 
 def _legend_outside(axes: Axes) -> None:
@@ -34,7 +35,8 @@ def ball(axes: Axes) -> None:
     scene = sandbox.load("ball")
     time = np.linspace(0, 1, 200)
     axes.plot(time, 10 - 9.81 / 2 * time**2, "k", label="closed form")
-    for integrator, colour in (("explicit_euler", BLUE), ("semi_implicit_euler", ORANGE)):
+    integrators: list[tuple[IntegratorName, str]] = [("explicit_euler", BLUE), ("semi_implicit_euler", ORANGE)]
+    for integrator, colour in integrators:
         run = sandbox.run(scene, "reference", dt=0.2, integrator=integrator)
         axes.plot(run.time, run.position[:, 0, 1], "o-", color=colour, label=f"{integrator}, dt = 0.2 s")
     axes.set(xlabel="time, s", ylabel="height, m")
@@ -84,7 +86,8 @@ def bisection(axes: Axes) -> None:
     """Draw a fast ball with four kinds of detection."""
     scene = sandbox.load("fast_ball")
     axes.plot([0, 0.045, 0.3], [5, 0.5, 26], "k", linewidth=1, label="truth")
-    for detection, colour, mark in zip(("discrete", "bisect", "swept", "shrink"), COLOURS, "oxs^", strict=False):
+    detections: list[DetectionName] = ["discrete", "bisect", "swept", "shrink"]
+    for detection, colour, mark in zip(detections, COLOURS, "oxs^", strict=False):
         run = sandbox.run(scene, "reference", detection=detection).at([0, 1, 2, 3])
         face = "none" if mark in "s^" else colour
         size = 9 if mark in "s^" else 6
@@ -110,7 +113,8 @@ def bounce(axes: Axes) -> None:
 def kepler(axes: Axes) -> None:
     """Draw five orbits by two integrators."""
     scene = sandbox.load("kepler")
-    for integrator, colour in (("explicit_euler", ORANGE), ("velocity_verlet", BLUE)):
+    integrators: list[tuple[IntegratorName, str]] = [("explicit_euler", ORANGE), ("velocity_verlet", BLUE)]
+    for integrator, colour in integrators:
         run = sandbox.run(scene, "reference", integrator=integrator, audit=False)
         axes.plot(*run.position[::20, 0].T, color=colour, linewidth=1, label=integrator)
     axes.plot(0, 0, "*", color=YELLOW, markersize=12)

@@ -93,6 +93,11 @@ def integrate(
         TypeError: f is no function of (t, x, u).
         ValueError: the method is unknown, the times or x0 are invalid, f fails at x0, or f returns an array of another
             shape than x.
+
+    Example:
+        >>> found = sandbox.integrate(lambda t, x, u: -x, [1.0], [0.0, 0.5, 1.0], "rk4")
+        >>> round(float(found.x[-1, 0]), 4)
+        0.3682
     """
     if not isinstance(method, str) or method not in INTEGRATORS:
         raise ValueError(f"no integrator {short_repr(method)}; {_near(method)}integrators: {', '.join(INTEGRATORS)}")
@@ -143,7 +148,7 @@ def _near(method: object) -> str:
     if not isinstance(method, str):
         return ""
     name = method.lower().replace("-", "_").replace(" ", "_")
-    known = {**{each: each for each in INTEGRATORS}, **SYNONYMS}
+    known: dict[str, str] = {**{str(each): str(each) for each in INTEGRATORS}, **SYNONYMS}
     containing = [each for each in known if name and name in each]
     close = containing or difflib.get_close_matches(name, known, n=1)
     return f"did you mean {known[close[0]]!r}? " if close else ""

@@ -22,6 +22,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.forces.air import Air, air_accelerations
+from sandbox.scene.description.world import IntegratorName
 
 State: TypeAlias = FloatArray
 """(2, N, D) poses, m and rad, and rates, m/s and rad/s"""
@@ -176,7 +177,7 @@ def leapfrog(f: Transition, t: float, x: State, u: Inputs, h: float) -> State:
     return moved
 
 
-INTEGRATORS: dict[str, Integrator] = {
+INTEGRATORS: dict[IntegratorName, Integrator] = {
     # The tutorial's: drift by the old velocity, then kick. pymunk's too, in free flight bit for bit.
     "explicit_euler": Integrator(runge_kutta(EULER), order=1, fraction=0.0),
     "semi_implicit_euler": Integrator(semi_implicit_euler, order=1, fraction=1.0),

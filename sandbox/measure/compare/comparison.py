@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.runner import run
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.files.load import as_scene
 from sandbox.schedule import with_whole_steps
 from sandbox.signals import defer_interrupt
@@ -52,7 +52,7 @@ def compare(
     why: bool = False,
     truth: Truth | None = None,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Comparison:
     """Run a scene on several engines, or with several values of a setting, and score each run against the truth.
 
@@ -87,6 +87,11 @@ def compare(
             `settings` sets too.
         SceneError: a swept key or value is invalid.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> found = sandbox.compare("spring", "pymunk", dt=0.01)
+        >>> [row.engine for row in found.rows]
+        ['pymunk']
     """
     scene = as_scene(scene)
     both = [key for key in sweep or () if short_key(key) in settings]
@@ -116,7 +121,7 @@ def compare_variants(
     why: bool = False,
     truth: Truth | None = None,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Comparison:
     """Run the variants of a scene on engines, and score each run against the truth of its variant.
 

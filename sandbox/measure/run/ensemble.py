@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from threading import Event, Lock
-from typing import Any, Literal
+from typing import Literal, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -34,7 +34,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.random_streams import Stream, draws
 from sandbox.schedule import frame_count
@@ -112,7 +112,7 @@ def ensemble(
     threads: int = 1,
     seed: int | None = None,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Ensemble:
     """Run a scene many times from normally distributed starts.
 
@@ -138,6 +138,11 @@ def ensemble(
         SceneError: the name or path is not that of a valid scene.
         TooLargeError: the results would not fit into memory.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> ends = sandbox.ensemble("bounce", 3, vary={"ball.*.position": 0.001}, engine="pymunk", dt=0.01)
+        >>> ends.position.shape
+        (3, 1, 2)
     """
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
     engine_named(engine)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Unpack, cast
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from sandbox.scene.compile.filters import bits_of_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_STEPS
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import as_scene
 from sandbox.schedule import ROUNDING, Stretch, schedule
@@ -52,7 +52,7 @@ def run(
     bout: HeadlessGame | None = None,
     on_work: WorkCallback | None = None,
     strict: bool = False,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Trajectory:
     """Run a scene or a recording from start to end.
 
@@ -88,12 +88,17 @@ def run(
         SettingsError: a setting is invalid.
         UnsuitableSceneError: the scene of a recording lacks an element that its game needs.
         KeyboardInterrupt: Ctrl-C was pressed, even if a library converted it to another exception.
+
+    Example:
+        >>> run = sandbox.run("bounce", dt=0.01)
+        >>> run.status, run.position.shape
+        ('ok', (601, 1, 2))
     """
     if isinstance(scene, Recording):
         recording = scene if engine is None else scene.on(engine)
         scene, engine = recording.whole_scene, recording.engine
         actions = (*recording.actions, *actions)
-        settings = recording.settings.model_dump() | settings
+        settings = {**cast("SettingsChanges", recording.settings.model_dump()), **settings}
         bout = bout or _recorded_game(recording)
     engine = engine or "pymunk"
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))

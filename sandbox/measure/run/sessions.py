@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from sandbox.action import Switch, actions_from_json
 from sandbox.engines.contract import Divergence, Exhaustion
@@ -19,7 +19,7 @@ from sandbox.measure.run.runner import run
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.errors import Fault, SceneError, SettingsError
 from sandbox.trajectory import Contacts, Frame, Trajectory
 
@@ -114,7 +114,7 @@ def play_out(
     *,
     audit: bool = False,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> PlayedGame:
     """Play the game of a scene until it is over, or for the scene's duration.
 
@@ -131,6 +131,11 @@ def play_out(
         SceneError: the script has faults.
         UnknownEngineError: no engine has that name.
         TooLargeError: the frames would not fit into memory.
+
+    Example:
+        >>> played = sandbox.play_out(sandbox.load("landing"), "none")
+        >>> played.recording.presses
+        ()
     """
     rules = required_rules(scene)
     game = (
@@ -146,7 +151,7 @@ def play_out(
 
 
 def _recording(
-    scene: Scene, engine: str, run: Trajectory, presses: tuple[Press, ...], settings: dict[str, Any]
+    scene: Scene, engine: str, run: Trajectory, presses: tuple[Press, ...], settings: SettingsChanges
 ) -> Recording:
     return Recording(
         scene=scene,

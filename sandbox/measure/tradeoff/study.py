@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Unpack
 
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.ground_truth import Truth, find_truth
@@ -54,7 +54,7 @@ from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.world import Settings
+from sandbox.scene.description.world import Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.schedule import with_whole_steps
@@ -94,7 +94,7 @@ def tradeoff(
     has_fixed_dt: bool = False,
     is_explained: bool = True,
     on_progress: ProgressCallback | None = None,
-    **settings: Any,
+    **settings: Unpack[SettingsChanges],
 ) -> Tradeoff:
     """Measure the error and the cost of engines and settings for a scene, and find the Pareto front.
 

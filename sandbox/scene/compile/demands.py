@@ -142,7 +142,12 @@ class Item(NamedTuple):
 
 @derived_once
 def demands(setup: Setup) -> frozenset[Demand]:
-    """Return the demands of a scene or setup: the physics that an engine must model to run it."""
+    """Return the demands of a scene or setup: the physics that an engine must model to run it.
+
+    Example:
+        >>> sorted(map(str, sandbox.demands(sandbox.load("spring"))))
+        ['springs', 'translation']
+    """
     return frozenset(demand for demand, on, _ in _items(setup) if on)
 
 

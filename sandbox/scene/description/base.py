@@ -5,10 +5,13 @@ can represent, and narrow enough that no square or cube of a value overflows.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, StringConstraints
+from pydantic.fields import FieldInfo
+from pydantic_core import CoreSchema
 
 MAX_POSITION = 1e16  # m
 MAX_SPEED = 1e12  # m/s
@@ -17,13 +20,78 @@ MAX_STEPS = 1e9
 BACKING = 1000.0  # m: depth of the solid behind a plane; no centre may start deeper
 
 
+_Stored = TypeVar("_Stored")
+_Given = TypeVar("_Given")
+_Item = TypeVar("_Item")
+
+
+class Accepts(Generic[_Stored, _Given]):
+    """Annotation of a field that has a value of one type and is set from values of another, such as a list.
+
+    Type checkers take the type of an argument of `__init__` from `__set__`, and that of the attribute from `__get__`.
+    """
+
+    if TYPE_CHECKING:
+
+        def __get__(self, instance: object, owner: object) -> _Stored: ...
+        def __set__(self, instance: object, value: _Given) -> None: ...
+
+    else:
+
+        def __class_getitem__(cls, types: tuple[Any, Any]) -> Any:
+            """Return the type of the stored value, which is what pydantic validates."""
+            return types[0]
+
+
+def default(value: Any, *, alias: str | None = None, max_length: int | None = None) -> Any:
+    """Return the default of a field whose annotation is `Accepts`.
+
+    Args:
+        value: the default.
+        alias: key in a scene file, if it is not the name of the field. The parameter in Python is that name.
+        max_length: largest number of items.
+    """
+    return Field(value, alias=alias, max_length=max_length)
+
+
+def default_kind(kind: str) -> Any:
+    """Return the default of the `kind` of a model in Python. Files must state it, and documents contain it."""
+    return Field(default_factory=lambda _: kind)  # a factory that takes the data is not excluded as a default
+
+
+def is_required(field: FieldInfo) -> bool:
+    """Return whether a file must state a field: it has no default, or only that of `default_kind`."""
+    return field.is_required() or bool(field.default_factory_takes_validated_data)
+
+
 class Part(BaseModel):
-    """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities."""
+    """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities.
+
+    Lists are accepted for tuples, and stored as tuples.
+    """
 
     # Validators are built on first use: a command mostly needs only that of a whole scene.
     model_config = ConfigDict(
         strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, defer_build=True
     )
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        schema = handler(source)
+        _accept_lists(schema)
+        return schema
+
+
+def _accept_lists(schema: Any) -> None:
+    """Let the tuples within a core schema be set from lists, in place. Their items are validated as before."""
+    if isinstance(schema, dict):
+        if schema.get("type") == "tuple":
+            schema["strict"] = False
+        for each in schema.values():
+            _accept_lists(each)
+    elif isinstance(schema, list):
+        for each in schema:
+            _accept_lists(each)
 
 
 def _speed_in_range(vector: tuple[float, float]) -> tuple[float, float]:
@@ -45,10 +113,19 @@ Coordinate = Annotated[float, Field(ge=-MAX_POSITION, le=MAX_POSITION)]
 Point = tuple[Coordinate, Coordinate]
 """A position, m."""
 
+Coordinates = Sequence[Sequence[float]]
+"""Accepted for several points."""
+
 Vector = tuple[float, float]
 
 Velocity = Annotated[Vector, AfterValidator(_speed_in_range)]
 """A velocity, m/s."""
+
+PointField = Accepts[Point, Sequence[float]]
+OptionalPoint = Accepts[Point | None, Sequence[float] | None]
+VelocityField = Accepts[Velocity, Sequence[float]]
+Items = Accepts[tuple[_Item, ...], Sequence[_Item]]
+"""Types of fields that are set from tuples or lists."""
 
 Angle = Annotated[float, Field(ge=-1e12, le=1e12)]
 """An angle, rad, counter-clockwise."""
@@ -101,7 +178,7 @@ class HasMaterial(Part):
     surface_speed: SurfaceSpeed = 0.0
     """speed of the surface, m/s, as of a conveyor belt or a drum: to the right of the outward normal, clockwise around
     the object"""
-    surface_velocity: SurfaceVelocity = (0.0, 0.0)
+    surface_velocity: Accepts[SurfaceVelocity, Sequence[float]] = default((0.0, 0.0))
     """velocity of the surface relative to the object, m/s, on all its sides and however it is turned; adds to
     `surface_speed`"""
     colour: Colour | None = None
@@ -115,10 +192,10 @@ Categories = Annotated[tuple[Name, ...], Field(max_length=32)]
 class Collider(HasMaterial):
     """Object that can collide: a body, or a static collider."""
 
-    categories: Categories | None = None
+    categories: Accepts[Categories | None, Sequence[str] | None] = default(None)
     """collision categories that it belongs to; default: all. Two objects collide only if the mask of each has a
     category of the other."""
-    mask: Categories | None = None
+    mask: Accepts[Categories | None, Sequence[str] | None] = default(None)
     """collision categories that it collides with; default: all"""
 
 
@@ -142,9 +219,9 @@ class BodySource(Collider):
 class BodySpec(BodySource):
     """One body."""
 
-    position: Point
+    position: PointField
     """position of the origin of the body frame, m: for balls, boxes and capsules the centre"""
-    velocity: Velocity = (0.0, 0.0)
+    velocity: VelocityField = default((0.0, 0.0))
     """velocity of the centre of mass, m/s"""
     fixed: bool = False
     """Never moves, as if infinitely heavy."""

@@ -1,10 +1,24 @@
 """Bodies: boxes, capsules, polygons and compounds of them."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 
-from sandbox.scene.description.base import Angle, BodySpec, Density, HasMaterial, Point, Radius
+from sandbox.scene.description.base import (
+    Accepts,
+    Angle,
+    BodySpec,
+    Coordinates,
+    Density,
+    HasMaterial,
+    Items,
+    OptionalPoint,
+    Point,
+    PointField,
+    Radius,
+    default,
+)
 
 MAX_CORNERS = 1000
 """Largest number of corners of one outline; far more crash pymunk, and have no visible effect."""
@@ -21,7 +35,7 @@ Outline = Annotated[tuple[Point, ...], Field(min_length=3, max_length=MAX_CORNER
 class Box(BodySpec):
     """A rectangle centred at its position."""
 
-    size: tuple[Length, Length]
+    size: Accepts[tuple[Length, Length], Sequence[float]]
     """width and height before rotation, m"""
     radius: Rounding = 0.0
     """radius by which it is widened on all sides, with round corners, m"""
@@ -39,9 +53,9 @@ class Capsule(BodySpec):
 class Polygon(BodySpec):
     """A simple polygon, clockwise or counter-clockwise; a concave one is cut into convex pieces."""
 
-    points: Outline
+    points: Accepts[Outline, Coordinates]
     """corners relative to `position`, m"""
-    position: Point = (0.0, 0.0)
+    position: PointField = default((0.0, 0.0))
     """origin of the points, m; the position of the body in results is its centre of mass"""
     radius: Rounding = 0.0
     """radius by which it is widened on all sides, with round corners, m"""
@@ -52,7 +66,7 @@ class Attached(HasMaterial):
 
     density: Density | None = None
     """kg/m²; default: the density of the body, or the same for all parts"""
-    position: Point = (0.0, 0.0)
+    position: PointField = default((0.0, 0.0))
     """position relative to the body's position, m"""
     angle: Angle = 0.0
     """angle in the frame of the body, rad"""
@@ -68,7 +82,7 @@ class BallPart(Attached):
 class BoxPart(Attached):
     """A rectangle that is part of a body."""
 
-    size: tuple[Length, Length]
+    size: Accepts[tuple[Length, Length], Sequence[float]]
     """width and height before rotation, m"""
     radius: Rounding = 0.0
     """radius by which it is widened on all sides, with round corners, m"""
@@ -79,7 +93,7 @@ class CapsulePart(Attached):
 
     length: Length | None = None
     """distance between the centres of the round ends, m"""
-    ends: tuple[Point, Point] | None = None
+    ends: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """or these centres themselves, in the frame of the part, m"""
     radius: Radius
     """radius of the round ends, m"""
@@ -96,7 +110,7 @@ class CapsulePart(Attached):
 class PolygonPart(Attached):
     """A polygon that is part of a body."""
 
-    points: Outline
+    points: Accepts[Outline, Coordinates]
     """corners of the outline in the frame of the part, m"""
     radius: Rounding = 0.0
     """radius by which it is widened on all sides, with round corners, m"""
@@ -108,12 +122,12 @@ AnyPart = BallPart | BoxPart | CapsulePart | PolygonPart
 class Compound(BodySpec):
     """One rigid body made of several shapes, such as a hammer. Where parts overlap, their masses add up."""
 
-    centre_of_mass: Point | None = None
+    centre_of_mass: OptionalPoint = default(None)
     """centre of mass in the frame of the body, m; default: that of its parts"""
-    balls: Annotated[tuple[BallPart, ...], Field(alias="ball", max_length=MAX_PARTS)] = ()
-    boxes: Annotated[tuple[BoxPart, ...], Field(alias="box", max_length=MAX_PARTS)] = ()
-    capsules: Annotated[tuple[CapsulePart, ...], Field(alias="capsule", max_length=MAX_PARTS)] = ()
-    polygons: Annotated[tuple[PolygonPart, ...], Field(alias="polygon", max_length=MAX_PARTS)] = ()
+    balls: Items[BallPart] = default((), alias="ball", max_length=MAX_PARTS)
+    boxes: Items[BoxPart] = default((), alias="box", max_length=MAX_PARTS)
+    capsules: Items[CapsulePart] = default((), alias="capsule", max_length=MAX_PARTS)
+    polygons: Items[PolygonPart] = default((), alias="polygon", max_length=MAX_PARTS)
 
     @property
     def parts(self) -> tuple[AnyPart, ...]:

@@ -5,11 +5,27 @@ ends when the centre is outside. A change of layer does not end it; each visit i
 `collides = "none"` and bodies held by a drive are not detected.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
-from sandbox.scene.description.base import GROUND, Acceleration, Collider, Colour, Name, Part, Point, Radius, Vector
+from sandbox.scene.description.base import (
+    GROUND,
+    Acceleration,
+    Accepts,
+    Collider,
+    Colour,
+    Coordinates,
+    Name,
+    OptionalPoint,
+    Part,
+    Point,
+    PointField,
+    Radius,
+    Vector,
+    default,
+)
 from sandbox.scene.description.world import Kick
 
 Layers = Annotated[tuple[Name, ...], Field(min_length=1, max_length=10)]
@@ -30,18 +46,21 @@ MAX_CATEGORIES = 32
 Width = Annotated[float, Field(gt=0, le=1e9)]
 
 
+ZonePoints = Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)]
+
+
 class Zone(Part):
     """An area that detects bodies: circle (`position`, `radius`), polygon (`points`), strip (`points`, `thickness`)."""
 
     name: Name | None = None
     """without a name, it is called by its kind and its number in the file"""
-    layers: Layers = (GROUND,)
+    layers: Accepts[Layers, Sequence[str]] = default((GROUND,))
     """layers in which it acts"""
-    position: Point | None = None
+    position: OptionalPoint = default(None)
     """centre of a circle, m"""
     radius: Radius | None = None
     """radius of a circle, m"""
-    points: Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)] | None = None
+    points: Accepts[ZonePoints | None, Coordinates | None] = default(None)
     """corners of a polygon, or centre line of a strip, m"""
     thickness: Width | None = None
     """full thickness of a strip, m"""
@@ -49,7 +68,7 @@ class Zone(Part):
     """moves a body that enters the zone to this collision layer, as at the mouth of a ramp"""
     holds: bool = False
     """A body that enters is held at the centre, one at a time, until an action moves it, as in a kicker."""
-    gravity: tuple[Acceleration, Acceleration] | None = None
+    gravity: Accepts[tuple[Acceleration, Acceleration] | None, Sequence[float] | None] = default(None)
     """gravity for bodies inside the zone and in its layers, m/s²; where zones overlap, the last one applies"""
     colour: Colour | None = None
     """colour in the window, `#rrggbb`"""
@@ -75,24 +94,24 @@ PlaneReach: TypeAlias = tuple[float, float, float]
 class Plane(Collider):
     """A half-plane, solid behind its normal."""
 
-    point: Point
+    point: PointField
     """a point on the surface, m"""
-    normal: Vector
+    normal: Accepts[Vector, Sequence[float]]
     """direction out of the solid; any length"""
-    layers: Layers | None = None
+    layers: Accepts[Layers | None, Sequence[str] | None] = default(None)
     """layers in which it is solid; default: all"""
 
 
 class Wall(Collider):
     """A polyline with round ends, solid on both sides."""
 
-    points: Course
+    points: Accepts[Course, Coordinates]
     """corners, m"""
     thickness: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """full thickness, m"""
     closed: bool = False
     """Connect the last point to the first."""
-    layers: Layers = (GROUND,)
+    layers: Accepts[Layers, Sequence[str]] = default((GROUND,))
     """layers in which it is solid"""
     height: Height | None = None
     """height of the nose above a floor, m"""
@@ -107,11 +126,11 @@ class Wall(Collider):
 class Post(Collider):
     """A fixed circle."""
 
-    position: Point
+    position: PointField
     """position of the centre, m"""
     radius: Radius
     """radius of the circle, m"""
-    layers: Layers = (GROUND,)
+    layers: Accepts[Layers, Sequence[str]] = default((GROUND,))
     """layers in which it is solid"""
     height: Height | None = None
     """height of the nose above a floor, m"""

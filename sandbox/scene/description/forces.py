@@ -5,11 +5,12 @@ damping do not. With a stroke or plunger drive, no load stops the body: it pushe
 bodies and other bodies with such a drive.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.scene.description.base import Moment, Name, Part, Point, Vector
+from sandbox.scene.description.base import Accepts, Moment, Name, Part, Point, PointField, Vector, default, default_kind
 
 DriveKey = Literal[
     "up", "down", "left", "right", "space", "left shift", "right shift", "z", "slash", "return"
@@ -43,10 +44,10 @@ class TorqueDrive(Driven):
     the target torque is multiplied by b + hold_ratio (1 − b), b = (d / hold_within)⁴, d the remaining angle.
     """
 
-    kind: Literal["torque"]
-    pivot: Point
+    kind: Literal["torque"] = default_kind("torque")
+    pivot: PointField
     """position of the hinge at the start, m"""
-    stops: tuple[StopAngle, StopAngle]
+    stops: Accepts[tuple[StopAngle, StopAngle], Sequence[float]]
     """rest angle and driven angle of the body, rad; either sense"""
     torque: Torque
     """torque at level 1, N·m"""
@@ -67,10 +68,10 @@ class TorqueDrive(Driven):
 class StrokeDrive(Driven):
     """Turns a body about a hinge at a prescribed rate, independent of the load: a diverter, a windmill."""
 
-    kind: Literal["stroke"]
-    pivot: Point
+    kind: Literal["stroke"] = default_kind("stroke")
+    pivot: PointField
     """position of the hinge at the start, m"""
-    stops: tuple[StopAngle, StopAngle]
+    stops: Accepts[tuple[StopAngle, StopAngle], Sequence[float]]
     """rest angle and driven angle of the body, rad; it turns to the second while the level is above 0; either sense"""
     rate: Rate
     """rate of rotation, rad/s"""
@@ -85,8 +86,8 @@ class PlungerDrive(Driven):
     cos(ω t), ω = speed / travel, until the plunger reaches its stop.
     """
 
-    kind: Literal["plunger"]
-    direction: Vector
+    kind: Literal["plunger"] = default_kind("plunger")
+    direction: Accepts[Vector, Sequence[float]]
     """direction of the strike; any length"""
     travel: Annotated[float, Field(gt=0, le=1e9)]
     """largest distance that it can be drawn back, m"""
@@ -110,7 +111,7 @@ class Attraction(Part):
 
     name: Name | None = None
     """without a name, it is called by its kind and its number in the file, such as `attraction-1`"""
-    toward: Point | Name
+    toward: Accepts[Point | Name, Sequence[float] | str]
     """a point, m, or the name of a body; a body that can move is attracted by the reaction"""
     strength: Annotated[float, Field(ge=-1e30, le=1e30)]
     """G·M, m³/s²; negative values repel"""
@@ -125,9 +126,9 @@ class Thrust(Part):
     """without a name, it is called by its kind and its number in the file, such as `thrust-1`"""
     body: Name
     """name of the body"""
-    force: tuple[Newton, Newton]
+    force: Accepts[tuple[Newton, Newton], Sequence[float]]
     """force in the frame of the body, N"""
-    point: Point = (0.0, 0.0)
+    point: PointField = default((0.0, 0.0))
     """point of action in the frame of the body, m"""
     begin: Second = 0.0
     """start, s"""

@@ -10,11 +10,24 @@ the foot and the limits of the wrist are estimates. Angles of joints are positiv
 for knees, which bend back, and ankles, which point the toes down.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
-from sandbox.scene.description.base import MAX_BODIES, BodySource, Collides, Name, Part, Point, Radius, Velocity
+from sandbox.scene.description.base import (
+    MAX_BODIES,
+    Accepts,
+    BodySource,
+    Collides,
+    Name,
+    Part,
+    Point,
+    PointField,
+    Radius,
+    VelocityField,
+    default,
+)
 from sandbox.scene.description.bodies import Length
 from sandbox.scene.description.discs import Count
 from sandbox.scene.description.joints import Damping, JointStrength, Stiffness
@@ -25,9 +38,9 @@ Gap = Annotated[float, Field(ge=0, le=1e9)]
 class Stack(BodySource):
     """Equal boxes, numbered along each row from the lower left; `angle` tilts the whole stack about its base."""
 
-    base: Point
+    base: PointField
     """centre of the bottom, m"""
-    size: tuple[Length, Length]
+    size: Accepts[tuple[Length, Length], Sequence[float]]
     """width and height of each box, m"""
     columns: Count
     """number of boxes in the bottom row; 1 for a tower"""
@@ -39,7 +52,7 @@ class Stack(BodySource):
     """gap between neighbours in a row, and between rows, m"""
     jitter: Gap = 0.0
     """Largest random displacement ± of each box along its row, m."""
-    velocity: Velocity = (0.0, 0.0)
+    velocity: VelocityField = default((0.0, 0.0))
     """initial velocity, m/s"""
 
     @property
@@ -58,6 +71,7 @@ ENDS: tuple[RopeEnd, RopeEnd] = ("start", "end")
 
 
 NodeIndex = Annotated[int, Field(ge=0, lt=MAX_BODIES)]
+PinnedNodes = Literal["top", "corners", "left"] | tuple[tuple[NodeIndex, NodeIndex], ...]
 
 
 class RopeAttachment(Part):
@@ -76,7 +90,7 @@ class SoftBody(BodySource):
     """radius of each node, or half the thickness of planks, m"""
     collides: Collides = "none"
     """Bodies that nodes or planks collide with; two bodies connected by a joint never collide."""
-    velocity: Velocity = (0.0, 0.0)
+    velocity: VelocityField = default((0.0, 0.0))
     """initial velocity of all nodes that are not fixed, m/s"""
     stiffness: Stiffness | None = None
     """stiffness of each spring, N/m"""
@@ -91,15 +105,15 @@ class Rope(SoftBody):
 
     kind: Literal["rods", "springs", "planks"] = "rods"
     """type of the links: rods or springs between nodes, or planks joined by pivots"""
-    start: Point
+    start: PointField
     """position of the first end, m"""
-    end: Point
+    end: PointField
     """position of the last end, m"""
     links: Count
     """number of rods, springs or planks"""
     length: Length | None = None
     """length of the whole rope at rest, m; default: the distance from start to end"""
-    fix: Annotated[tuple[RopeEnd, ...], Field(max_length=2)] | None = None
+    fix: Accepts[Annotated[tuple[RopeEnd, ...], Field(max_length=2)] | None, Sequence[RopeEnd] | None] = default(None)
     """ends that are fixed in the world; default: both, except tied ends"""
     tie: RopeAttachment = Field(default_factory=RopeAttachment)
     """bodies that the ends are tied to"""
@@ -118,19 +132,19 @@ class Cloth(SoftBody):
 
     kind: Literal["springs", "rods"] = "springs"
     """type of the joints along rows and columns"""
-    corner: Point
+    corner: PointField
     """position of the upper left node, m"""
     columns: Count
     """number of nodes in each row"""
     rows: Count
     """number of rows"""
-    spacing: tuple[Length, Length]
+    spacing: Accepts[tuple[Length, Length], Sequence[float]]
     """distance between columns and between rows, m"""
     shear: Stiffness | None = None
     """stiffness of diagonal springs, N/m; default: no diagonal springs"""
     bend: Stiffness | None = None
     """stiffness of springs from each node to the next but one, N/m; default: no such springs"""
-    pins: Literal["top", "corners", "left"] | tuple[tuple[NodeIndex, NodeIndex], ...] = "top"
+    pins: Accepts[PinnedNodes, Literal["top", "corners", "left"] | Sequence[Sequence[int]]] = default("top")
     """fixed nodes: a row, a column, the upper corners, or a list of [column, row], counted from 0"""
 
     @property
@@ -154,7 +168,7 @@ DEFAULT_MASS = 75.0
 class Ragdoll(BodySource):
     """A figure that stands in mid-stride; `angle` and `angular_velocity` turn the whole figure about its position."""
 
-    position: Point
+    position: PointField
     """point on the ground under it, m"""
     height: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.75
     """height of the figure, m"""
@@ -162,7 +176,7 @@ class Ragdoll(BodySource):
     """total mass, kg; default 75"""
     facing: Literal["right", "left"] = "right"
     """direction that it faces"""
-    velocity: Velocity = (0.0, 0.0)
+    velocity: VelocityField = default((0.0, 0.0))
     """initial velocity, m/s"""
 
 

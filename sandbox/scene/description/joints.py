@@ -4,11 +4,22 @@
 the first; of a single body, relative to the world.
 """
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.scene.description.base import Name, Part, Point
+from sandbox.scene.description.base import (
+    Accepts,
+    Coordinates,
+    Name,
+    OptionalPoint,
+    Part,
+    Point,
+    PointField,
+    default,
+    default_kind,
+)
 
 JointStrength = Annotated[float, Field(gt=0, le=1e42)]
 JointLimit = Annotated[float, Field(ge=0, le=1e42)]
@@ -24,7 +35,7 @@ class Joined(Part):
 
     name: Name | None = None
     """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
-    between: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)]
+    between: Accepts[Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)], Sequence[str]]
     """names of one body (joined to the world) or of two"""
     collide: bool = False
     """Allow collisions between the two bodies."""
@@ -52,7 +63,7 @@ class ErrorCorrecting(ForceLimited):
 class Anchored(Joined):
     """A joint that acts on one point of each body."""
 
-    anchors: tuple[Point, Point] = ((0.0, 0.0), (0.0, 0.0))
+    anchors: Accepts[tuple[Point, Point], Coordinates] = default(((0.0, 0.0), (0.0, 0.0)))
     """the two end points, m, in the order of `between`, each in the frame of its body. With one body, the second is a
     point in the world"""
 
@@ -60,7 +71,7 @@ class Anchored(Joined):
 class Rod(Anchored, ErrorCorrecting):
     """Keeps two points at a constant distance, as a massless rod. `pin` is a synonym (pymunk's term)."""
 
-    kind: Literal["rod", "pin"]
+    kind: Literal["rod", "pin"] = default_kind("rod")
     length: JointDistance | None = None
     """length, m; default: the distance at the start. A rod of length 0 holds two points together along the line
     between them only, as pymunk's `PinJoint` does; a pivot holds them in both directions"""
@@ -69,10 +80,10 @@ class Rod(Anchored, ErrorCorrecting):
 class Pivot(ErrorCorrecting):
     """Joins two bodies at one point, about which they turn."""
 
-    kind: Literal["pivot"]
-    at: Point | None = None
+    kind: Literal["pivot"] = default_kind("pivot")
+    at: OptionalPoint = default(None)
     """position of the pivot in the world at the start, m"""
-    anchors: tuple[Point, Point] | None = None
+    anchors: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """or its position in the frame of each body, m, in the order of `between`; with one body, the second is a point in
     the world"""
 
@@ -80,7 +91,7 @@ class Pivot(ErrorCorrecting):
 class Slide(Anchored, ErrorCorrecting):
     """Keeps the distance of two points between two limits; a string if the lower limit is 0."""
 
-    kind: Literal["slide"]
+    kind: Literal["slide"] = default_kind("slide")
     least: JointDistance = 0.0
     """smallest distance, m"""
     most: JointDistance
@@ -90,17 +101,17 @@ class Slide(Anchored, ErrorCorrecting):
 class Groove(ErrorCorrecting):
     """Lets a point of the second body slide along a groove in the first; with one body, the groove is in the world."""
 
-    kind: Literal["groove"]
-    groove: tuple[Point, Point]
+    kind: Literal["groove"] = default_kind("groove")
+    groove: Accepts[tuple[Point, Point], Coordinates]
     """ends of the groove in the frame of the first body, m"""
-    anchor: Point = (0.0, 0.0)
+    anchor: PointField = default((0.0, 0.0))
     """point of the other body in its own frame, m"""
 
 
 class RotaryLimit(ErrorCorrecting):
     """Keeps the angle between two bodies within limits."""
 
-    kind: Literal["rotary_limit"]
+    kind: Literal["rotary_limit"] = default_kind("rotary_limit")
     least: JointAngle
     """smallest angle, rad"""
     most: JointAngle
@@ -110,7 +121,7 @@ class RotaryLimit(ErrorCorrecting):
 class Motor(Joined):
     """Turns the second body relative to the first at a constant rate."""
 
-    kind: Literal["motor"]
+    kind: Literal["motor"] = default_kind("motor")
     rate: JointAngle
     """rate of rotation, rad/s"""
     max_torque: JointLimit | None = None
@@ -123,7 +134,7 @@ class Ratchet(ErrorCorrecting):
     Clicks are at the angles phase + k·ratchet, for all integers k.
     """
 
-    kind: Literal["ratchet"]
+    kind: Literal["ratchet"] = default_kind("ratchet")
     ratchet: JointAngle
     """angle between two clicks, rad; if negative, the body turns freely clockwise, else counter-clockwise"""
     phase: JointAngle = 0.0
@@ -135,7 +146,7 @@ class Ratchet(ErrorCorrecting):
 class Gear(ErrorCorrecting):
     """Keeps angle₂·ratio − angle₁ = phase: the first body turns `ratio` times as fast as the second."""
 
-    kind: Literal["gear"]
+    kind: Literal["gear"] = default_kind("gear")
     ratio: Annotated[float, Field(ge=-1e6, le=1e6)]
     """angle₁ / angle₂"""
     phase: JointAngle | None = None
@@ -145,7 +156,7 @@ class Gear(ErrorCorrecting):
 class Spring(Anchored, ForceLimited):
     """A damped spring between two points: F = −k (l − l₀) − c l̇ along their line."""
 
-    kind: Literal["spring"]
+    kind: Literal["spring"] = default_kind("spring")
     rest_length: JointDistance | None = None
     """length without force, m; default: the distance at the start"""
     stiffness: Stiffness
@@ -157,7 +168,7 @@ class Spring(Anchored, ForceLimited):
 class RotarySpring(ForceLimited):
     """A damped spring of the angle between two bodies: τ = −k (φ − φ₀) − c φ̇."""
 
-    kind: Literal["rotary_spring"]
+    kind: Literal["rotary_spring"] = default_kind("rotary_spring")
     rest_angle: JointAngle | None = None
     """angle without torque, rad; default: its value at the start"""
     stiffness: Stiffness
@@ -172,10 +183,10 @@ class Pulley(Anchored):
     The lengths are those from each wheel to its body. The rope pulls and never pushes. Wheels have no size.
     """
 
-    kind: Literal["pulley"]
-    between: Annotated[tuple[Name, ...], Field(min_length=2, max_length=2)]
+    kind: Literal["pulley"] = default_kind("pulley")
+    between: Accepts[Annotated[tuple[Name, ...], Field(min_length=2, max_length=2)], Sequence[str]]
     """names of two bodies"""
-    wheels: tuple[Point, Point]
+    wheels: Accepts[tuple[Point, Point], Coordinates]
     """positions of the wheels in the world, m, in the order of `between`"""
     ratio: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
     """tension at the second body / tension at the first; 2 if the second hangs in a loop of the rope"""

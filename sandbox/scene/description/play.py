@@ -1,5 +1,6 @@
 """`[play]`: view, named spots, markings, and the roles of elements in a game."""
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
@@ -7,7 +8,20 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from sandbox.game_names import game_names, is_game
-from sandbox.scene.description.base import Colour, Name, Part, Point, Radius, Velocity
+from sandbox.scene.description.base import (
+    Accepts,
+    Colour,
+    Coordinates,
+    Items,
+    Name,
+    OptionalPoint,
+    Part,
+    Point,
+    PointField,
+    Radius,
+    Velocity,
+    default,
+)
 from sandbox.scene.description.game_tables import with_game_tables
 
 MIN_PLAYBACK_SPEED, MAX_PLAYBACK_SPEED = 1e-9, 10.0
@@ -20,11 +34,11 @@ class Marking(Part):
 
     colour: Colour
     """`#rrggbb`"""
-    position: Point | None = None
+    position: OptionalPoint = default(None)
     """centre of a disc or ring, m"""
     radius: Radius | None = None
     """radius of a disc or ring, m"""
-    points: Annotated[tuple[Point, ...], Field(max_length=10_000)] = ()
+    points: Accepts[Annotated[tuple[Point, ...], Field(max_length=10_000)], Coordinates] = default(())
     """points of a line, or corners of a polygon, m"""
     filled: bool = True
     """true for a disc or polygon, false for a ring or line"""
@@ -68,11 +82,11 @@ class PlayPart(Part):
     """position in an ordered group: 0 for the entry of a ramp, 1 for its exit; targets and lanes count from the left"""
     score: Annotated[int, Field(ge=0, le=10**12)] = 0
     """points each time it is hit, entered or turned"""
-    at: Point | None = None
+    at: OptionalPoint = default(None)
     """position where it places a ball, such as the plunger lane or the start of a ball, m"""
-    out: Velocity | None = None
+    out: Accepts[Velocity | None, Sequence[float] | None] = default(None)
     """velocity of a ball that it releases, such as from a kicker, m/s"""
-    light: Point | None = None
+    light: OptionalPoint = default(None)
     """position of the lamp that shows whether it is lit, m"""
     colour: Colour | None = None
     """colour of the lamp"""
@@ -100,7 +114,7 @@ class Spot(Part):
 
     name: Name
     """name used by the rules"""
-    position: Point
+    position: PointField
     """position, m"""
 
 
@@ -121,22 +135,22 @@ class _Header(Part):
     """Colour bodies that overlap something."""
     game: Annotated[str, _GameName()] | None = None
     """game whose rules apply, in the window and in runs; runs of a table need a player for that"""
-    area: tuple[Point, Point] | None = None
+    area: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """lower left and upper right corner of the playing area of a table, m"""
-    view: tuple[Point, Point] | None = None
+    view: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """lower left and upper right corner of the initial view, m; default: the area that the bodies may reach"""
-    inset: tuple[Point, Point] | None = None
+    inset: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """lower left and upper right corner of an area that is also shown enlarged in a corner of the picture, m"""
-    spots: tuple[Spot, ...] = Field((), alias="spot")
+    spots: Items[Spot] = default((), alias="spot")
 
 
 class Play(_Header):
     """Settings of the window and the game. Engines ignore them; runs depend on the rules of the game only."""
 
-    markings: tuple[Marking, ...] = Field((), alias="marking")
+    markings: Items[Marking] = default((), alias="marking")
     players: Annotated[int, Field(ge=1, le=4)] = 1
     """number of players who take turns, in games such as pinball"""
-    parts: tuple[PlayPart, ...] = Field((), alias="part")
+    parts: Items[PlayPart] = default((), alias="part")
     """roles of bodies, walls, posts, zones and drives in the rules of the game"""
     ground: Literal["grid", "playfield"] = "grid"
     """background: a grid, or a playfield of markings on which fixed objects cast shadows and zones with a colour are

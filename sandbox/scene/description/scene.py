@@ -6,11 +6,11 @@ Generators are not expanded, and coefficients of pairs are not mixed: see `sandb
 import copy
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Self, cast
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, StringConstraints
 
-from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMaterial, Part
+from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMaterial, Items, Part, default
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
@@ -44,33 +44,33 @@ class SceneDescription(_Header):
 
     surface: Floor | None = None
     contact_models: ContactModels = Field(default_factory=ContactModels)
-    materials: tuple[Material, ...] = Field((), alias="material")
-    pairs: tuple[Pair, ...] = Field((), alias="pair")
-    planes: tuple[Plane, ...] = Field((), alias="plane")
-    walls: tuple[Wall, ...] = Field((), alias="wall")
-    posts: tuple[Post, ...] = Field((), alias="post")
-    pockets: tuple[Pocket, ...] = Field((), alias="pocket")
-    zones: tuple[Zone, ...] = Field((), alias="zone")
-    balls: tuple[Ball, ...] = Field((), alias="ball")
-    grids: tuple[Grid, ...] = Field((), alias="grid")
-    scatters: tuple[Scatter, ...] = Field((), alias="scatter")
-    emitters: tuple[Emitter, ...] = Field((), alias="emitter")
-    boxes: tuple[Box, ...] = Field((), alias="box")
-    capsules: tuple[Capsule, ...] = Field((), alias="capsule")
-    polygons: tuple[Polygon, ...] = Field((), alias="polygon")
-    compounds: tuple[Compound, ...] = Field((), alias="body")
-    stacks: tuple[Stack, ...] = Field((), alias="stack")
-    ropes: tuple[Rope, ...] = Field((), alias="rope")
-    cloths: tuple[Cloth, ...] = Field((), alias="cloth")
-    ragdolls: tuple[Ragdoll, ...] = Field((), alias="ragdoll")
-    joints: tuple[Joint, ...] = Field((), alias="joint")
+    materials: Items[Material] = default((), alias="material")
+    pairs: Items[Pair] = default((), alias="pair")
+    planes: Items[Plane] = default((), alias="plane")
+    walls: Items[Wall] = default((), alias="wall")
+    posts: Items[Post] = default((), alias="post")
+    pockets: Items[Pocket] = default((), alias="pocket")
+    zones: Items[Zone] = default((), alias="zone")
+    balls: Items[Ball] = default((), alias="ball")
+    grids: Items[Grid] = default((), alias="grid")
+    scatters: Items[Scatter] = default((), alias="scatter")
+    emitters: Items[Emitter] = default((), alias="emitter")
+    boxes: Items[Box] = default((), alias="box")
+    capsules: Items[Capsule] = default((), alias="capsule")
+    polygons: Items[Polygon] = default((), alias="polygon")
+    compounds: Items[Compound] = default((), alias="body")
+    stacks: Items[Stack] = default((), alias="stack")
+    ropes: Items[Rope] = default((), alias="rope")
+    cloths: Items[Cloth] = default((), alias="cloth")
+    ragdolls: Items[Ragdoll] = default((), alias="ragdoll")
+    joints: Items[Joint] = default((), alias="joint")
     """Joint of one body to the world, or of two bodies: rod, pivot, slide, groove, rotary_limit, motor, gear, spring,
     rotary_spring, pulley, ratchet."""
-    attractions: tuple[Attraction, ...] = Field((), alias="attraction")
-    thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
-    drives: tuple[AnyDrive, ...] = Field((), alias="drive")
+    attractions: Items[Attraction] = default((), alias="attraction")
+    thrusts: Items[Thrust] = default((), alias="thrust")
+    drives: Items[AnyDrive] = default((), alias="drive")
     """Drive that moves a body between two positions: torque, stroke or plunger."""
-    shots: tuple[Shot, ...] = Field((), alias="shot")
+    shots: Items[Shot] = default((), alias="shot")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy, with other values for some fields. Derived values are computed again from the fields."""
@@ -78,7 +78,7 @@ class SceneDescription(_Header):
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
         values = {**(copy.deepcopy(values) if deep else values), **update}
-        return cast("Self", type(self).model_construct(self.model_fields_set | update.keys(), **values))
+        return type(self).model_construct(self.model_fields_set | update.keys(), **values)
 
     @property
     def kinds(self) -> dict[str, tuple[BodySource, ...]]:

@@ -13,7 +13,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.scene.description.base import AngularVelocity, Colour, Friction, Mass, Name, Part, Point, Radius
+from sandbox.scene.description.base import (
+    AngularVelocity,
+    Colour,
+    Friction,
+    Mass,
+    Name,
+    Part,
+    PointField,
+    Radius,
+)
 
 Spin = tuple[AngularVelocity, AngularVelocity, AngularVelocity]
 """rad/s, right-handed, z up: natural roll is (−v_y, v_x, 0) / R"""
@@ -68,7 +77,7 @@ class Pocket(Part):
 
     name: Name | None = None
     """without a name, it is called by its kind and its number in the file"""
-    position: Point
+    position: PointField
     """position of the centre, m"""
     radius: Radius
     """capture radius for the centre of a ball, m"""

@@ -2,12 +2,25 @@
 
 import difflib
 import math
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self, TypedDict
 
 from pydantic import Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from sandbox.scene.description.base import Acceleration, Falloff, Friction, Name, Part, Point, Restitution, Velocity
+from sandbox.scene.description.base import (
+    Acceleration,
+    Accepts,
+    Coordinates,
+    Falloff,
+    Friction,
+    Name,
+    Part,
+    Point,
+    Restitution,
+    VelocityField,
+    default,
+)
 from sandbox.scene.errors import EXPECTED, Fault, LocatedMessage, SettingsError, path_of, shown
 
 Drag = Annotated[float, Field(ge=0, le=1e9)]
@@ -16,7 +29,7 @@ Drag = Annotated[float, Field(ge=0, le=1e9)]
 class World(Part):
     """Gravity, air, duration, random seed, and the bounds outside which bodies are removed."""
 
-    gravity: tuple[Acceleration, Acceleration] = (0.0, 0.0)
+    gravity: Accepts[tuple[Acceleration, Acceleration], Sequence[float]] = default((0.0, 0.0))
     """acceleration of free fall, m/s²"""
     duration: Annotated[float, Field(gt=0, le=1e9)] = 10.0
     """duration of a run without a window, s; pymunk and box2d end it with a whole step of dt"""
@@ -28,9 +41,9 @@ class World(Part):
     """c, 1/m: a = −c |v − wind| (v − wind)"""
     damping: Annotated[float, Field(gt=0, le=1)] = 1.0
     """d, pymunk's `space.damping`: fraction of velocity and angular velocity that remains after one second"""
-    wind: Velocity = (0.0, 0.0)
+    wind: VelocityField = default((0.0, 0.0))
     """velocity of the air, m/s"""
-    bounds: tuple[Point, Point] | None = None
+    bounds: Accepts[tuple[Point, Point] | None, Coordinates | None] = default(None)
     """Lower left and upper right corner, m. A body whose centre leaves the box is removed."""
 
     @property
@@ -67,6 +80,33 @@ MAX_STIFFNESS = 1e30
 """N/m"""
 MAX_SLEEP_TIME = 1e6
 """s"""
+
+
+class SettingsChanges(TypedDict, total=False):
+    """Changes to `Settings`, as keyword arguments; the keys and their types are those of its fields."""
+
+    dt: float
+    substeps: int
+    iterations: int
+    slop: float | None
+    bias: float | None
+    persistence: int | None
+    stiffness: float | None
+    damping: float | None
+    half_kick: bool
+    integrator: IntegratorName | None
+    detection: DetectionName | None
+    response: Response | None
+    impact: ImpactLaw | None
+    broad_phase: BroadPhaseName | None
+    joints: Joints | None
+    stretch: float | None
+    continuous: bool | None
+    sleeping: bool | None
+    sleep_time: float | None
+    idle_speed: float | None
+    workers: int | None
+    record_every: int
 
 
 class Settings(Part):
@@ -166,7 +206,7 @@ class Material(Part):
 class Pair(Part):
     """Coefficients of the contact of two materials, used in place of their combined values."""
 
-    between: tuple[Name, Name]
+    between: Accepts[tuple[Name, Name], Sequence[str]]
     """names of the two materials"""
     restitution: Restitution | None = None
     """e of this pair, 0 to 1, in place of the product of the two materials' values"""

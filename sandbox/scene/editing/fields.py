@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, StringConstraints
 from pydantic.fields import FieldInfo
 
-from sandbox.scene.description.base import Colour, Name
+from sandbox.scene.description.base import Colour, Name, is_required
 from sandbox.scene.files.expressions import evaluated
 from sandbox.scene.files.json_schema import described
 
@@ -80,10 +80,10 @@ def fields_of(model: type[BaseModel]) -> tuple[FieldSpec, ...]:
         if inner is not None:
             found += [replace(spec, key=f"{key}.{spec.key}", is_required=False) for spec in fields_of(inner)]
             continue
-        default = None if field.is_required() else field.get_default(call_default_factory=True)
-        is_optional = not field.is_required() and (default is None or NoneType in get_args(field.annotation))
+        default = None if is_required(field) else field.get_default(call_default_factory=True)
+        is_optional = not is_required(field) and (default is None or NoneType in get_args(field.annotation))
         spec = _spec(key, properties[key], descriptions.get(name, ""))
-        found.append(replace(spec, default=default, is_optional=is_optional, is_required=field.is_required()))
+        found.append(replace(spec, default=default, is_optional=is_optional, is_required=is_required(field)))
     return tuple(found)
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import ValidationError
 
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import Wording
+from sandbox.scene.description.base import Wording, is_required
 from sandbox.scene.description.game_tables import PRESETS, has_preset
 from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, PathKey, shown
 from sandbox.scene.files.document import TAGGED, keys_of, list_tables, model_at, read_model
@@ -373,7 +373,7 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
         if location[0] == "body" and not any(holder.get(part) for part in PARTS):
             holder["ball"] = [{"radius": 1.0}]
         for name, field in model_at(location[:depth]).model_fields.items():
-            if field.is_required() and name not in holder and name in PLACEHOLDERS:
+            if is_required(field) and name not in holder and name in PLACEHOLDERS:
                 holder[name] = PLACEHOLDERS[name]
     stated = document
     if has_preset(stated):

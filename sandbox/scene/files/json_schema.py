@@ -66,6 +66,10 @@ class _Generator(GenerateJsonSchema):
     def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002, its name is pydantic's
         return False  # editors show the key itself
 
+    def field_is_required(self, field: Any, total: bool) -> bool:
+        """Return whether a file must have the key; it must have `kind`, whose default is that of Python only."""
+        return super().field_is_required(field, total) or bool(field["schema"].get("default_factory_takes_data"))
+
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         result = super().model_schema(schema)
         descriptions = described(schema["cls"])

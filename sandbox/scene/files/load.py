@@ -42,6 +42,11 @@ def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
 
     Raises:
         SceneError: the file cannot be found or read, or the scene is invalid; the error has every fault that was found.
+
+    Example:
+        >>> scene = sandbox.load("bounce", ["world.duration=2"])
+        >>> scene.world.duration
+        2.0
     """
     try:
         file = find(str(path))
@@ -76,6 +81,11 @@ def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) 
 
     Raises:
         SceneError: the scene is invalid; the error has every fault that was found.
+
+    Example:
+        >>> scene = sandbox.loads('ball = [{ name = "a", position = [0, 1], radius = 0.1 }]')
+        >>> scene.balls[0].position
+        (0.0, 1.0)
     """
     return SceneText.of(text, file).scene(overrides)
 
@@ -255,6 +265,12 @@ def dumps(scene: Scene) -> str:
 
     Args:
         scene: the scene.
+
+    Example:
+        >>> print(sandbox.dumps(sandbox.Scene(balls=[sandbox.Ball(position=[0.0, 1.0], radius=0.1)])).strip())
+        [[ball]]
+        position = [0.0, 1.0]
+        radius = 0.1
     """
     import tomlkit
 

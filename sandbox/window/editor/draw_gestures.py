@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import Part, Point
+from sandbox.scene.description.base import Part, Point, is_required
 from sandbox.scene.description.bodies import Box, Capsule, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
@@ -111,7 +111,7 @@ def defaults_of(table: str) -> dict[str, Any]:
     """Return the default values of the fields of a table."""
     fields = ELEMENT_TYPES[table].model_fields
     return {
-        name: field.get_default(call_default_factory=True) for name, field in fields.items() if not field.is_required()
+        name: field.get_default(call_default_factory=True) for name, field in fields.items() if not is_required(field)
     }
 
 
