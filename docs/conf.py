@@ -41,7 +41,7 @@ autodoc_preserve_defaults = True
 autodoc_default_options = {"members": True}
 default_role = "code"  # docstrings write `name`
 nitpick_ignore_regex = [
-    ("py:.*", r"(numpy|np|npt|pydantic|gymnasium|pymunk|collections|pathlib|typing)\..*"),
+    ("py:.*", r"(numpy|np|npt|pandas|polars|pydantic|gymnasium|pymunk|collections|pathlib|typing)\..*"),
     ("py:.*", r"sandbox\..*"),  # types within that have no page
     ("py:.*", r"[A-Z]\w*|\w+Array|optional"),  # names of type aliases
     ("py:class", r"Path|Any|(annotated_types|types)\..*"),
