@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from sandbox.measure.run.runner import run as run
     from sandbox.measure.run.sessions import play_out as play_out
     from sandbox.measure.tradeoff import tradeoff as tradeoff
+    from sandbox.notebook import live as live
     from sandbox.pymunk_capture.game_capture import GameCapture as GameCapture, capture as capture
     from sandbox.pymunk_capture.space_capture import (
         CaptureError as CaptureError,
@@ -103,6 +104,7 @@ _NAMES = {
     "sandbox.measure.run.runner": "run",
     "sandbox.measure.run.sessions": "play_out",
     "sandbox.measure.tradeoff": "tradeoff",
+    "sandbox.notebook": "live",
     "sandbox.pymunk_capture.game_capture": "GameCapture capture",
     "sandbox.pymunk_capture.space_capture": "CaptureError CaptureWarning from_pymunk",
     "sandbox.recording": "Recording",

@@ -4,6 +4,7 @@ Accumulator of G. Fiedler, "Fix Your Timestep!" (2004): real time is accumulated
 is the interpolation parameter between two states.
 """
 
+import math
 from collections import deque
 from dataclasses import replace
 
@@ -60,7 +61,7 @@ class FixedStepClock:
     """Converts real time to a number of steps."""
 
     def __init__(self) -> None:
-        self._level = 0
+        self._level = 0.0
         self._accumulated = 0.0  # s
         self._samples: deque[tuple[float, float]] = deque()  # real and simulated time of each frame, s
 
@@ -74,6 +75,11 @@ class FixedStepClock:
         """Recently measured speed, as a multiple of real time; the requested speed until enough samples exist."""
         real = sum(each for each, _ in self._samples)
         return sum(each for _, each in self._samples) / real if real > SPEED_WINDOW / 2.0 else self.speed
+
+    def set_speed(self, speed: float) -> None:
+        """Set the speed, as a multiple of real time."""
+        self._level = math.log10(speed) * SPEEDS_PER_DECADE
+        self._samples.clear()
 
     def slower(self) -> None:
         """Decrease the speed by one level."""
