@@ -299,6 +299,7 @@ class LiveScene:
             "ended": self._ended,
             "engine": simulation.engine,
             "dt": simulation.settings.dt,
+            "has_steps": simulation.settings.integrator is not None,
             "engines": [
                 {
                     "name": name,

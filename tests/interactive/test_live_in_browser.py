@@ -1,9 +1,11 @@
 """A live scene in a browser, by pointer, finger and keyboard, on a desktop and a phone."""
 
 import asyncio
+import base64
 import threading
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from queue import Queue
 from typing import Any, NamedTuple
 
@@ -12,8 +14,10 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+import sandbox
 from sandbox.interactive.live_scene import LiveScene
 from sandbox.interactive.server import SceneServer, ServerOptions
+from sandbox.interactive.widget import LiveWidget
 from sandbox.scene.files.load import loads
 from tests.browser import Browser
 
@@ -210,3 +214,54 @@ def test_page_of_a_server_that_has_ended_says_so(browser: Browser) -> None:
     browser.wait(f"{DATA}.ended === 'true'")
     assert "ended" in browser.do("return document.querySelector('.message').textContent")
     assert browser.do("return [...document.querySelectorAll('button, select, input')].every((it) => it.disabled)")
+
+
+NOTEBOOK = """<!doctype html><style>{style}</style><body style="margin: 0; width: 640px"><div id="cell"></div>
+<script type="module">
+import widget from "data:text/javascript;base64,{module}";
+window.sent = [];
+const callbacks = [];
+window.reply = (message) => callbacks.forEach((each) => each(message));
+const model = {{
+  send: (message) => window.sent.push(message),
+  on: (name, callback) => name === "msg:custom" && callbacks.push(callback),
+  off: (name, callback) => callbacks.splice(callbacks.indexOf(callback), 1),
+}};
+window.dispose = widget.render({{ model, el: document.getElementById("cell") }});
+</script>"""
+"""A page with the interface of a notebook that a widget uses."""
+
+
+def test_widget_plays_in_a_cell_of_a_notebook(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replies: list[Any] = []
+    monkeypatch.setattr(LiveWidget, "send", lambda self, content, buffers=None: replies.append(content))
+    widget = sandbox.live(loads(SCENE))
+    page = tmp_path / "notebook.html"
+    module = base64.b64encode(str(widget._esm).encode()).decode()
+    page.write_text(NOTEBOOK.format(style=widget._css, module=module), encoding="utf-8")
+
+    def answer() -> None:
+        """Pass the requests of the page to the widget, and its replies to the page."""
+        for message in browser.do("return window.sent.splice(0)"):
+            widget._handle_custom_msg(message, [])
+        while replies:
+            browser.do("window.reply(arguments[0])", replies.pop(0))
+
+    browser.show(page)
+    browser.wait("window.sent && window.sent.length")
+    answer()
+    browser.wait(f"Number({DATA}.painted) > 0")
+    browser.driver.find_element(By.CSS_SELECTOR, "[data-action=play]").click()
+    for _ in range(500):
+        answer()
+        if widget.simulation.time > 0.1:
+            break
+    assert widget.simulation.time > 0.1
+    assert browser.do("const f = document.querySelector('.layout'); return f.scrollWidth <= f.clientWidth")
+    browser.do("window.dispose()")
+    answer()
+    assert widget._viewers == {}
+    assert browser.log() == []
+    widget.close()

@@ -7,6 +7,7 @@ const ENERGY_SECONDS = 10; // simulated, shown in the chart
 const MAX_SAMPLES = 1500;
 const POLL = 400; // ms between requests while a shared scene is paused: another viewer may play it
 const MESSAGE_SECONDS = 8;
+const LATE = 1500; // ms after which a missing answer is reported, as of a kernel that runs another cell
 const DARK_THEME = window.matchMedia("(prefers-color-scheme: dark)");
 const COLOURS = ["paper", "sheet", "ink", "soft", "rule", "solid", "pocket", "accent", "e0", "e1", "e2", "e3", "e4", "e5"];
 
@@ -230,6 +231,7 @@ class Live {
     if (this.closed) return;
     if (this.isChanged) this.paint();
     if (!this.waiting) this.sendInputs(now);
+    else if (now - this.sentAt > LATE) this.status.textContent = "waiting for an answer …";
     this.request = requestAnimationFrame(this.tick);
   }
 
@@ -281,7 +283,7 @@ class Live {
     this.speed.value = String(SPEEDS.reduce((a, b) => (Math.abs(b - state.speed) < Math.abs(a - state.speed) ? b : a)));
     this.fill(this.engine, state.engines.map(({ name, is_able: isAble }) => [name, isAble ? name : `${name} (cannot run it)`, isAble]), state.engine);
     const others = state.engines.filter((each) => each.is_able && each.name !== state.engine).map(({ name }) => [name, 1]);
-    const ghosts = [...others, [state.engine, 0.1]];
+    const ghosts = state.has_steps ? [...others, [state.engine, 0.1]] : others; // event-driven engines need no small dt
     const chosen = state.ghost ? [state.ghost.engine, state.ghost.dt_fraction] : null;
     if (chosen && !ghosts.some((each) => String(each) === String(chosen))) ghosts.push(chosen);
     const names = ghosts.map(([name, fraction]) => [JSON.stringify([name, fraction]), fraction === 1 ? name : `${name === state.engine ? "" : `${name}, `}dt ÷ ${Math.round(1 / fraction)}`, true]);
