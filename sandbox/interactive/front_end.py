@@ -9,6 +9,7 @@ from sandbox.report.html.static_files import hash_source, static_text
 
 SHARED_SCRIPTS = ("format.js", "renderer.js")
 """Scripts of the pages that the module begins with."""
+SCRIPTS = ("energy_chart.js", "controls.js", "live.js", "widget.js")
 
 
 @cache
@@ -19,7 +20,7 @@ def _text(name: str) -> str:
 @cache
 def module() -> str:
     """Return the ES module. Its default export is that of a widget of anywidget; it also exports `mount`."""
-    return "\n".join([*map(static_text, SHARED_SCRIPTS), _text("live.js"), _text("widget.js")])
+    return "\n".join([*map(static_text, SHARED_SCRIPTS), *map(_text, SCRIPTS)])
 
 
 @cache

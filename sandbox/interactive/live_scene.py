@@ -21,7 +21,7 @@ from sandbox.engines.registry import ENGINES, able, engine_named, usual
 from sandbox.engines.switching import SwitchableSimulation, switch_engine
 from sandbox.interactive.ghost import Ghost, largest_distance
 from sandbox.interactive.picture import Picture, find_view
-from sandbox.interactive.sliders import default_sliders, parse_sliders, read_number
+from sandbox.interactive.sliders import default_sliders, parse_sliders, split_component, whole_values
 from sandbox.report.colours import css_class_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
@@ -152,7 +152,10 @@ class LiveScene:
 
     def _restart(self, values: dict[str, float]) -> str | None:
         try:
-            scene = from_document(to_document(self._file), overrides=values.items()) if values else self._file
+            scene = self._file
+            if values:
+                overrides = whole_values(scene, self.simulation.settings, values)
+                scene = from_document(to_document(scene), overrides=overrides.items())
             simulation = _start(scene, self.simulation.engine)
         except (SceneError, Refusal) as error:
             raise ActionError(str(error)) from None
@@ -203,11 +206,11 @@ class LiveScene:
         except ValueError as error:
             raise ActionError(str(error)) from None
         values = {**self._values, key: checked}
-        (base, component), message = _component_of(key), None
+        message = None
         if key.startswith("solver."):
             self.apply(Switch(time=0.0, settings={key.removeprefix("solver."): checked}))
-        elif is_settable(base):
-            message = self._set_live(base, component, checked, values)
+        elif is_settable(split_component(key)[0]):
+            message = self._set_live(key, checked, values)
         else:
             message = self._restart(values)
         self._values = values
@@ -215,13 +218,9 @@ class LiveScene:
         self.revision += 1
         return message
 
-    def _set_live(self, path: str, component: int | None, value: float, values: dict[str, float]) -> str | None:
+    def _set_live(self, key: str, value: float, values: dict[str, float]) -> str | None:
         """Set a parameter of the running scene; start it again if the engine cannot."""
-        whole: Any = value
-        if component is not None:
-            scene, settings = self.simulation.scene, self.simulation.settings
-            whole = [read_number(scene, settings, f"{path}[{k}]") for k in range(2)]
-            whole[component] = value
+        ((path, whole),) = whole_values(self.simulation.scene, self.simulation.settings, {key: value}).items()
         try:
             self.apply(SetParameter(time=0.0, path=path, value=whole))
         except ActionError:
@@ -346,9 +345,3 @@ def _start(scene: Scene, engine: str) -> SwitchableSimulation:
             raise refusal from None
     simulation.patience = STEP_TIMEOUT
     return simulation
-
-
-def _component_of(key: str) -> tuple[str, int | None]:
-    """Return the address of an array and the index of a number in it; None if the address has no index at its end."""
-    base, _, index = key.rstrip("]").replace("[", ".").rpartition(".")
-    return (base, int(index)) if index.isdecimal() and len(index) < 3 and base.count(".") > 0 else (key, None)

@@ -1,7 +1,7 @@
 """Sliders: numbers of a scene by their address, as in `--set`, with the range and scale of each."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,6 +111,42 @@ def read_number(scene: Scene, settings: Settings, key: str) -> float | int | Non
     Raises:
         AddressError: there is no such number.
     """
+    value = _read_value(scene, settings, key)
+    if isinstance(value, bool) or not isinstance(value, int | float | None):
+        raise AddressError(f"{shorten(key, MAX_NAMED)} is not a number")
+    return value
+
+
+def split_component(key: str) -> tuple[str, int | None]:
+    """Return the address of an array and the index of a number in it; None if the address has no index at its end."""
+    base, _, index = key.rstrip("]").replace("[", ".").rpartition(".")
+    return (base, int(index)) if index.isdecimal() and len(index) < 3 and "." in base else (key, None)
+
+
+def whole_values(scene: Scene, settings: Settings, values: Mapping[str, float]) -> dict[str, Any]:
+    """Return values of sliders as assignments to numbers and to whole arrays.
+
+    A file may leave an array out, and then none of its components can be set alone.
+    """
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        base, component = split_component(key)
+        if component is None or EVERY in parse_path(base):  # the arrays of several elements differ
+            found[key] = value
+            continue
+        array = found.get(base)
+        if array is None:
+            array = found[base] = list(_read_value(scene, settings, base))
+        array[component] = value
+    return found
+
+
+def _read_value(scene: Scene, settings: Settings, key: str) -> Any:
+    """Return the value at an address.
+
+    Raises:
+        AddressError: there is no such value.
+    """
     parts = parse_path(key)
     shown = shorten(key, MAX_NAMED)
     value: Any = scene
@@ -124,8 +160,6 @@ def read_number(scene: Scene, settings: Settings, key: str) -> float | int | Non
             value = value[_index(value, parts[: k + 1], shown)]
         else:
             raise AddressError(f"{shown}: the scene has no {short_repr('.'.join(parts[: k + 1]))}")
-    if isinstance(value, bool) or not isinstance(value, int | float | None):
-        raise AddressError(f"{shown} is not a number")
     return value
 
 

@@ -110,6 +110,16 @@ def test_reset_restores_the_start_with_the_values_of_sliders() -> None:
     assert talk.live.frame.position.tolist() == plain.position[200].tolist()
 
 
+def test_component_of_an_array_that_the_file_leaves_out() -> None:
+    scene = '[[ball]]\nname = "a"\nposition = [0.0, 0.0]\nradius = 1.0\n'
+    talk = Conversation(scene, sliders=["world.gravity[0]", "world.gravity[1]", "ball.a.velocity[1]"])
+    for key, value in (("world.gravity[0]", 2.0), ("world.gravity[1]", -3.0), ("ball.a.velocity[1]", 4.0)):
+        assert "messages" not in talk.ask(type="set", key=key, value=value)
+    talk.ask(type="reset")
+    shown = talk.live.simulation.scene
+    assert (shown.world.gravity, shown.balls[0].velocity) == ((2.0, -3.0), (0.0, 4.0))
+
+
 @pytest.mark.parametrize(
     ("key", "value", "restarts"),
     [("solver.dt", 0.002, False), ("world.gravity[1]", 3.0, False), ("ball.*.restitution", 0.25, False),

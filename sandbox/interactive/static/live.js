@@ -3,25 +3,11 @@
    A transport has `send(inputs)`, which sends an array of inputs, and calls `onmessage(reply)` once for each, or
    `onclose(reason)`. At most one request is under way: a slow scene gets fewer requests, not a queue of them. */
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
-const ENERGY_SECONDS = 10; // simulated, shown in the chart
-const MAX_SAMPLES = 1500;
 const POLL = 400; // ms between requests while a shared scene is paused: another viewer may play it
 const MESSAGE_SECONDS = 8;
 const LATE = 1500; // ms after which a missing answer is reported, as of a kernel that runs another cell
 const DARK_THEME = window.matchMedia("(prefers-color-scheme: dark)");
 const COLOURS = ["paper", "sheet", "ink", "soft", "rule", "solid", "pocket", "accent", "e0", "e1", "e2", "e3", "e4", "e5"];
-
-/* An element with attributes and children. */
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-  made.append(...children);
-  return made;
-}
-
-function button(action, sign, about) {
-  return element("button", { type: "button", "data-action": action, title: about, "aria-label": about }, sign);
-}
 
 /* Distance of a point in the frame of a body from one of its pieces, m; negative or 0 inside. */
 function pieceDistance(piece, x, y) {
@@ -40,104 +26,6 @@ function pieceDistance(piece, x, y) {
     if ((dx * (y - ay) - dy * (x - ax)) * area < 0) inside = false;
   }
   return (inside ? 0 : nearest) - piece[0];
-}
-
-/* Kinetic, potential and total energy over the last seconds. */
-class EnergyChart {
-  constructor(canvas) {
-    this.canvas = canvas;
-    this.samples = [];
-  }
-
-  add(time, energy) {
-    const last = this.samples.at(-1);
-    if (last && time < last[0]) this.samples = [];
-    if (energy === null || (last && time === last[0] && this.samples.length)) return;
-    this.samples.push([time, energy[0], energy[1], energy[0] + energy[1]]);
-    while (this.samples.length > MAX_SAMPLES || time - this.samples[0][0] > ENERGY_SECONDS) this.samples.shift();
-  }
-
-  paint(colours, ratio) {
-    const { canvas, samples } = this;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!width) return;
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    context.clearRect(0, 0, width, height);
-    const values = samples.flatMap((sample) => sample.slice(1));
-    let [low, high] = [Math.min(0, ...values), Math.max(0, ...values)];
-    if (high - low < 1e-12) high = low + 1;
-    const [top, bottom, right] = [8, height - 8, width - 4];
-    const toY = (value) => bottom - ((value - low) / (high - low)) * (bottom - top);
-    context.font = `11px ${colours.font}`;
-    const rough = (high - low) / 3;
-    const power = 10 ** Math.floor(Math.log10(rough));
-    const step = [1, 2, 5, 10].find((each) => each * power >= rough) * power;
-    const ticks = [];
-    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k += 1) ticks.push(k * step);
-    const left = 6 + Math.max(...ticks.map((tick) => context.measureText(formatNumber(tick, "J")).width));
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    context.lineWidth = 1;
-    for (const tick of ticks) {
-      const y = Math.round(toY(tick)) + 0.5;
-      context.strokeStyle = tick === 0 ? colours.soft : colours.rule;
-      context.beginPath();
-      context.moveTo(left, y);
-      context.lineTo(right, y);
-      context.stroke();
-      context.fillStyle = colours.soft;
-      context.fillText(formatNumber(tick, "J"), left - 6, y);
-    }
-    if (!samples.length) return;
-    const begin = Math.max(samples[0][0], samples.at(-1)[0] - ENERGY_SECONDS);
-    const toX = (time) => left + ((time - begin) / ENERGY_SECONDS) * (right - left);
-    for (const [k, colour] of [[1, colours.e3], [2, colours.e4], [3, colours.ink]]) {
-      context.strokeStyle = colour;
-      context.lineWidth = k === 3 ? 1.2 : 1.8;
-      context.beginPath();
-      for (const sample of samples) context.lineTo(toX(sample[0]), toY(sample[k]));
-      context.stroke();
-    }
-  }
-}
-
-/* One slider: its scale is linear or logarithmic, its values have three digits. */
-class Slider {
-  constructor({ key, low, high, is_log: isLog, is_whole: isWhole, unit }, onChange) {
-    Object.assign(this, { key, low, high, isLog, isWhole, unit });
-    this.output = element("output");
-    const range = isWhole ? { min: low, max: high, step: 1 } : { min: 0, max: 200, step: 1 };
-    this.input = element("input", { type: "range", ...range, "aria-label": key });
-    this.root = element("label", { class: "slider" }, element("span", { class: "key" }, key), this.output, this.input);
-    this.input.addEventListener("input", () => {
-      const value = this.value();
-      this.write(value);
-      onChange(key, value);
-    });
-  }
-
-  value() {
-    if (this.isWhole) return Number(this.input.value);
-    const fraction = this.input.value / 200;
-    const exact = this.isLog ? this.low * (this.high / this.low) ** fraction : this.low + fraction * (this.high - this.low);
-    return Math.min(Math.max(Number(exact.toPrecision(3)), this.low), this.high);
-  }
-
-  write(value) {
-    const text = this.isWhole ? String(value) : formatNumber(value, this.unit).trim().replace("-", "−");
-    this.output.textContent = text;
-    this.input.setAttribute("aria-valuetext", text);
-  }
-
-  show(value) {
-    if (this.input.matches(":active")) return;
-    const fraction = this.isLog ? Math.log(value / this.low) / Math.log(this.high / this.low) : (value - this.low) / (this.high - this.low);
-    this.input.value = this.isWhole ? value : 200 * fraction;
-    this.write(value);
-  }
 }
 
 class Live {
