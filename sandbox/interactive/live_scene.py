@@ -34,6 +34,10 @@ MAX_WORK = 0.03
 """s, computing time of the steps of one request; the last step may exceed it"""
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
+SPEEDS = (0.001, 0.01, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Speeds that a front end offers, as multiples of real time."""
+MIN_SECONDS = 2.0
+"""Real time, s, that the duration of a scene takes at its initial speed; longer scenes begin at real time."""
 BEHIND = 0.9
 """Fraction of the selected speed below which the scene counts as behind."""
 
@@ -70,6 +74,8 @@ class LiveScene:
         self._sliders = parse_sliders(texts, self._file, settings)
         self._values: dict[str, float] = {}  # set by sliders
         self._clock = FixedStepClock()
+        slow_enough = [speed for speed in SPEEDS if speed <= min(1.0, self._file.world.duration / MIN_SECONDS)]
+        self._clock.set_speed(max(slow_enough, default=SPEEDS[0]))
         self._wall_clock, self._last_request = wall_clock, 0.0 if wall_clock is None else wall_clock()
         self._ghost: Ghost | None = None
         self.playing = False
@@ -295,6 +301,7 @@ class LiveScene:
             "playing": self.playing,
             "is_shared": self._wall_clock is not None,
             "speed": self._clock.speed,
+            "speeds": list(SPEEDS),
             "ended": self._ended,
             "engine": simulation.engine,
             "dt": simulation.settings.dt,

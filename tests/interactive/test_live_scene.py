@@ -235,6 +235,12 @@ def test_speed_scales_time() -> None:
     assert talk.live.frame.time == pytest.approx(0.2, abs=0.011)
 
 
+@pytest.mark.parametrize(("duration", "speed"), [(0.02, 0.01), (1.0, 0.5), (2.0, 1.0), (100.0, 1.0), (1e-4, 0.001)])
+def test_short_scene_begins_slowly(duration: float, speed: float) -> None:
+    talk = Conversation(SCENE.replace("duration = 2.0", f"duration = {duration}"))
+    assert talk.reply["state"]["speed"] == pytest.approx(speed)
+
+
 def test_diverged_scene_ends_and_can_be_reset() -> None:
     talk = Conversation(sliders=["world.gravity[1]=-1e9:0"])
     talk.ask_all({"type": "set", "key": "world.gravity[1]", "value": -1e9}, {"type": "play", "on": True})

@@ -2,7 +2,6 @@
 
    A transport has `send(inputs)`, which sends an array of inputs, and calls `onmessage(reply)` once for each, or
    `onclose(reason)`. At most one request is under way: a slow scene gets fewer requests, not a queue of them. */
-const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const POLL = 400; // ms between requests while a shared scene is paused: another viewer may play it
 const MESSAGE_SECONDS = 8;
 const LATE = 1500; // ms after which a missing answer is reported, as of a kernel that runs another cell
@@ -48,7 +47,7 @@ class Live {
     this.status = element("p", { class: "status", "aria-live": "off" });
     this.message = element("p", { class: "message", role: "status" });
     this.time = element("output", { class: "time" }, "0 s");
-    this.speed = element("select", { "aria-label": "Speed" }, ...SPEEDS.map((each) => element("option", { value: each }, `${each}×`)));
+    this.speed = element("select", { "aria-label": "Speed" });
     this.engine = element("select", { class: "engine" });
     this.ghost = element("select", { class: "ghost" });
     this.legend = element("ul", { class: "legend" });
@@ -168,7 +167,9 @@ class Live {
     play.textContent = state.playing ? "❚❚" : "▶";
     play.setAttribute("aria-pressed", String(state.playing));
     this.figure.dataset.playing = String(state.playing);
-    this.speed.value = String(SPEEDS.reduce((a, b) => (Math.abs(b - state.speed) < Math.abs(a - state.speed) ? b : a)));
+    const nearest = state.speeds.reduce((a, b) => (Math.abs(b - state.speed) < Math.abs(a - state.speed) ? b : a));
+    this.fill(this.speed, state.speeds.map((each) => [String(each), `${each}×`, true]), String(nearest));
+    this.digits = Math.min(Math.max(2, Math.ceil(-Math.log10(state.dt))), 6);
     this.fill(this.engine, state.engines.map(({ name, is_able: isAble }) => [name, isAble ? name : `${name} (cannot run it)`, isAble]), state.engine);
     const others = state.engines.filter((each) => each.is_able && each.name !== state.engine).map(({ name }) => [name, 1]);
     const ghosts = state.has_steps ? [...others, [state.engine, 0.1]] : others; // event-driven engines need no small dt
@@ -412,7 +413,7 @@ class Live {
     this.drawChosen();
     this.drawPull();
     this.chart.paint(colours, this.ratio);
-    this.time.textContent = `${frame.time.toFixed(2)} s`;
+    this.time.textContent = `${frame.time.toFixed(this.digits)} s`;
     const notes = [];
     if (frame.real_speed !== undefined) notes.push(`at ${Math.round(100 * frame.real_speed)} % of real time`);
     if (!picture.is_complete) notes.push(`${picture.bodies.toLocaleString("en")} bodies are drawn`);
