@@ -40,6 +40,8 @@ MIN_SECONDS = 2.0
 """Real time, s, that the duration of a scene takes at its initial speed; longer scenes begin at real time."""
 BEHIND = 0.9
 """Fraction of the selected speed below which the scene counts as behind."""
+LATE_REQUESTS = 30
+"""Requests for which a scene still counts as behind after one that could not make all steps: half a second."""
 
 
 class LiveScene:
@@ -77,6 +79,7 @@ class LiveScene:
         slow_enough = [speed for speed in SPEEDS if speed <= min(1.0, self._file.world.duration / MIN_SECONDS)]
         self._clock.set_speed(max(slow_enough, default=SPEEDS[0]))
         self._wall_clock, self._last_request = wall_clock, 0.0 if wall_clock is None else wall_clock()
+        self._late = 0  # requests for which it still counts as behind
         self._ghost: Ghost | None = None
         self.playing = False
         """whether elapsed time advances the scene"""
@@ -104,6 +107,7 @@ class LiveScene:
             self._clock.reset()
         else:
             self._clock.record_steps(elapsed, made, due, dt)
+            self._late = LATE_REQUESTS if made < due else max(self._late - 1, 0)
 
     def step(self, count: int) -> None:
         """Pause, and make some steps; fewer if they take longer than `STEP_TIMEOUT`."""
@@ -280,7 +284,7 @@ class LiveScene:
         if self._ghost is not None and self._ghost.ended is None:
             ghost = self._ghost.frame_at(shown.time)
             document["ghost"] = {"pose": self.picture.pose(ghost), "distance": largest_distance(shown, ghost)}
-        if self.playing and self._clock.real_speed < BEHIND * self._clock.speed:
+        if self.playing and self._late and self._clock.real_speed < BEHIND * self._clock.speed:
             document["real_speed"] = self._clock.real_speed
         return document
 

@@ -17,8 +17,6 @@ MAX_BODIES = 2000
 """Bodies that are drawn; of more, a part."""
 MAX_STEPS, MAX_BODY_STEPS = 4000, 20_000
 """Limits of the trial run that finds the region of the bodies: steps, and steps times bodies."""
-MAX_GROWTH = 20.0
-"""Size of that region, in sizes at the start, at which the trial run ends."""
 RESOLUTION = 1e-6
 """Rounding of coordinates, as a fraction of the size of the view: less than a pixel at the largest zoom."""
 
@@ -76,19 +74,14 @@ def find_view(scene: Scene, engine: str, settings: Settings) -> Bounds:
         (left, bottom), (right, top) = stated
         margin = 0.0 if scene.play.view is not None else 0.12 * min(right - left, top - bottom)  # the rails of a table
         return left - margin, bottom - margin, right + margin, top + margin
-    start_view = viewport(scene, [scene.bodies.position[None]])
-    largest = MAX_GROWTH * max(start_view[2] - start_view[0], start_view[3] - start_view[1])
-    path = _trial(scene, engine, settings, largest)
-    return viewport(scene, [path])
+    return viewport(scene, [_trial(scene, engine, settings)])
 
 
-def _trial(scene: Scene, engine: str, settings: Settings, largest: float) -> FloatArray:
-    """Return positions (T, N, 2), m, of a short run; it ends once a body is farther than `largest` from its start."""
-    begin = scene.bodies.position
-    moving = ~scene.bodies.fixed
-    count = int(np.count_nonzero(moving))
+def _trial(scene: Scene, engine: str, settings: Settings) -> FloatArray:
+    """Return positions (T, N, 2), m, of a run, as long as the limits permit."""
+    count = int(np.count_nonzero(~scene.bodies.fixed))
     steps = min(round(scene.world.duration / settings.dt), MAX_STEPS, MAX_BODY_STEPS // max(count, 1))
-    path, every = [begin], max(1, steps // 200)
+    path, every = [scene.bodies.position], max(1, steps // 200)
     simulation = start(scene, engine, settings)
     try:
         for k in range(steps if count else 0):
@@ -96,8 +89,6 @@ def _trial(scene: Scene, engine: str, settings: Settings, largest: float) -> Flo
             if k % every:
                 continue
             frame = simulation.frame()
-            if not np.abs(frame.position - begin)[moving & frame.present].max(initial=0.0) <= largest:
-                break
             path.append(np.where(frame.present[:, None], frame.position, np.nan))
     except (Divergence, Exhaustion):
         pass  # the region up to then

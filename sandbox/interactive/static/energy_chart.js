@@ -1,4 +1,4 @@
-const ENERGY_SECONDS = 10; // simulated, shown in the chart
+const ENERGY_SECONDS = 10; // of real time, shown in the chart
 const MAX_SAMPLES = 1500;
 
 /* Kinetic, potential and total energy over the last seconds. */
@@ -6,6 +6,7 @@ class EnergyChart {
   constructor(canvas) {
     this.canvas = canvas;
     this.samples = [];
+    this.seconds = ENERGY_SECONDS; // simulated
   }
 
   add(time, energy) {
@@ -13,7 +14,7 @@ class EnergyChart {
     if (last && time < last[0]) this.samples = [];
     if (energy === null || (last && time === last[0] && this.samples.length)) return;
     this.samples.push([time, energy[0], energy[1], energy[0] + energy[1]]);
-    while (this.samples.length > MAX_SAMPLES || time - this.samples[0][0] > ENERGY_SECONDS) this.samples.shift();
+    while (this.samples.length > MAX_SAMPLES || time - this.samples[0][0] > this.seconds) this.samples.shift();
   }
 
   paint(colours, ratio) {
@@ -51,8 +52,8 @@ class EnergyChart {
       context.fillText(formatNumber(tick, "J"), left - 6, y);
     }
     if (!samples.length) return;
-    const begin = Math.max(samples[0][0], samples.at(-1)[0] - ENERGY_SECONDS);
-    const toX = (time) => left + ((time - begin) / ENERGY_SECONDS) * (right - left);
+    const begin = Math.max(samples[0][0], samples.at(-1)[0] - this.seconds);
+    const toX = (time) => left + ((time - begin) / this.seconds) * (right - left);
     for (const [k, colour] of [[1, colours.e3], [2, colours.e4], [3, colours.ink]]) {
       context.strokeStyle = colour;
       context.lineWidth = k === 3 ? 1.2 : 1.8;

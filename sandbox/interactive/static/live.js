@@ -169,6 +169,7 @@ class Live {
     this.figure.dataset.playing = String(state.playing);
     const nearest = state.speeds.reduce((a, b) => (Math.abs(b - state.speed) < Math.abs(a - state.speed) ? b : a));
     this.fill(this.speed, state.speeds.map((each) => [String(each), `${each}×`, true]), String(nearest));
+    this.chart.seconds = ENERGY_SECONDS * nearest;
     this.digits = Math.min(Math.max(2, Math.ceil(-Math.log10(state.dt))), 6);
     this.fill(this.engine, state.engines.map(({ name, is_able: isAble }) => [name, isAble ? name : `${name} (cannot run it)`, isAble]), state.engine);
     const others = state.engines.filter((each) => each.is_able && each.name !== state.engine).map(({ name }) => [name, 1]);
