@@ -144,6 +144,8 @@ class LiveScene:
         if on != self.playing and not (on and self._ended is not None):
             self.playing = on
             self._clock.reset()
+            if self._wall_clock is not None:
+                self._last_request = self._wall_clock()
             self._before = self._after
             self.revision += 1
 

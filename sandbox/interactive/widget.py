@@ -46,7 +46,12 @@ class LiveWidget(anywidget.AnyWidget):
         self._viewers[view] = viewer  # the last one used
         if len(self._viewers) > MAX_VIEWS:
             self._forget(next(iter(self._viewers)))
+        before = self._live.revision
         self.send({"view": view, "reply": viewer.handle(json.dumps(inputs))})
+        if self._live.revision != before:
+            for other in self._viewers:
+                if other != view:
+                    self.send({"view": other, "reply": self._viewers[other].handle("[]")})
 
     def _forget(self, view: str) -> None:
         viewer = self._viewers.pop(view, None)

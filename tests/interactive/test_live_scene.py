@@ -264,6 +264,9 @@ def test_viewers_of_one_scene_see_changes_of_each_other_and_share_its_time() -> 
     talk.ask(type="play", on=True)
     assert other.ask(type="advance", elapsed=0.0)["state"]["playing"] is True
     assert "state" not in other.ask(type="advance", elapsed=0.0)
+    talk.ask(type="play", on=False)
+    now[0] += 100.0  # a pause
+    talk.ask(type="play", on=True)
     for _ in range(10):
         now[0] += 0.02
         talk.ask(type="advance", elapsed=0.02)

@@ -35,6 +35,19 @@ def test_views_of_a_widget_show_one_scene(sent) -> None:
     widget.close()
 
 
+def test_change_in_one_view_is_shown_in_the_others(sent) -> None:
+    widget = sandbox.live(loads(SCENE))
+    for view in ("one", "two"):
+        receive(widget, view, {"type": "open"})
+    sent.clear()
+    receive(widget, "one", {"type": "engine", "name": "reference"})
+    assert [(each["view"], each["reply"]["state"]["engine"]) for each in sent] == [
+        ("one", "reference"),
+        ("two", "reference"),
+    ]
+    widget.close()
+
+
 def test_invalid_messages_are_answered(sent) -> None:
     widget = sandbox.live(loads(SCENE))
     widget._handle_custom_msg({"view": "one", "inputs": [{"type": "advance", "elapsed": float("nan")}]}, [])

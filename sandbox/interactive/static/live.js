@@ -2,7 +2,7 @@
 
    A transport has `send(inputs)`, which sends an array of inputs, and calls `onmessage(reply)` once for each, or
    `onclose(reason)`. At most one request is under way: a slow scene gets fewer requests, not a queue of them. */
-const POLL = 400; // ms between requests while a shared scene is paused: another viewer may play it
+const POLL = 400; // ms between requests of a transport with `polls` while a shared scene is paused: others may play it
 const MESSAGE_SECONDS = 8;
 const LATE = 1500; // ms after which a missing answer is reported, as of a kernel that runs another cell
 const DARK_THEME = window.matchMedia("(prefers-color-scheme: dark)");
@@ -127,7 +127,7 @@ class Live {
     this.target = null;
     for (const [key, value] of this.changes) this.send({ type: "set", key, value });
     this.changes.clear();
-    const polls = this.state && this.state.is_shared && now - this.sentAt > POLL;
+    const polls = this.transport.polls && this.state && this.state.is_shared && now - this.sentAt > POLL;
     if ((this.state && this.state.playing) || polls) {
       this.send({ type: "advance", elapsed: this.sentAt === null ? 0 : (now - this.sentAt) / 1000 });
     }
