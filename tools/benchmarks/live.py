@@ -7,24 +7,15 @@ computed with it. The display adds up to one frame of its own.
 """
 
 import argparse
-import asyncio
 import random
-import shutil
-import tempfile
-import threading
 from functools import partial
-from queue import Queue
 from time import perf_counter, sleep
 
 import numpy as np
 from selenium import webdriver
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 
-from sandbox.interactive.live_scene import LiveScene
-from sandbox.interactive.server import SceneServer, ServerOptions
-from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
+from tools.live_page import PAINTED, live_page
 
 SCENE = """
 title = "Balls in a box"
@@ -58,11 +49,6 @@ new MutationObserver(() => {
 """
 
 
-def serve(scene: Scene, addresses: "Queue[str]") -> None:
-    """Serve a scene until the process ends."""
-    asyncio.run(SceneServer(scene, partial(LiveScene, scene), ServerOptions()).serve(addresses.put))
-
-
 def main() -> None:
     """Measure, and print the figures."""
     parser = argparse.ArgumentParser(description="Frame rate and latency of a live scene in a headless Chromium.")
@@ -71,31 +57,16 @@ def main() -> None:
     options = parser.parse_args()
     columns = max(options.bodies // 10, 1)
     scene = loads(SCENE.format(columns=columns, spacing=min(0.9, 9.0 / columns)))
-    addresses: Queue[str] = Queue()
-    threading.Thread(target=serve, args=(scene, addresses), daemon=True).start()
-
-    chromium = Options()
-    chromium.binary_location = str(shutil.which("chromium"))
-    with tempfile.TemporaryDirectory() as profile:
-        for flag in ("--headless=new", "--no-sandbox", "--disable-gpu", "--window-size=1300,1000"):
-            chromium.add_argument(flag)
-        chromium.add_argument(f"--user-data-dir={profile}")
-        driver = webdriver.Chrome(options=chromium, service=Service(str(shutil.which("chromedriver"))))
-        try:
-            driver.get(addresses.get())
-            sleep(1.0)
-            _measure(driver, len(scene.bodies), options.seconds)
-        finally:
-            driver.quit()
+    with live_page(scene, 1280, 900) as driver:
+        _measure(driver, len(scene.bodies), options.seconds)
 
 
 def _measure(driver: webdriver.Chrome, bodies: int, seconds: float) -> None:
     driver.find_element("css selector", "[data-action=play]").click()
     sleep(1.0)
-    painted = "return Number(document.querySelector('.layout').dataset.painted)"
-    before, begin = driver.execute_script(painted), perf_counter()
+    before, begin = driver.execute_script(PAINTED), perf_counter()
     sleep(seconds)
-    frames, passed = driver.execute_script(painted) - before, perf_counter() - begin
+    frames, passed = driver.execute_script(PAINTED) - before, perf_counter() - begin
 
     driver.find_element("css selector", "[data-action=reset]").click()
     driver.execute_script(MEASURE)
