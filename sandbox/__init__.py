@@ -174,6 +174,9 @@ if TYPE_CHECKING:
     from sandbox.measure.tradeoff.simplify import (
         Simplification as Simplification,
     )
+    from sandbox.notebook import (
+        live as live,
+    )
     from sandbox.pymunk_capture.game_capture import (
         GameCapture as GameCapture,
         SpaceCapture as SpaceCapture,
@@ -345,6 +348,7 @@ _NAMES = {
     "sandbox.measure.tradeoff.error_budget": "ErrorBudget",
     "sandbox.measure.tradeoff.result": "Conclusion Recommendation Tradeoff",
     "sandbox.measure.tradeoff.simplify": "Simplification",
+    "sandbox.notebook": "live",
     "sandbox.pymunk_capture.game_capture": "GameCapture SpaceCapture capture",
     "sandbox.pymunk_capture.space_capture": "CaptureError CaptureWarning from_pymunk",
     "sandbox.pymunk_capture.state_log": "StateLog",

@@ -3,16 +3,20 @@
 Each is a page of the report in a frame of its own (`<iframe srcdoc>`): its styles, scripts and identifiers cannot
 clash with the notebook or with another page, and its content security policy lets it fetch nothing. The page reports
 its height, and a script beside the frame makes the frame as tall. Where a notebook runs no scripts (JupyterLab, as long
-as it does not trust the notebook), the frame keeps a fixed height and scrolls.
+as it does not trust the notebook), the frame keeps a fixed height and scrolls. Live scenes are widgets instead.
 """
 
 import html
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib import import_module
+from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sandbox.interactive.widget import LiveWidget
     from sandbox.report.html.page import Page
+    from sandbox.scene.compile.scene import Scene
 
 MAX_CHARACTERS = 1_500_000
 """Length of one display; a longer page is shown without its replay, so that notebook files stay small."""
@@ -79,3 +83,34 @@ def _frame(page: "Page", height: int) -> str:
         f'<iframe srcdoc="{document}" sandbox="allow-scripts" class="sandbox-page" title="{title}" loading="lazy"'
         f' style="{style}"></iframe>'
     )
+
+
+def live(
+    scene: "Scene | str | Path", engine: str | None = None, *, sliders: Sequence[str] | None = None
+) -> "LiveWidget":
+    """Return a scene as a live widget for notebooks: play, drag bodies, move sliders, change the engine.
+
+    Needs the extra `notebook` (`pip install -e '.[notebook]'`).
+
+    Args:
+        scene: the scene, or its name or path.
+        engine: name of the engine; default: `exact` for billiards, otherwise `pymunk`.
+        sliders: numbers of the scene with a slider, each `KEY` or `KEY=LOW:HIGH`, such as `solver.dt` or
+            `ball.*.restitution=0:1`; default: gravity, dt, restitution and friction.
+
+    Raises:
+        SceneError: the name or path is not that of a valid scene.
+        UnknownEngineError: no engine has that name.
+        Refusal: the engine does not support something that the scene needs.
+        ValueError: a slider is invalid.
+        ImportError: anywidget is not installed.
+    """
+    try:
+        from sandbox.interactive.widget import LiveWidget
+    except ModuleNotFoundError as error:
+        if error.name != "anywidget":
+            raise
+        raise ImportError("sandbox.live needs anywidget: pip install -e '.[notebook]'") from None
+    from sandbox.interactive.live_scene import LiveScene
+
+    return LiveWidget(LiveScene(scene, engine, sliders, wall_clock=monotonic))

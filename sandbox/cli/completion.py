@@ -212,6 +212,7 @@ _WORDS: dict[str, Words] = {
     "engines": _several_engines,
     "overrides": _keys,
     "sweeps": _keys,
+    "sliders": _keys,
     "metric": _metrics,
     "axes": _axes,
     "player": _players,

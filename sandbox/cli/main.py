@@ -25,6 +25,7 @@ COMMANDS = {
     "run": ("run:run_command", "run scenes without a window and print the results"),
     "runs": ("runs:runs_command", "list, filter, group and plot the stored runs of a folder"),
     "play": ("window:play_command", "open the window: play a scene, or pick one"),
+    "serve": ("serve:serve_command", "serve a live scene to the browser: play, drag, sliders, engines"),
     "compare": ("compare:compare_command", "run a scene on several engines and measure the error of each"),
     "tradeoff": (
         "tradeoff:tradeoff_command",

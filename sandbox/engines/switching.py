@@ -10,11 +10,23 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self, Unpack
+from typing import Any, Protocol, Self, Unpack
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
+from sandbox.action import (
+    Action,
+    ActionError,
+    Force,
+    Launch,
+    Pull,
+    Remove,
+    SetParameter,
+    Spawn,
+    Switch,
+    Throttle,
+    Value,
+)
 from sandbox.arrays import BoolArray
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
 from sandbox.engines.common.base import step_and_record
@@ -32,7 +44,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.fixed import AWAY, PlaneReach
-from sandbox.scene.description.world import Settings, SettingsChanges
+from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.validate.references import generators
@@ -543,3 +555,40 @@ class SwitchableSimulation:
     def close(self) -> None:
         """Release the resources of the engine."""
         self._segment.simulation.close()
+
+
+class Switchable(Protocol):
+    """Running scene to which a `Switch` can be applied."""
+
+    @property
+    def wanted(self) -> Settings:
+        """Settings as requested; those that are None are chosen by the engine."""
+
+    def apply(self, action: Action) -> object:
+        """Apply an action now."""
+
+
+def switch_engine(session: Switchable, engine: str) -> str | None:
+    """Continue with another engine from the present state.
+
+    Settings that only the present engine knows get the default of the other.
+
+    Returns:
+        A message that names those settings, or None.
+
+    Raises:
+        ActionError: the other engine cannot continue from here.
+    """
+    try:
+        session.apply(Switch(time=0.0, engine=engine))
+    except ActionError as error:
+        own = [key for key in session.wanted.model_dump(exclude_defaults=True) if key not in COMMON]
+        if not own:
+            raise
+        defaults: dict[str, Value] = {key: False if key == "half_kick" else None for key in own}
+        try:
+            session.apply(Switch(time=0.0, engine=engine, settings=defaults))
+        except ActionError:
+            raise error from None
+        return f"chosen by {engine}: {', '.join(own)}"
+    return None

@@ -17,19 +17,18 @@ from sandbox.formatting import format_number
 from sandbox.measure.compare import Comparison
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.trajectory_error import Errors, common_frames, errors
+from sandbox.report.colours import COLOURS, colour_index
 from sandbox.report.run_plot import MAX_BODIES, draw_fixed, draw_path, draw_truth, moving_axes
 from sandbox.report.style import (
     BEYOND,
     CHART_POINTS,
     CLOSED,
-    COLOURS,
     FAINT,
     INK,
     MAX_POINTS,
     SHADED,
     add_legend,
     chart_figure,
-    colour_index,
     draw,
     draw_closed,
     dress,

@@ -17,11 +17,11 @@ from matplotlib.patches import Circle, Polygon
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic import ClosedForm, closed_form
 from sandbox.measure.metrics.energy import energies
+from sandbox.report.colours import COLOURS
 from sandbox.report.style import (
     BEYOND,
     CHART_POINTS,
     CLOSED,
-    COLOURS,
     FAINT,
     FORMATS,
     INK,

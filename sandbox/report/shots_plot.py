@@ -16,7 +16,8 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.exact.tabletop.shots import ShotBatch
 from sandbox.measure.shots.monte_carlo import Odds
 from sandbox.measure.shots.study import ShotStudy
-from sandbox.report.style import COLOURS, FAINT, INK, literal, shortened, write_figure
+from sandbox.report.colours import COLOURS
+from sandbox.report.style import FAINT, INK, literal, shortened, write_figure
 from sandbox.scene.compile.scene import Scene
 
 BINS = 90

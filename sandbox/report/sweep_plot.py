@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from sandbox.arrays import FloatArray
-from sandbox.report.style import COLOURS, INK, colour_of, literal, style_axes, write_figure
+from sandbox.report.colours import COLOURS, colour_of
+from sandbox.report.style import INK, literal, style_axes, write_figure
 
 BAND_OPACITY = 0.18
 BAR_SHIFT = 0.12

@@ -13,7 +13,8 @@ from matplotlib.ticker import LogFormatter
 
 from sandbox.formatting import format_plural
 from sandbox.measure.tradeoff.objective import pareto
-from sandbox.report.style import FAINT, GRID, INK, add_legend, colour_of, literal, shortened, write_figure
+from sandbox.report.colours import colour_of
+from sandbox.report.style import FAINT, GRID, INK, add_legend, literal, shortened, write_figure
 
 TradeoffMapping = Mapping[str, Any]
 """Document that `sandbox tradeoff --json` prints, or a part of it."""

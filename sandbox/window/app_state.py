@@ -22,12 +22,12 @@ from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import Override, from_document, load
 from sandbox.scene.files.shipped_scenes import shipped
+from sandbox.step_clock import speed_for
 from sandbox.window.camera import ViewBox
 from sandbox.window.game_controls import GameControls
 from sandbox.window.game_host import GameHost, controls_of, host_of
 from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes
-from sandbox.window.playback.clock import speed_for
 from sandbox.window.playback.diagnostics import GHOST_ENGINES, Diagnostics
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import ParameterValue, parameter_actions

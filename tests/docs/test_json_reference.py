@@ -20,7 +20,7 @@ from tests.cli.json_validation import assert_valid_document
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
-NO_DOCUMENT = {"play", "replay", "schema", "warm"}
+NO_DOCUMENT = {"play", "replay", "serve", "schema", "warm"}
 """Commands without a JSON document."""
 
 BAD = "[world]\nduraton = 1\n"

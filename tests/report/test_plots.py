@@ -10,8 +10,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sandbox.report.colours import COLOURS
 from sandbox.report.run_plot import draw_run, format_of, plot_run
-from sandbox.report.style import COLOURS
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads

@@ -17,7 +17,7 @@ from typing import NamedTuple
 os.environ["SDL_VIDEODRIVER"] = os.environ["SDL_AUDIODRIVER"] = "dummy"  # the window, without a display
 os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
 
-from tools.images import editor, films, hero, lessons, plots, thumbnails, window
+from tools.images import browser, editor, films, hero, lessons, plots, thumbnails, window
 from tools.images.files import FOLDER
 
 
@@ -37,6 +37,7 @@ def _thumbnail(scene: str) -> Callable[[Path], None]:
 PICTURES = (
     Picture("hero.gif", "the same scene on three engines, with the error of each", hero.make),
     Picture("window.png", "the window: gas on pymunk, with the ghost of the exact engine", window.ghost),
+    Picture("live.png", "a live scene in the browser: the bridge, with a ghost at a tenth of dt", browser.live),
     Picture("editor.gif", "the editor: a car is built and driven", editor.make),
     Picture("table.png", "8-ball: the predicted paths of the next shot", window.table),
     Picture("break.gif", "9-ball: the break", window.rolling),

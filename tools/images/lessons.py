@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Rectangle
 from PIL import Image
 
 import sandbox
-from sandbox.report.style import COLOURS
+from sandbox.report.colours import COLOURS
 from sandbox.scene.description.world import DetectionName, IntegratorName
 
 from .files import save_png

@@ -15,7 +15,8 @@ from markupsafe import Markup
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from sandbox.report.style import COLOURS, FAINT, GRID, INK, SHADED, ignore_missing_glyphs
+from sandbox.report.colours import COLOURS
+from sandbox.report.style import FAINT, GRID, INK, SHADED, ignore_missing_glyphs
 
 DPI = 72
 """Units of the SVG are those of the figure at this resolution, points."""

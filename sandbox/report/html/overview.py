@@ -10,6 +10,7 @@ from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.provenance import machine, versions
+from sandbox.report.colours import css_class_of
 from sandbox.report.comparison_plot import FLOOR
 from sandbox.report.html.comparison import (
     ENGINE_COLUMNS,
@@ -38,7 +39,7 @@ from sandbox.report.html.page import (
     table,
 )
 from sandbox.report.html.tradeoff import answers, diagram
-from sandbox.report.style import BEYOND, css_class_of
+from sandbox.report.style import BEYOND
 from sandbox.report.tradeoff_plot import TradeoffMapping
 
 TEMPLATE = "overview.html.j2"

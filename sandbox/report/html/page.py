@@ -4,14 +4,11 @@ Templates escape every text that is not `Markup`. Style and scripts are files in
 content security policy names them by their hashes: no other script runs, no other style applies, nothing is fetched.
 """
 
-import base64
-import hashlib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -21,9 +18,11 @@ from markupsafe import Markup
 from sandbox.atomic_write import atomic_write
 from sandbox.columns import Column, Kind, R
 from sandbox.formatting import format_change, format_count, format_number, format_plural
-from sandbox.report.style import css_class_of
+from sandbox.report.colours import css_class_of
+from sandbox.report.html.static_files import hash_source, static_text
 
-SCRIPTS = ("charts.js", "renderer.js", "replay.js")
+STYLES = ("palette.css", "page.css")
+SCRIPTS = ("charts.js", "format.js", "points.js", "renderer.js", "replay.js")
 """In the order in which they run."""
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ufffe\uffff]")
 
@@ -200,11 +199,11 @@ class Page:
             compact: with small margins and headings, for a frame within another page; the script reports the height to
             that page.
         """
-        style, script = _static("page.css"), "\n".join(map(_static, SCRIPTS))
+        style, script = ("\n".join(map(static_text, names)) for names in (STYLES, SCRIPTS))
         if compact:
-            style = f"{style}\n{_static('compact.css')}"
-            script = f"{script}\n{_static('frame_height.js')}"
-        policy = f"default-src 'none'; img-src data:; style-src {_source(style)}; script-src {_source(script)}"
+            style = f"{style}\n{static_text('compact.css')}"
+            script = f"{script}\n{static_text('frame_height.js')}"
+        policy = f"default-src 'none'; img-src data:; style-src {hash_source(style)}; script-src {hash_source(script)}"
         text = (
             _environment()
             .get_template("page.html.j2")
@@ -238,14 +237,3 @@ def _provenance(machine: Mapping[str, str | int], versions: Mapping[str, str]) -
         return []
     facts = {**{key: str(value) for key, value in machine.items()}, "date": f"{datetime.now(UTC):%Y-%m-%d}"}
     return [definitions(facts), definitions(versions)]
-
-
-@cache
-def _static(name: str) -> str:
-    return files("sandbox.report.html").joinpath("static", name).read_text(encoding="utf-8")
-
-
-def _source(text: str) -> str:
-    """Return the source expression of a script or style for a content security policy, by its SHA-256."""
-    digest = hashlib.sha256(f"\n{text}\n".encode()).digest()
-    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

@@ -11,6 +11,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.registry import able
 from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.metrics.contacts import collisions, first_collision
+from sandbox.report.colours import css_class_of
 from sandbox.report.html.inline_svg import time_chart
 from sandbox.report.html.page import (
     Content,
@@ -27,7 +28,6 @@ from sandbox.report.html.page import (
 from sandbox.report.html.replay import Track, replay
 from sandbox.report.html.replay_data import Bounds, viewport
 from sandbox.report.run_plot import outlines_of, run_energy_chart
-from sandbox.report.style import css_class_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane, Post
 from sandbox.scene.files.load import from_session

@@ -14,6 +14,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.exact.tabletop.shot_result import ShotEvent, ShotResult
 from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.shots.monte_carlo import Odds
+from sandbox.report.colours import COLOURS, css_class_of
 from sandbox.report.html.page import (
     Content,
     HtmlColumn,
@@ -30,7 +31,7 @@ from sandbox.report.html.replay import MAX_FRAMES, Track, replay
 from sandbox.report.html.replay_data import viewport
 from sandbox.report.html.scene_page import TEMPLATE, PictureFrame, Shape, circle, line, static_shapes
 from sandbox.report.shots_plot import draw_rests
-from sandbox.report.style import COLOURS, css_class_of, ignore_missing_glyphs
+from sandbox.report.style import ignore_missing_glyphs
 from sandbox.trajectory import Trajectory
 
 ENGINE = "exact"

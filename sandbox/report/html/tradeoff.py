@@ -12,6 +12,7 @@ from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.tradeoff import Tradeoff
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE
+from sandbox.report.colours import css_class_of
 from sandbox.report.html.comparison import HOW_TO_REPLAY, linked_plots, settings_text
 from sandbox.report.html.inline_svg import markup_of, svg_of
 from sandbox.report.html.page import (
@@ -30,7 +31,6 @@ from sandbox.report.html.page import (
     table,
     write_page,
 )
-from sandbox.report.style import css_class_of
 from sandbox.report.tradeoff_plot import (
     POINT,
     TradeoffMapping,

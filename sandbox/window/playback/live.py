@@ -4,17 +4,18 @@ import math
 from collections.abc import Iterator, Sequence
 from time import perf_counter
 
-from sandbox.action import Action, ActionError, Launch, Switch, Value
+from sandbox.action import Action, Launch
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.energy_balance import energy_of
+from sandbox.engines.switching import switch_engine
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import zone_visits
-from sandbox.scene.description.world import COMMON, Settings
+from sandbox.scene.description.world import Settings
+from sandbox.step_clock import FixedStepClock, interpolate
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.playback.action_log import SceneHistory
-from sandbox.window.playback.clock import FixedStepClock, interpolate
 from sandbox.window.playback.diagnostics import Diagnostics
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.session import ReplacedFuture, ReplayMismatchError, Session
@@ -426,29 +427,3 @@ class LiveView:
         """Release the resources of all engines."""
         self.diagnostics.close()
         self.session.close()
-
-
-def switch_engine(session: Session, engine: str) -> str | None:
-    """Continue with another engine from the present state.
-
-    Settings that only the present engine knows get the default of the other.
-
-    Returns:
-        A message that names those settings, or None.
-
-    Raises:
-        ActionError: the other engine cannot continue from here.
-    """
-    try:
-        session.apply(Switch(time=0.0, engine=engine))
-    except ActionError as error:
-        own = [key for key in session.simulation.wanted.model_dump(exclude_defaults=True) if key not in COMMON]
-        if not own:
-            raise
-        defaults: dict[str, Value] = {key: False if key == "half_kick" else None for key in own}
-        try:
-            session.apply(Switch(time=0.0, engine=engine, settings=defaults))
-        except ActionError:
-            raise error from None
-        return f"chosen by {engine}: {', '.join(own)}"
-    return None

@@ -17,11 +17,11 @@ from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import from_session
+from sandbox.step_clock import FixedStepClock
 from sandbox.trajectory import Contacts, Frame, Trajectory
 from sandbox.window.camera import ViewBox
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.playback.action_log import SceneHistory
-from sandbox.window.playback.clock import FixedStepClock
 from sandbox.window.playback.snapshot import MissedContactMarker, Snapshot, broken_joints
 from sandbox.window.view_bounds import anchor_points, crowd_bounds, view_bounds
 

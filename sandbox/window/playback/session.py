@@ -144,6 +144,11 @@ class Session:
         return self.simulation.settings
 
     @property
+    def wanted(self) -> Settings:
+        """The present settings as requested; those that are None are chosen by the engine."""
+        return self.simulation.wanted
+
+    @property
     def bodies(self) -> Bodies:
         """The bodies by index; spawned ones at the end."""
         return self.simulation.bodies

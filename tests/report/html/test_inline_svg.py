@@ -6,8 +6,9 @@ from xml.etree.ElementTree import Element
 import pytest
 from matplotlib.figure import Figure
 
+from sandbox.report.colours import COLOURS
 from sandbox.report.html.inline_svg import markup_of, svg_of, time_chart
-from sandbox.report.style import COLOURS, INK, chart_figure, finish_chart, shortened
+from sandbox.report.style import INK, chart_figure, finish_chart, shortened
 from tests.report.html.page_documents import HOSTILE
 
 

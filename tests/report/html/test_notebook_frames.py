@@ -9,7 +9,7 @@ import sandbox
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.html_repr import HtmlRepr
 from sandbox.measure.compare import Comparison
-from tests.report.html.conftest import Browser
+from tests.browser import Browser
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 

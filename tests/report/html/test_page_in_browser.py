@@ -7,7 +7,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from tests.report.html.conftest import Browser
+from tests.browser import Browser
 from tests.report.html.page_documents import HOSTILE
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.cli.main import call
+from sandbox.step_clock import SHORTEST_PLAY, FixedStepClock, speed_for
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
-from sandbox.window.playback.clock import SHORTEST_PLAY, FixedStepClock, speed_for
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from tests.window.windowed import open_window, run_frame
 

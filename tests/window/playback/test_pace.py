@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
+from sandbox.step_clock import MAX_FRAME_TIME, FixedStepClock, interpolate
 from sandbox.trajectory import Frame
-from sandbox.window.playback.clock import MAX_FRAME_TIME, FixedStepClock, interpolate
 
 
 def frame(time: float, position: FloatArray, velocity: FloatArray, present: list[bool] | None = None) -> Frame:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Pull, Remove, SetParameter, Spawn, Strike, Switch
 from sandbox.engines.registry import ENGINES
+from sandbox.engines.switching import switch_engine
 from sandbox.measure.run.sessions import rerun
 from sandbox.recording import RecordedGame, Recording, ReplayCheck
 from sandbox.scene.compile.scene import Scene
@@ -24,7 +25,6 @@ from sandbox.window.playback import follower as follower_module
 from sandbox.window.playback import history as history_module
 from sandbox.window.playback.follower import Follower
 from sandbox.window.playback.history import Keyframe
-from sandbox.window.playback.live import switch_engine
 from sandbox.window.playback.session import ReplayMismatchError, Session
 
 pytestmark = pytest.mark.fail_slow(60)  # property tests with many examples
