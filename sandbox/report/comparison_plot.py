@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from sandbox.arrays import FloatArray
 from sandbox.formatting import format_number
 from sandbox.measure.compare import Comparison
+from sandbox.measure.compare.result import set_text
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.trajectory_error import Errors, common_frames, errors
 from sandbox.report.colours import COLOURS, colour_index
@@ -41,7 +42,7 @@ from sandbox.report.style import (
 
 FLOOR = 1e-16
 """Lower limit of a logarithmic axis; smaller values, such as 0, are drawn at its floor."""
-WIDTHS = (7.0, 4.4, 2.6, 1.6)
+WIDTHS = (4.6, 3.4, 2.4, 1.4)
 """Points: the line of each engine is narrower than the one below it, so that all are visible where they agree."""
 LOG_WIDTH = 0.7
 """Ratio of these widths on a logarithmic axis."""
@@ -54,6 +55,8 @@ TOLERANCE_LINE: dict[str, Any] = {"color": FAINT, "lw": 1.0, "ls": ":"}
 """Line of the tolerance."""
 NOTE_CLASS = "css:note"
 """Class in pages of a text over curves, which gets an outline in the colour of the background."""
+CHARACTERS_PER_INCH, HANDLE_WIDTH = 11.5, 7
+"""Average characters of a legend per inch at its size of 10 points, and the width of a line beside its label"""
 LEGEND_LAYOUT: dict[str, Any] = {"loc": "outside lower center"}
 MAX_REACH = 2.0
 """Largest extent of the energy axis beyond the energies of the truth, for diverging engines, in ranges of the truth."""
@@ -230,8 +233,20 @@ def _draw_total_energy(panel: Axes, comparison: Comparison, detail: ChartDetail 
         draw_closed(panel, run.time, true_energy, is_trusted, detail.max_points)
         panel.lines[-1].set_gid("css:line truth")
         true_energy = true_energy[is_trusted]
-    dress(panel, _energy_limits(totals, true_energy))
+    limits = _energy_limits(totals, true_energy)
+    dress(panel, limits)
     _shade(panel, comparison)
+    beyond = [max(abs(values[np.isfinite(values)]), default=0.0) for values in totals.values()]
+    if limits is not None and max(beyond, default=0.0) > max(map(abs, limits)):
+        note = f"cut off: up to {max(beyond):.3g} J"
+        layout: dict[str, Any] = {
+            "xycoords": "axes fraction",
+            "ha": "right",
+            "va": "top",
+            "fontsize": 8,
+            "color": FAINT,
+        }
+        panel.annotate(note, (0.995, 0.985), gid=NOTE_CLASS, **layout)
 
 
 def _energy_limits(totals: Mapping[str, FloatArray], true_energy: FloatArray | None) -> tuple[float, float] | None:
@@ -267,6 +282,12 @@ def _drawn_indices(comparison: Comparison) -> dict[str, int]:
     """Return the index in `COLOURS` of each row that has a run, in the order in which runs are drawn."""
     indices = colour_indices(comparison)
     return {name: indices[name] for name in comparison.trajectories}
+
+
+def _labels(comparison: Comparison) -> dict[str, str]:
+    """Return the label of each row by its name: without the engine if all rows have the same one."""
+    has_engines = len({row.engine for row in comparison.rows}) > 1
+    return {row.name: row.name if has_engines or not row.set else set_text(row.set) for row in comparison.rows}
 
 
 def _widths(comparison: Comparison, scale: float = 1.0) -> Iterator[float]:
@@ -346,8 +367,9 @@ def _finish(
     truth: bool = True,
 ) -> None:
     """Add legend, title, and the sentence about the truth."""
+    labels = _labels(comparison)
     entries = [
-        (name, Line2D([], [], color=COLOURS[index], lw=3.4, alpha=OPACITY))
+        (labels[name], Line2D([], [], color=COLOURS[index], lw=3.4, alpha=OPACITY))
         for name, index in _drawn_indices(comparison).items()
     ]
     best, duration = comparison.best, comparison.scene.world.duration
@@ -356,7 +378,9 @@ def _finish(
     entries += extra or []
     if best is not None and best.trusted_until < duration and "time, s" in (p.get_xlabel() for p in figure.axes):
         entries.append((f"trusted until {best.trusted_until:.3g} s", Line2D([], [], color=INK, lw=1.0)))
-    add_legend(figure, entries, ncols=min(len(entries), 4), **LEGEND_LAYOUT)
+    width = max((len(shortened(label)) for label, _ in entries), default=0) + HANDLE_WIDTH
+    columns = max(min(len(entries), 4, int(figure.get_figwidth() * CHARACTERS_PER_INCH) // width), 1)
+    add_legend(figure, entries, ncols=columns, **LEGEND_LAYOUT)
     figure.align_ylabels()
 
     lines = wrap(comparison.sentence(), 105)[:3]

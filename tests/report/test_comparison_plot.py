@@ -8,8 +8,9 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sandbox.measure.compare import Comparison, compare
+from sandbox.measure.compare import Comparison, compare, compare_variants
 from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.result import variants_of
 from sandbox.measure.metrics.energy import energies
 from sandbox.report.comparison_plot import (
     draw_energy,
@@ -176,3 +177,17 @@ def test_constant_energy_is_a_flat_line_in_the_middle() -> None:
     cradle = compare(load(find("newtons_cradle"), ["world.duration=0.1"]), ["exact"])
     low, high = energy_chart(cradle).axes[0].get_ylim()
     assert (low, high) == pytest.approx((0.475, 0.525))  # m·v²/2 = 0.5 J, and 5 % around it
+
+
+@pytest.mark.fail_slow(60)  # compiles the reference engine
+def test_legend_of_a_sweep_is_within_the_picture_and_names_what_differs() -> None:
+    names = ["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+    variants = variants_of(load(find("spring"), ["world.duration=2.0"]), {"solver.integrator": names})
+    figure = draw_energy(compare_variants(variants, ["reference"]))
+    assert legend_of(figure) == [*(f"integrator {name}" for name in names), "truth: closed form"]
+    figure.draw_without_rendering()
+    box, page = figure.legends[0].get_window_extent(), figure.bbox
+    assert (box.x0 >= page.x0, box.x1 <= page.x1) == (True, True)
+    omega, amplitude, steps = 2.0 * np.pi, 0.1, 200
+    largest = 0.5 * (omega * amplitude) ** 2 * (1.0 + (0.01 * omega) ** 2) ** steps  # of explicit Euler, 1 kg
+    assert [text.get_text() for text in figure.axes[0].texts] == [f"cut off: up to {largest:.3g} J"]
