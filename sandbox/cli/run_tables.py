@@ -323,7 +323,10 @@ def _game_end(row: RunRow) -> str:
 def _differs(rows: Sequence[RunRow], setting: str) -> bool:
     """Return whether a setting differs between runs of one scene on one engine; defaults differ between them anyway."""
     values: dict[tuple[str, str], set[str]] = {}
+    is_set = any(f"solver.{setting}" in row.set for row in rows)
     for row in rows:
+        if row.status == "refused" and not is_set:  # an engine that refuses resolves no settings
+            continue
         values.setdefault((row.scene, row.engine), set()).add(str(row.settings[setting]))
     return any(len(found) > 1 for found in values.values())
 

@@ -315,3 +315,13 @@ def test_refused_run_has_no_ledger(tmp_path: Path, capfd: pytest.CaptureFixture[
     assert (status, document["runs"][0]["status"], document["runs"][0]["ledger"]) == (1, "refused", None)
     status, lines, _ = lines_of(capfd, "run", write_scene(tmp_path), *RUN, "--set", "solver.half_kick=true")
     assert not any(line.startswith(("energy of", "%:")) for line in lines)
+
+
+def test_refused_run_of_a_sweep_adds_no_columns(capfd: pytest.CaptureFixture[str]) -> None:
+    springs = ("solver.response=penalty", "solver.damping=1")
+    given = [word for each in springs for word in ("--set", each)]
+    status, out, _ = lines_of(
+        capfd, "run", "rest_depth", "--engine", "reference", *given, "--sweep", "solver.stiffness=1000,3000"
+    )
+    assert status == 1  # 3000 N/m would gain energy at 0.01 s
+    assert out[1].split()[:4] == ["engine", "dt", "stiffness", "status"]
