@@ -79,7 +79,7 @@ BENCHES = (
     ),
     Bench(
         "pyramid-box2d",
-        "5 s of a pyramid of 55 boxes on box2d with 4 substeps / on pymunk with 10 iterations; both stepped and read",
+        "5 s of a pyramid of 55 boxes on box2d / on pymunk with 10 iterations; both with 4 substeps, stepped and read",
         lambda: stepping(PYRAMID, 300, contacts=False, engine="box2d"),
         lambda: stepping(
             scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.iterations=10"), 300, contacts=False
