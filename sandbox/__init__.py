@@ -92,6 +92,9 @@ if TYPE_CHECKING:
     from sandbox.games.session import (
         HeadlessGame as HeadlessGame,
     )
+    from sandbox.interactive.widget import (
+        LiveWidget as LiveWidget,
+    )
     from sandbox.measure.compare import (
         compare as compare,
     )
@@ -326,6 +329,7 @@ _NAMES = {
     "sandbox.frame_table": "FrameTable",
     "sandbox.games.contract": "Policy",
     "sandbox.games.session": "HeadlessGame",
+    "sandbox.interactive.widget": "LiveWidget",
     "sandbox.measure.compare": "compare",
     "sandbox.measure.compare.attribution": "SettingEffect",
     "sandbox.measure.compare.contact_matching": "ContactMatch",

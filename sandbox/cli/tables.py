@@ -120,7 +120,7 @@ def _fitted(table: "Table", keys: int, width: int) -> "Iterator[Table]":
         for column in columns:
             column.header = _on_two_lines(str(column.header), max(map(_cell_width, column.cells), default=0))
     for column in columns[:keys]:
-        column.max_width = width // 2
+        column.max_width, column.no_wrap = width // 2, False
     repeated = [columns[k] for k in range(keys) if _total(columns[: k + 1]) <= width // 2]
     room = width - _total(repeated) - GAP
     block: list[TableColumn] = []

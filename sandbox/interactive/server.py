@@ -88,7 +88,7 @@ class SceneServer:
         elif _name_of(f"//{request.host}") not in LOOPBACK:
             raise web.HTTPForbidden(text="this server answers to loopback names only\n")
         origin = request.headers.get("Origin")
-        if origin is not None and urlsplit(origin).netloc != request.host:
+        if origin is not None and _address_of(origin) != request.host:
             raise web.HTTPForbidden(text="requests of other web sites are refused\n")
         response: web.StreamResponse = await handler(request)
         return response
@@ -166,6 +166,14 @@ class SceneServer:
         host = _outward_address() if self._options.host in ("0.0.0.0", "::") else self._options.host
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{port}/" + ("" if self.token is None else f"?token={self.token}")
+
+
+def _address_of(url: str) -> str | None:
+    """Return the host and port of a URL; None if it is malformed."""
+    try:
+        return urlsplit(url).netloc
+    except ValueError:
+        return None
 
 
 def _name_of(url: str) -> str | None:

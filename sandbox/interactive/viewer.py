@@ -1,11 +1,14 @@
 """One viewer of a live scene: its requests and replies, and the body that it drags."""
 
 import math
+from time import perf_counter
 from typing import Any
+
+from pydantic import ValidationError
 
 from sandbox.action import ActionError, Impulse, Move, Pull
 from sandbox.engines.contract import Refusal
-from sandbox.interactive.live_scene import LiveScene
+from sandbox.interactive.live_scene import STEP_TIMEOUT, LiveScene
 from sandbox.interactive.messages import (
     AdvanceInput,
     DragInput,
@@ -53,11 +56,16 @@ class Viewer:
             inputs = read_inputs(request)
         except MessageError as error:
             inputs, messages = [], [str(error)]
+        until = perf_counter() + STEP_TIMEOUT  # of all inputs: the server ends when the last request is answered
         for each in inputs:
+            if isinstance(each, StepInput | AdvanceInput) and perf_counter() > until:
+                continue
             try:
                 message = self._apply(each)
             except (ActionError, Refusal) as refusal:
                 message = str(refusal)
+            except ValidationError:  # a target that the origin of the picture moves out of range
+                message = "the point is out of range"
             if message:
                 messages.append(message)
         return self._reply(messages)

@@ -67,6 +67,7 @@ def test_restart_replays_the_recorded_actions() -> None:
         assert again.session.recording() == source
     state.restart()
     state.paused = False
+    live(state.view).clock.speed = 1.0
     for _ in range(60):
         state.update(0.02)
     assert state.paused  # at the end of the recording

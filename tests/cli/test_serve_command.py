@@ -2,18 +2,18 @@
 
 import signal
 import subprocess
-import sys
 from urllib.request import urlopen
 
 import pytest
 
 from tests.cli.calling import lines_of, write_scene
+from tests.interruptible import interruptible
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and command lines that run long
 
 
 def test_serve_prints_its_address_and_ends_with_ctrl_c(tmp_path) -> None:
-    command = [sys.executable, "-m", "sandbox", "serve", write_scene(tmp_path), "--slider", "solver.dt=0.001:0.1"]
+    command = interruptible("serve", write_scene(tmp_path), "--slider", "solver.dt=0.001:0.1")
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
         address = server.stdout.readline().strip()

@@ -89,6 +89,11 @@ def test_refused_drag_is_reported_and_ends() -> None:
     assert "no body 9" in talk.ask(type="push", body=9, direction=[1, 0])["messages"][0]
 
 
+def test_target_at_the_end_of_the_range_is_an_answer() -> None:
+    reply = Conversation().ask(type="grab", body=0, grip=[0, 0], target=[1e16, 1e16])
+    assert reply["messages"] == ["the point is out of range"]
+
+
 def test_push_adds_speed() -> None:
     talk = Conversation()
     talk.ask(type="push", body=0, direction=[1, 0])

@@ -76,7 +76,7 @@ def test_names_rebound_to_this_machine_are_refused(name: str) -> None:
 
 def test_other_web_sites_cannot_open_a_socket() -> None:
     async def test(client: Client, _server: SceneServer) -> None:
-        for origin in ("http://evil.example", "null", f"http://localhost:{client.port}"):
+        for origin in ("http://evil.example", "null", "http://[x", f"http://localhost:{client.port}"):
             with pytest.raises(WSServerHandshakeError) as error:
                 await client.ws_connect("/socket", headers={"Origin": origin})
             assert error.value.status == 403

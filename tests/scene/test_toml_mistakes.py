@@ -1,7 +1,11 @@
 """Text that is not TOML: the usual mistakes are named with the text that would be right."""
 
+import re
+
 import pytest
 
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import loads
 from tests.scene.faults import assert_faults, faults_of
 
 
@@ -88,3 +92,20 @@ def test_number_in_quotes_is_refused_with_the_number(value: str, right: str) -> 
 @pytest.mark.parametrize("text", [f"a = 1{',' * 200_000}", f"a = 1{' ' * 200_000}x", f"a{' a' * 200_000} 1"])
 def test_long_line_takes_no_quadratic_time(text: str) -> None:
     assert [fault.line for fault in faults_of(text)] == [1]
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "not_words"),
+    [
+        ("[[wall]]\npoints = [\n  [0, 0],\n  [1, 1],\n[[ball]]\nradius = 0.1\n", "bracket ]", "write the heading"),
+        ("[world]\ngravity = [0,\n-9.81\nduration = 3\n", "bracket ]", "gravity = [0,]"),
+        ("[world]\ngravity = [0, -9.81 m/s^2]\n", "no unit", "comma is missing"),
+        ("[world]\nduration = 1,000\n", "1000, or 1.000", "point"),
+        ("[world]\nduration = 5 // five\n", "not TOML", "quotes"),
+        ("[world]\nduration = NaN\n", "not TOML", "quotes"),
+    ],
+)
+def test_remedy_does_not_lead_to_another_mistake(text: str, words: str, not_words: str) -> None:
+    with pytest.raises(SceneError, match=re.escape(words)) as error:
+        loads(text)
+    assert not_words not in str(error.value)

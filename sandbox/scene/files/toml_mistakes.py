@@ -96,7 +96,9 @@ def _remedies(message: str, row: str, position: int) -> Iterator[str]:
         yield from _repeated(message, row)
     elif heading := _HEADING.match(row):
         brackets = heading[1] == "[[" or heading[2] in list_tables()
-        yield f"write the heading as {_heading(heading[2], brackets)}"
+        right = _heading(heading[2], brackets)
+        is_right = _COMMENT.sub("", row).strip() == right
+        yield "a bracket ] is missing above this heading" if is_right else f"write the heading as {right}"
     elif message.startswith("Invalid statement"):
         if row.lstrip().startswith(("//", ";", "/*", "--", "%")):
             yield "a comment begins with #"
@@ -171,9 +173,17 @@ def _value_remedies(message: str, row: str, position: int) -> Iterator[str]:
     if message.startswith("Unclosed"):
         bracket = "}" if "table" in message else "]"
         is_end = not rest or rest.startswith("#")
-        if not is_end:
+        quantity = f"{_token(row, len(row[:position].rstrip()))} {re.split('[],}]', rest)[0].strip()}"
+        if not is_end and _WITH_UNIT.fullmatch(quantity):
+            yield from _scalar_remedies(quantity, "")
+        elif not is_end:
             yield f"a comma is missing before {rest[:20]}"
-        elif bracket == "]" and assignment and row[assignment.end() :].count("[") == row.count("]") + 1:
+        elif (
+            bracket == "]"
+            and assignment
+            and row[assignment.end() :].count("[") == row.count("]") + 1
+            and whole[-1] not in "[,"
+        ):
             yield f"the bracket at the end is missing: {before}{whole}]"
         elif bracket == "]":
             yield "the bracket ] at the end is missing"
@@ -225,6 +235,8 @@ def _scalar_remedies(value: str, before: str) -> Iterator[str]:
         yield f"write true or false: {before}{_TRUTH[value.lower()]}"
     if value.lower() in _NOTHING:
         yield "there is no empty value; remove this key"
+    if re.match(r"[+-]?(?:[.\d]|nan|inf)", value, re.ASCII | re.IGNORECASE):
+        return
     if value[0].isalpha() or (before and re.search(r"[^\W\d_]{2}", value)):
         yield f'put text in quotes: {before}"{value}"'
 
@@ -235,6 +247,8 @@ def number_remedy(text: str) -> tuple[str, str] | None:
     Examples are `1/60`, `0,5`, `.5`, `007`, `45°`, `−9.81` (with a minus sign of typography) and `3 s`.
     """
     text = text.strip()
+    if match := re.fullmatch(r"([+-]?[1-9]\d{0,2}),(\d{3})", text, re.ASCII):
+        return "numbers have no comma", f"{match[1]}{match[2]}, or {match[1]}.{match[2]}"
     if match := _DECIMAL_COMMA.fullmatch(text):
         return "decimals have a point", f"{match[1]}.{match[2]}"
     if match := _WITH_UNIT.fullmatch(text):
