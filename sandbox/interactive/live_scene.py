@@ -27,7 +27,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import as_scene, from_document
-from sandbox.step_clock import FixedStepClock, interpolate
+from sandbox.step_clock import FixedStepClock, interpolate, speed_for
 from sandbox.trajectory import Frame
 
 MAX_WORK = 0.03
@@ -35,9 +35,7 @@ MAX_WORK = 0.03
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
 SPEEDS = (0.001, 0.01, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
-"""Speeds that a front end offers, as multiples of real time."""
-MIN_SECONDS = 2.0
-"""Real time, s, that the duration of a scene takes at its initial speed; longer scenes begin at real time."""
+"""Speeds that a front end offers beside the present one, as multiples of real time."""
 BEHIND = 0.9
 """Fraction of the selected speed below which the scene counts as behind."""
 LATE_REQUESTS = 30
@@ -76,8 +74,7 @@ class LiveScene:
         self._sliders = parse_sliders(texts, self._file, settings)
         self._values: dict[str, float] = {}  # set by sliders
         self._clock = FixedStepClock()
-        slow_enough = [speed for speed in SPEEDS if speed <= min(1.0, self._file.world.duration / MIN_SECONDS)]
-        self._clock.speed = max(slow_enough, default=SPEEDS[0])
+        self._clock.speed = self._file.play.speed or speed_for(self._file.world.duration)
         self._wall_clock, self._last_request = wall_clock, 0.0 if wall_clock is None else wall_clock()
         self._late = 0  # requests for which it still counts as behind
         self._ghost: Ghost | None = None
@@ -307,7 +304,7 @@ class LiveScene:
             "playing": self.playing,
             "is_shared": self._wall_clock is not None,
             "speed": self._clock.speed,
-            "speeds": list(SPEEDS),
+            "speeds": sorted({*SPEEDS, self._clock.speed}),
             "ended": self._ended,
             "engine": simulation.engine,
             "dt": simulation.settings.dt,

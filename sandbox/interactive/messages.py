@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from sandbox.echo import MAX_MESSAGE, printable, shorten
 from sandbox.scene.description.base import Name, Part, Point
+from sandbox.scene.description.play import PlaybackSpeed
 
 MAX_INPUTS = 32
 """Inputs of one request."""
@@ -63,7 +64,7 @@ class SpeedInput(Part):
     """Set the speed."""
 
     type: Literal["speed"]
-    speed: Annotated[float, Field(ge=1e-3, le=10)]
+    speed: PlaybackSpeed
     """multiple of real time"""
 
 

@@ -93,7 +93,7 @@ class SceneServer:
         response: web.StreamResponse = await handler(request)
         return response
 
-    async def _page(self, request: web.Request) -> web.Response:  # noqa: ARG002, aiohttp's signature
+    async def _page(self, _request: web.Request) -> web.Response:
         text = page(self._scene.title or "Untitled scene", self._scene.about or "")
         return web.Response(text=text, content_type="text/html", headers=HEADERS)
 
@@ -137,7 +137,7 @@ class SceneServer:
         finally:
             await asyncio.shield(asyncio.to_thread(end))
 
-    async def _close_sockets(self, app: web.Application) -> None:  # noqa: ARG002, aiohttp's signature
+    async def _close_sockets(self, _app: web.Application) -> None:
         for connection in list(self._sockets):
             await connection.close(code=WSCloseCode.GOING_AWAY, message=b"The server has ended.")
 

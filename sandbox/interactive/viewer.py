@@ -64,8 +64,6 @@ class Viewer:
                 message = self._apply(each)
             except (ActionError, Refusal) as refusal:
                 message = str(refusal)
-            except ValidationError:  # a target that the origin of the picture moves out of range
-                message = "the point is out of range"
             if message:
                 messages.append(message)
         return self._reply(messages)
@@ -148,6 +146,9 @@ class Viewer:
             except ActionError:
                 self._held = None
                 raise
+            except ValidationError:  # beyond the range of coordinates, with the origin of the picture
+                self._held = None
+                raise ActionError("the point is out of range") from None
 
     def _move(self, name: str, target: Point) -> None:
         live = self._live

@@ -12,6 +12,9 @@ SCENE = """
 gravity = [0.0, -9.81]
 duration = 2.0
 
+[play]
+speed = 1.0
+
 [[plane]]
 point = [0.0, 0.0]
 normal = [0.0, 1.0]

@@ -124,8 +124,8 @@ def seed_sweep(engine: str, runs: int, *, keeps_ends: bool) -> Timed:
     def work() -> float:
         times: list[float] = []
         with _planned(scene, runs, engine, keeps_ends) as (plan, folder), Store(folder) as store:
-            note = lambda _index, _record: times.append(time.perf_counter())  # noqa: E731
-            Driver(plan, runs, ProcessExecutor(WORKERS), options, store, note).run()
+            executor = ProcessExecutor(WORKERS)
+            Driver(plan, runs, executor, options, store, lambda *_: times.append(time.perf_counter())).run()
         return _latest(times) / (runs * MEASURED)
 
     return work
