@@ -132,7 +132,7 @@ class _Side(NamedTuple):
     """One side of a contact."""
 
     name: str
-    """of a body or static object"""
+    """of the element in the file, such as a ball or a grid of balls, or of a static object"""
     material: str | None
 
 
@@ -156,10 +156,15 @@ def _sides(scene: Scene, matrix: ContactMatrix, a: int, b: int) -> tuple[_Side, 
 
 
 def _objects(scene: Scene, matrix: ContactMatrix, surface: int) -> list[_Side]:
-    """Return the first bodies or static objects with a surface, two at most."""
+    """Return the elements of the first bodies, or static objects, with a surface, two at most."""
     bodies, table = scene.bodies, matrix.surfaces
+    names = {
+        id(element): element.name or default_name(kind, k)
+        for kind, elements in scene.kinds.items()
+        for k, element in enumerate(elements)
+    }
     of_piece = np.arange(len(bodies)) if bodies.round.all() else bodies.shapes.body
     found = np.unique(of_piece[table.of_shape == surface])[:2].tolist()
     fixed = np.flatnonzero(table.of_fixed == surface)[:2].tolist()
-    sides = [_Side(bodies.names[k], bodies.elements[bodies.element[k]].material) for k in found]
+    sides = [_Side(names[id(each)], each.material) for each in (bodies.elements[bodies.element[k]] for k in found)]
     return [*sides, *(_Side(scene.fixed_names[k], scene.fixed[k].material) for k in fixed)][:2]

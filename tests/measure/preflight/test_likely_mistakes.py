@@ -77,6 +77,16 @@ def test_remedy_of_multiplied_restitution_sets_the_first_value(e: float, f: floa
     assert found(repaired) == []
 
 
+def test_remedy_for_balls_of_a_grid_names_the_grid() -> None:
+    text = "[[grid]]\ncolumns = 3\nrows = 2\nspacing = [1, 1]\norigin = [0, 1]\nradius = 0.1\nrestitution = 0.5\n"
+    (note,) = found(text)
+    assert "material = \"grid-1\" to 'grid-1'" in note.message
+    lines = "\n".join(re.findall("`([^`]*)`", note.message))
+    repaired = f"{text}material = 'grid-1'\n{lines}\n"
+    assert restitution(loads(repaired)) == 0.5
+    assert found(repaired) == []
+
+
 @pytest.mark.parametrize(
     "text",
     [
