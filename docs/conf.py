@@ -23,6 +23,8 @@ extensions = [
     "sphinx_copybutton",
     "api_docstrings",
     "generated",
+    "hidden_directives",
+    "lesson_notebooks",
     "mathml",
 ]
 

@@ -12,6 +12,7 @@ WITH_EXAMPLES = [name for name in FUNCTIONS if ">>>" in (getattr(sandbox, name).
 
 
 @pytest.mark.fail_slow(60)  # imports engines, and may compile functions
+@pytest.mark.usefixtures("own_integrators")
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
 def test_examples_of_a_docstring_run(name: str) -> None:
     text = inspect.getdoc(getattr(sandbox, name)) or ""
