@@ -147,7 +147,7 @@ def setup(app: Any) -> dict[str, bool]:
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def _add_link(app: Any, page: str, source: list[str]) -> None:
+def _add_link(_: Any, page: str, source: list[str]) -> None:
     """Put a link to the notebook below the title."""
     folder, _, name = page.rpartition("/")
     if folder == "lessons" and LESSONS / f"{name}.md" in lesson_pages():
