@@ -109,6 +109,12 @@ def live(
         Refusal: the engine does not support something that the scene needs.
         ValueError: a slider is invalid.
         ImportError: anywidget is not installed.
+
+    Example:
+        >>> widget = sandbox.live("bounce", sliders=["ball.ball.restitution=0:1"])
+        >>> widget.simulation.engine
+        'pymunk'
+        >>> widget.close()
     """
     try:
         from sandbox.interactive.widget import LiveWidget
