@@ -29,7 +29,7 @@ FILE = re.compile(r"<!-- (?:faulty )?file: (\S+) -->")
 WINDOWS = ("sandbox play", "sandbox replay", "sandbox serve")
 """Commands that open a window or wait: they stay text."""
 SETUP = "import sandbox\nfrom sandbox.lessons import check"
-NEEDS = 'Needs the sandbox with `pip install -e ".[notebook]"`, and JupyterLab, marimo or VS Code.'
+NEEDS = 'Needs the sandbox with `pip install -e ".[fast,box2d,notebook]"`, and JupyterLab, marimo or VS Code.'
 
 
 def notebook_of(name: str, text: str) -> nbformat.NotebookNode:
