@@ -133,7 +133,7 @@ class LiveScene:
 
     def _follow(self, ghost: Ghost) -> None:
         ended = ghost.ended
-        ghost.follow(self._after.time)
+        ghost.follow(self._after.time, STEP_TIMEOUT)
         self.revision += ghost.ended != ended
 
     def play(self, on: bool) -> None:
