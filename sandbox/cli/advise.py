@@ -28,6 +28,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, report_remarks
+from sandbox.cli.starts import spread_option, starts_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
@@ -127,6 +128,8 @@ class _Options(OutputOptions):
     tolerance: tuple[float, str]
     given_zoom: float | None
     pixels: bool
+    starts: int
+    spread: float
     effort: float
     time_limit: float | None
     repeats: int
@@ -177,6 +180,8 @@ class _Options(OutputOptions):
     help="pixels per metre; default: 50, or as --pixels for the recording of a game whose bodies look like pixels",
 )
 @click.option("--pixels", is_flag=True, help="the unit of length is the pixel, as --zoom 1")
+@starts_option
+@spread_option
 @click.option(
     "--effort",
     type=POSITIVE,
@@ -223,6 +228,8 @@ def advise_command(options: _Options) -> int:
                 tolerance=options.tolerance_metres(zoom),
                 budget=options.budget_ms,
                 zoom=zoom,
+                starts=options.starts,
+                spread=options.spread,
                 effort=options.effort,
                 time_limit=options.time_limit,
                 repeats=options.repeats,

@@ -50,6 +50,17 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+class Fraction(FiniteRange):
+    """Fraction, also in per cent: `0.01` or `1%`."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the fraction; fail unless it is a number within the range."""
+        text = str(value).strip()
+        if not text.endswith("%"):
+            return super().convert(value, param, ctx)
+        return super().convert(click.FLOAT.convert(text[:-1].strip(), param, ctx) / 100.0, param, ctx)
+
+
 POSITIVE = FiniteRange(min=0.0, min_open=True)
 NOT_NEGATIVE = FiniteRange(min=0.0)
 

@@ -32,6 +32,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
+from sandbox.cli.starts import spread_option, starts_option, starts_text
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -120,6 +121,7 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     name = f"{scene} ({found.scene.title})" if found.scene.title else scene
     print_line(f"{name}: {found.error_about}")
     print_line(_about(found))
+    print_line(starts_text(found.scene, found.starts, found.spread))
     if rows:
         print_table(table, keys=SETTING_COLUMNS)
         if verbose:
@@ -146,10 +148,9 @@ def _rows(found: Tradeoff) -> list[Evaluation]:
 
 
 def _about(found: Tradeoff) -> str:
-    seeds = f"; each error is the largest over {len(found.seeds)} seeds" if len(found.seeds) > 1 else ""
     ended = "; the time limit ended the search, so another run may try other settings" if found.out_of_time else ""
     count = len(found.points)
-    return f"{count} setting{'s' if count != 1 else ''} tried{seeds}{ended}"
+    return f"{count} setting{'s' if count != 1 else ''} tried{ended}"
 
 
 def _thinned(front: Sequence[Evaluation], found: Tradeoff) -> list[Evaluation]:
@@ -264,7 +265,8 @@ class _Options(OutputOptions):
     tolerance: float | None
     budget: float | None
     fps: float
-    seeds: int
+    starts: int
+    spread: float
     zoom: float | None
     effort: float
     time_limit: float | None
@@ -294,13 +296,8 @@ class _Options(OutputOptions):
     metavar="N",
     help="frames per second that --budget refers to; default: 60",
 )
-@click.option(
-    "--seeds",
-    type=click.IntRange(1, 1000),
-    default=1,
-    metavar="N",
-    help="take the largest error over N seeds; default: 1",
-)
+@starts_option
+@spread_option
 @click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels per metre, for the metrics in pixels")
 @click.option(
     "--effort",
@@ -308,7 +305,7 @@ class _Options(OutputOptions):
     default=DEFAULT_EFFORT,
     metavar="N",
     help="effort of the search, in seconds of counted work, so that every machine tries the same settings; the truth, "
-    f"timing and other seeds come on top; default: {DEFAULT_EFFORT:g}",
+    f"timing and other starts come on top; default: {DEFAULT_EFFORT:g}",
 )
 @time_limit_option("time limit of the search, s; the settings tried then depend on the machine; default: no limit")
 @click.option(
@@ -358,7 +355,8 @@ def tradeoff_command(options: _Options) -> int:
                 tolerance=options.tolerance,
                 budget=options.budget,
                 fps=options.fps,
-                seeds=options.seeds,
+                starts=options.starts,
+                spread=options.spread,
                 zoom=options.zoom,
                 effort=options.effort,
                 time_limit=options.time_limit,

@@ -53,6 +53,8 @@ class Stream(Enum):
     """start position of a ship"""
     ENSEMBLE = 0x656E7365
     """variations of the starts of an ensemble, by the varied quantity"""
+    STARTS = 0x73746172
+    """perturbed starts of a scene, by their numbers"""
     KEYS = 0x706C6179
     """keys of a random player"""
 

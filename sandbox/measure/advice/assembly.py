@@ -26,7 +26,7 @@ from sandbox.measure.tradeoff.configuration import (
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )
-from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.measure.tradeoff.result import Confirmation, Tradeoff
 from sandbox.provenance import machine, versions
 from sandbox.scene.description.world import Settings
 
@@ -70,6 +70,15 @@ def evaluation_key(point: Evaluation) -> tuple[str, str]:
     return point.engine, point.asked.model_dump_json()
 
 
+def _confirmation(request: AdviceRequest, measured: AdviceMeasurements) -> Confirmation | None:
+    """Return the errors of the recommended setting from fresh starts; None unless the trade-off recommends it."""
+    found = None if measured.found is None else measured.found.cheapest_by_engine.get(request.engine)
+    if found is None or measured.recommended is None:
+        return None
+    is_pick = evaluation_key(found.point) == evaluation_key(measured.recommended)
+    return found.confirmation if is_pick else None
+
+
 def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> Advice:
     """Return the advice of what was measured."""
     scene, truth, found, metric = request.scene, score.truth, measured.found, METRICS[score.metric]
@@ -103,6 +112,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         present=present,
         is_in_loop=request.is_in_loop,
         recommended=recommended,
+        confirmation=_confirmation(request, measured),
         fallback=fallback,
         fallback_kind=measured.fallback_kind,
         remaining_risks=_remaining_risks(request, chosen),

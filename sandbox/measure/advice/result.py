@@ -8,6 +8,7 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
 from sandbox.measure.compare.metrics import WorstError
+from sandbox.measure.tradeoff.result import Confirmation
 from sandbox.scene.description.world import Settings
 
 FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]
@@ -145,6 +146,8 @@ class Advice:
     """whether the present dt is that of a frame, so that the game steps once a frame"""
     recommended: MeasuredSetting | None
     """cheapest setting of the present engine within the tolerance"""
+    confirmation: Confirmation | None
+    """its errors from fresh starts; None if no other starts confirm it"""
     fallback: MeasuredSetting | None
     """another setting if the recommended one is missing or over the budget"""
     fallback_kind: FallbackKind | None

@@ -39,6 +39,8 @@ class AdviceRequest:
     """m, largest accepted error of a position"""
     budget: float | None
     zoom: float
+    starts: int
+    spread: float
     effort: float
     deadline: float
     repeats: int

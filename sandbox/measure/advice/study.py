@@ -27,7 +27,7 @@ from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilati
 from sandbox.measure.run.recorder import TooLargeError, require_memory
 from sandbox.measure.run.runner import run
 from sandbox.measure.run.sessions import recorded_scene
-from sandbox.measure.seeds import is_random
+from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS
 from sandbox.measure.tradeoff.configuration import (
     MIN_STEPS,
     Configuration,
@@ -76,6 +76,8 @@ def advise(
     tolerance: float | None = None,
     budget: float | None = None,
     zoom: float = DEFAULT_ZOOM,
+    starts: int = DEFAULT_STARTS,
+    spread: float = DEFAULT_SPREAD,
     effort: float = DEFAULT_EFFORT,
     time_limit: float | None = None,
     repeats: int = DEFAULT_REPEATS,
@@ -95,6 +97,8 @@ def advise(
         tolerance: largest accepted error of a position, m; default: 1 px.
         budget: computing time per frame, ms.
         zoom: px/m, for errors on the screen.
+        starts: number of perturbed starts that decide on the recommended setting, as of `tradeoff`.
+        spread: largest change of a start, as a fraction, as of `tradeoff`.
         effort: counted work of the search, about seconds of computing, as of `tradeoff`.
         time_limit: time after which no more settings are tried, s.
         repeats: number of timings of each setting of the advice.
@@ -129,6 +133,8 @@ def advise(
         length=tolerance,
         budget=budget,
         zoom=zoom,
+        starts=starts,
+        spread=spread,
         effort=effort,
         deadline=math.inf if time_limit is None else clock_without_compilation() + time_limit,
         repeats=repeats,
@@ -196,6 +202,8 @@ def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurem
         budget=request.budget,
         fps=request.fps,
         zoom=request.zoom,
+        starts=request.starts,
+        spread=request.spread,
         effort=request.effort,
         time_limit=None if math.isinf(left) else left,
         repeats=min(SEARCH_REPEATS, request.repeats),
@@ -231,13 +239,13 @@ def _fallback(
     if not has_cheapest and score.invariant is not None and score.invariant_tolerance is not None:
         by_invariant = [replace(point, error=point.metrics.get(score.invariant)) for point in points]
         other = objective._replace(metric=METRICS[score.invariant], tolerance=score.invariant_tolerance)
-        kept = recommend_cheapest(by_invariant, other, (), lambda point: point.ranking_error)
+        kept = recommend_cheapest(by_invariant, other, lambda _: True, lambda _: None)
         is_affordable = kept is not None and (
             objective.budget is None or kept.point.frame_time(objective.fps) <= objective.budget
         )
         if kept is not None and is_affordable:
             return next(point for point in points if evaluation_key(point) == evaluation_key(kept.point)), "invariant"
-    affordable = recommend_most_accurate(points, objective, (), lambda point: point.ranking_error)
+    affordable = recommend_most_accurate(points, objective, lambda _: None)
     if affordable is not None:
         return affordable.point, "budget"
     nearest = None if has_cheapest else nearest_to_tolerance(points, objective)
@@ -271,7 +279,7 @@ def _turn_knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeas
         measured.knobs.append(
             evaluate(neighbour, space, [score.context], score.metric, score.tolerance, limit, request.deadline)
         )
-    if measured.recommended is None and not is_random(request.scene):  # other seeds would have to confirm it
+    if measured.recommended is None and measured.found.starts < 2:  # no other starts would have to confirm it
         within = [each for each in measured.knobs if each.meets(score.tolerance)]
         measured.recommended = min(within, key=lambda each: each.counted_seconds, default=None)
 

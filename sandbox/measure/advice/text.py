@@ -183,9 +183,10 @@ def risk_text(risk: Risk, fps: float) -> str:
 
 
 def cheapest_head(advice: Advice) -> str:
-    """Return the heading of the recommended setting, with the number of settings among which it is the cheapest."""
+    """Return the heading of the recommended setting: among how many it is the cheapest, and its fresh starts."""
     tried = f", of {advice.tried_here} tried on {advice.engine}" if advice.tried_here else ""
-    return f"Cheapest setting within the tolerance{tried}"
+    confirmed = "" if advice.confirmation is None else f"; {advice.confirmation}"
+    return f"Cheapest setting within the tolerance{tried}{confirmed}"
 
 
 def no_setting_text(advice: Advice) -> str:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from sandbox.arrays import BoolArray, FloatArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.drives import is_driven
@@ -120,10 +120,16 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPai
     scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
     immovable = bodies.fixed | is_driven(scene, bodies)
     collides = matrix.touches | bodies.fixed
-    found = []
-    for i, j in _near_pairs(bodies, collides, reach):
-        if not (immovable[i] and immovable[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
-            found.append(((i, j), _initial_clearance(setup, (i, j))))
+    first, second = _near_pairs(bodies, collides, reach)
+    group = bodies.group[first]
+    wanted = ~(immovable[first] & immovable[second]) & ((group != bodies.group[second]) | (group == 0))
+    first, second = first[wanted], second[wanted]
+    discs = bodies.round[first] & bodies.round[second]
+    clear = _length(bodies.position[first] - bodies.position[second]) - bodies.radius[first] - bodies.radius[second]
+    found = [
+        ((i, j), float(clear[k]) if discs[k] else _initial_clearance(setup, (i, j)))
+        for k, (i, j) in enumerate(zip(first.tolist(), second.tolist(), strict=True))
+    ]
     apart = set(map(tuple, setup.joints.apart().tolist()))  # joined bodies that do not collide
     found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
     movable = np.flatnonzero(~immovable & collides)
@@ -140,16 +146,19 @@ def _initial_clearance(setup: Setup, pair: IndexPair) -> float:
     return float(clearance(setup.scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
 
 
-def _near_pairs(bodies: Bodies, collides: BoolArray, reach: float) -> Iterator[IndexPair]:
-    """Yield the pairs of bodies whose bounding discs are no farther apart than `reach`."""
+def _near_pairs(bodies: Bodies, collides: BoolArray, reach: float) -> tuple[IntArray, IntArray]:
+    """Return the pairs of bodies whose bounding discs are no farther apart than `reach`, (K,) indices each."""
     chosen = np.flatnonzero(collides)
     if len(chosen) < 2:
-        return
+        return np.empty(0, np.int64), np.empty(0, np.int64)
     position, radius = bodies.position, bodies.radius
+    found = []
     for a, b in near_pairs(position[chosen], (2.0 * float(radius[chosen].max()) + reach) * (1.0 + 1e-9)):  # rounding
         i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
         close = np.hypot(*(position[j] - position[i]).T) - radius[i] - radius[j] <= reach
-        yield from zip(i[close].tolist(), j[close].tolist(), strict=True)
+        found.append(np.stack((i[close], j[close])))
+    pairs = np.concatenate(found, axis=1) if found else np.empty((2, 0), np.int64)
+    return pairs[0], pairs[1]
 
 
 def bounding_clearances(thing: Plane | Wall | Post, position: FloatArray, radius: FloatArray) -> FloatArray:

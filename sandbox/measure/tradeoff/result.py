@@ -4,15 +4,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
-from sandbox.jsonable import in_json, to_json
+from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.compare.result import StudyAgainstTruth
 from sandbox.measure.preflight.diagnostic import Diagnostic
+from sandbox.measure.proportion import Proportion
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
 from sandbox.measure.tradeoff.objective import pareto
@@ -32,17 +35,39 @@ MAX_SHOWN = 4
 
 
 @dataclass(frozen=True)
+class Confirmation:
+    """Errors of a setting over perturbed starts that were not used to choose it."""
+
+    held: Proportion
+    """starts in which the error was within the tolerance"""
+    median_error: float | None
+    """median over the starts, in the unit of the metric; None if half of the runs failed"""
+    error_95: float | None
+    """95 % quantile over the starts, in the unit of the metric; None if more than 5 % of the runs failed"""
+
+    @classmethod
+    def of(cls, errors: Sequence[float], tolerance: float) -> Self:
+        """Return the confirmation by the errors of the starts; infinite for a run that failed."""
+        median, high = np.quantile(errors, (0.5, 0.95), method="higher").tolist()
+        held = Proportion(sum(error <= tolerance for error in errors), len(errors))
+        return cls(held, finite(median), finite(high))
+
+    def __str__(self) -> str:
+        """Return in how many starts the setting held: `held in 29 of 30 fresh starts (95 % interval 83 to 99 %)`."""
+        low, high = (100.0 * each for each in self.held.interval)
+        return f"held in {self.held.hits} of {self.held.trials} fresh starts (95 % interval {low:.0f} to {high:.0f} %)"
+
+
+@dataclass(frozen=True)
 class Recommendation:
-    """Recommended setting, with its error for seeds that were not used to choose it."""
+    """Recommended setting, with its errors over perturbed starts."""
 
     point: Evaluation = field(metadata=in_json(inline=True))
     """the setting, with error and cost"""
     sentence: str
     """description of the setting, its error and its cost"""
-    fresh_seeds: tuple[int, ...]
-    """seeds of the additional runs; empty if the scene has no randomness"""
-    fresh_error: float | None
-    """largest error of the additional runs, in the unit of the metric"""
+    confirmation: Confirmation | None
+    """errors over fresh starts; None if no other starts were asked for, or the setting is not recommended"""
     warnings: tuple[Diagnostic, ...] = ()
     """problems that formulas predict for the setting (those of `sandbox check --no-trial`). The measured runs may not
     show them: a body can tunnel at a slightly different speed"""
@@ -98,8 +123,10 @@ class Tradeoff(StudyAgainstTruth):
     """setting with the smallest error, if no setting is within the tolerance"""
     nearest_to_budget: Recommendation | None
     """setting with the smallest frame time, if no setting is within the budget"""
-    seeds: tuple[int, ...]
-    """seeds over which errors are the largest"""
+    starts: int
+    """number of perturbed starts with which settings are confirmed, if the effort allows; 1: none"""
+    spread: float
+    """largest change of a start, as a fraction (`Starts`)"""
     untried: int
     """number of configurations left out because of their cost"""
     effort: float

@@ -19,9 +19,9 @@ from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
 from sandbox.measure.preflight.tunnelling import largest_safe_dt
-from sandbox.measure.run.bounded_run import clock_without_compilation
+from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
 from sandbox.measure.run.recorder import require_memory
-from sandbox.measure.seeds import is_random, with_seed
+from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
 from sandbox.measure.tradeoff.configuration import (
     Configuration,
     Evaluation,
@@ -40,14 +40,13 @@ from sandbox.measure.tradeoff.objective import (
 )
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
-    VALIDATION_SEEDS,
     cheapest_rejected,
     nearest_to_budget,
     nearest_to_tolerance,
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of
+from sandbox.measure.tradeoff.result import Confirmation, Recommendation, Tradeoff, front_of
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
 from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
@@ -71,8 +70,14 @@ TIMING_FRACTION = 0.5
 """Fraction of the effort for separate timings."""
 MIN_REPEATS = 2
 """Repeats that are made even if the timing exceeds its part of the effort, unless fewer were asked for."""
-SEED_COUNT = 2**63
-"""Seeds wrap around to 0."""
+HELD_FRACTION = 0.95
+"""Fraction of the starts in which a recommended setting is within the tolerance."""
+STARTS_FRACTION = 0.3
+"""Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
+MIN_STARTS = 3
+"""Starts that are run even if they exceed that fraction, unless fewer were asked for."""
+TRUTH_RUNS = 2.0
+"""Cost of a refined truth in that of its finest run: the halvings of dt before it cost as much again."""
 
 
 def tradeoff(
@@ -83,7 +88,8 @@ def tradeoff(
     tolerance: float | None = None,
     budget: float | None = None,
     fps: float = 60.0,
-    seeds: int = 1,
+    starts: int = DEFAULT_STARTS,
+    spread: float = DEFAULT_SPREAD,
     zoom: float | None = None,
     effort: float = DEFAULT_EFFORT,
     time_limit: float | None = None,
@@ -112,7 +118,10 @@ def tradeoff(
         budget: computing time per frame, ms, for which the most accurate setting is sought.
         fps: frames per second of the budget. A recommended setting has at least this step rate, or the step rate of the
             scene if that is lower.
-        seeds: number of seeds, from the scene's own upwards; each error is the largest over the seeds.
+        starts: number of perturbed starts (`Starts`) from which a setting has to be within the tolerance in 95 % of the
+            cases to be recommended; as many others then confirm it. There are fewer if their runs would take too large
+            a part of `effort`. 1: only the start in the scene counts.
+        spread: largest change of a start, as a fraction: 0.01 changes positions by up to 1 % of the smallest half width.
         zoom: px/m, for errors in pixels; default: the motion fills a window of 1280 × 720.
         effort: counted work of the search, about seconds of computing. The same settings are tried on every machine.
             The default settings of each engine are tried even with a small effort.
@@ -145,7 +154,7 @@ def tradeoff(
     names = tuple(dict.fromkeys(ENGINES if engines is None else engines))
     for name in names:
         engine_named(name)
-    _check_arguments(seeds, zoom, effort, time_limit, repeats, most)
+    _check_arguments(starts, zoom, effort, time_limit, repeats, most)
     check_objective(metric, tolerance, budget, fps)
     base = scene.solver.replace(**settings) if settings else scene.solver
     scene = with_whole_steps(scene, base.dt)
@@ -153,22 +162,23 @@ def tradeoff(
     deadline = math.inf if time_limit is None else clock_without_compilation() + time_limit
 
     on_progress(Progress("the truth"))
-    seeding = _seeds(scene, seeds)
+    drawn = Starts(scene, spread)
     truth_tolerance = _truth_tolerance(scene, metric, tolerance, zoom)
-    contexts = _contexts(scene, base, truth_tolerance, seeding.search, zoom, truth)
-    zoom = contexts[0].zoom  # without a given one, that of the motion, for which a truth is needed
+    context = _context(scene, base, truth_tolerance, zoom, truth)
+    zoom = context.zoom  # without a given one, that of the motion, for which a truth is needed
     finer = _truth_tolerance(scene, metric, tolerance, zoom)
     if finer < truth_tolerance:
         truth_tolerance = finer
-        contexts = _contexts(scene, base, finer, seeding.search, zoom)
-    objective = complete_objective(contexts[0], metric, tolerance, budget, fps)
+        context = _context(scene, base, finer, zoom)
+    objective = complete_objective(context, metric, tolerance, budget, fps)
     study = _Study(
         space=SearchSpace(
             scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps, has_fixed_dt
         ),
-        contexts=contexts,
+        context=context,
         objective=objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps)),
-        seeding=seeding,
+        starts=drawn,
+        start_count=starts if drawn.vary else 1,
         truth_tolerance=truth_tolerance,
         effort=effort,
         deadline=deadline,
@@ -180,32 +190,14 @@ def tradeoff(
 
 
 def _check_arguments(
-    seeds: int, zoom: float | None, effort: float, time_limit: float | None, repeats: int, most: int
+    starts: int, zoom: float | None, effort: float, time_limit: float | None, repeats: int, most: int
 ) -> None:
-    for name, count in (("seeds", seeds), ("repeats", repeats), ("most", most)):
+    for name, count in (("starts", starts), ("repeats", repeats), ("most", most)):
         if count < 1:
             raise ValueError(f"{name} is {count}; it must be at least 1")
     for name, value in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
         if value is not None and not 0.0 < value < math.inf:
             raise ValueError(f"{name} is {value:g}; it must be positive and finite")
-
-
-@dataclass(frozen=True)
-class _Seeding:
-    """Seeds of the contexts of a study."""
-
-    search: tuple[int, ...]
-    """seeds of the search, the scene's own first"""
-    validation: tuple[int, ...]
-    """seeds for recommended settings; empty if the scene has no randomness"""
-
-
-def _seeds(scene: Scene, count: int) -> _Seeding:
-    """Return the seeds of the search, from the scene's own upwards, and the following ones for validation."""
-    if not is_random(scene):
-        return _Seeding((scene.world.seed,), ())
-    found = tuple((scene.world.seed + k) % SEED_COUNT for k in range(count + VALIDATION_SEEDS))
-    return _Seeding(found[:count], found[count:])
 
 
 def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None, zoom: float | None) -> float:
@@ -216,24 +208,13 @@ def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None, 
     return min(default_tolerance(scene), tolerance / scale)
 
 
-def _contexts(
-    scene: Scene,
-    base: Settings,
-    truth_tolerance: float,
-    seeds: Sequence[int],
-    zoom: float | None,
-    known: Truth | str | None = None,
-) -> list[EvaluationContext]:
-    """Return a context for each seed; the truth for the scene's own seed may be known."""
-    found: list[EvaluationContext] = []
-    for seed in seeds:
-        is_own = seed == scene.world.seed
-        seeded = scene if is_own else with_seed(scene, seed)
-        result = known if is_own and known is not None else find_truth(seeded, base, truth_tolerance)
-        truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
-        zoom = default_zoom(seeded, truth) if zoom is None else zoom  # one scale for all seeds
-        found.append(EvaluationContext(seeded, truth, zoom, doubt))
-    return found
+def _context(
+    scene: Scene, base: Settings, truth_tolerance: float, zoom: float | None, known: Truth | str | None = None
+) -> EvaluationContext:
+    """Return the context of a start of a scene; its truth may be known."""
+    result = find_truth(scene, base, truth_tolerance) if known is None else known
+    truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
+    return EvaluationContext(scene, truth, default_zoom(scene, truth) if zoom is None else zoom, doubt)
 
 
 def _refusal(scene: Scene, engine: str, base: Settings) -> str | None:
@@ -254,9 +235,12 @@ class _Study:
     """A trade-off in progress."""
 
     space: SearchSpace
-    contexts: Sequence[EvaluationContext]
+    context: EvaluationContext
+    """of the start in the scene"""
     objective: Objective
-    seeding: _Seeding
+    starts: Starts
+    start_count: int
+    """number of starts that decide on a setting; 1: only the one in the scene"""
     truth_tolerance: float
     """m, error that a truth may have"""
     effort: float
@@ -266,15 +250,17 @@ class _Study:
     """evaluations of the engines that cannot run the scene"""
     is_explained: bool = True
     """whether to split the errors into their sources, and to try simpler models"""
-    _validation_contexts: list[EvaluationContext] = field(default_factory=list)
-    _validation_errors: dict[Configuration, float] = field(default_factory=dict)
+    _contexts: dict[int, EvaluationContext] = field(default_factory=dict)
+    """contexts of other starts, by their numbers"""
+    _errors: dict[tuple[Configuration, int], float] = field(default_factory=dict)
+    """errors of configurations from other starts, by their numbers"""
 
     def run(self, runs: Mapping[str, Trajectory], repeats: int, most: int) -> Tradeoff:
         """Search, time and recommend; after Ctrl-C, with the finished evaluations and their times."""
         budget, duration = self.objective.seconds_budget, self.space.scene.world.duration
         search = SettingsSearch(
             space=self.space,
-            contexts=self.contexts,
+            contexts=[self.context],
             metric=self.objective.metric.name,
             tolerance=self.objective.tolerance,
             budget=None if budget is None else budget * duration,
@@ -287,10 +273,11 @@ class _Study:
         evaluations = search.run()
         if not search.interrupted:
             try:
-                return self._result(search, evaluations, repeats, self.seeding.validation)
+                return self._result(search, evaluations, repeats)
             except KeyboardInterrupt:
                 self.on_progress(Progress("interrupted"))
-        return self._result(search, evaluations, 0, ())
+        self.start_count = 1
+        return self._result(search, evaluations, 0)
 
     def _reusable(self, runs: Mapping[str, Trajectory]) -> dict[str, Trajectory]:
         """Return the given runs with the own settings of an engine, if they have the data that the metric needs."""
@@ -304,15 +291,13 @@ class _Study:
                 found[name] = run
         return found
 
-    def _result(
-        self, search: SettingsSearch, evaluations: Sequence[Evaluation], repeats: int, seeds: Sequence[int]
-    ) -> Tradeoff:
+    def _result(self, search: SettingsSearch, evaluations: Sequence[Evaluation], repeats: int) -> Tradeoff:
         """Time the evaluations and recommend; with 0 repeats, use the times of the scored runs."""
         self.on_progress(Progress("timing"))
         points = [*self._timed(evaluations, repeats), *self.refused]
-        self.on_progress(Progress("checking the recommended setting with other seeds"))
-        within_tolerance = recommend_cheapest(points, self.objective, seeds, self._validate)
-        within_budget = recommend_most_accurate(points, self.objective, seeds, self._validate)
+        self.on_progress(Progress("checking the recommended setting from other starts"))
+        within_tolerance = recommend_cheapest(points, self.objective, self._holds, self._confirmation)
+        within_budget = recommend_most_accurate(points, self.objective, self._confirmation)
         splits: list[ErrorBudget] = []
         proposals: list[Simplification] = []
         if repeats and self.is_explained and clock_without_compilation() < self.deadline:
@@ -320,11 +305,14 @@ class _Study:
             splits = self._error_budgets()
             proposals = self._simplifications(within_tolerance)
         by_engine = {name: [p for p in points if p.engine == name] for name in self.space.engines}
-        cheapest = {n: recommend_cheapest(own, self.objective, seeds, self._validate) for n, own in by_engine.items()}
+        cheapest = {
+            name: recommend_cheapest(own, self.objective, self._holds, self._confirmation)
+            for name, own in by_engine.items()
+        }
         near_tolerance = None if within_tolerance else nearest_to_tolerance(points, self.objective)
         has_answer = within_budget or self.objective.budget is None
         near_budget = None if has_answer else nearest_to_budget(points, self.objective)
-        context = self.contexts[0]
+        context = self.context
         return Tradeoff(
             scene=self.space.scene,
             best=context.truth,
@@ -345,7 +333,8 @@ class _Study:
             rejected=cheapest_rejected(points, self.objective, within_tolerance),
             nearest_to_tolerance=self._with_warnings(near_tolerance),
             nearest_to_budget=self._with_warnings(near_budget),
-            seeds=self.seeding.search,
+            starts=self.start_count,
+            spread=self.starts.spread,
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
             spent=search.spent,
@@ -394,29 +383,57 @@ class _Study:
                     near_front.append(each)
         return near_front
 
-    def _validate(self, point: Evaluation) -> float:
-        """Return the error of a configuration with the validation seeds; their truths are found at the first call."""
-        if not self._validation_contexts:
-            scene, base, zoom = self.space.scene, self.space.base, self.contexts[0].zoom
-            self._validation_contexts = _contexts(scene, base, self.truth_tolerance, self.seeding.validation, zoom)
-        known = self._validation_errors
-        if point.configuration not in known:
-            found = evaluate(
-                point.configuration,
-                self.space,
-                self._validation_contexts,
-                self.objective.metric.name,
-                self.objective.tolerance,
-                RUN_FRACTION * self.effort,
-            )
-            known[point.configuration] = found.ranking_error
-        return known[point.configuration]
+    def _holds(self, point: Evaluation) -> bool:
+        """Return whether a configuration is within the tolerance in 95 % of the starts that decide.
+
+        It stops at the first start that makes that impossible.
+        """
+        count = self._affordable(point)
+        failures = math.floor((1.0 - HELD_FRACTION) * count + 1e-9)
+        for number in range(1, count + 1):
+            failures -= self._error(point, number) > self.objective.tolerance
+            if failures < 0:
+                return False
+        return True
+
+    def _confirmation(self, point: Evaluation) -> Confirmation | None:
+        """Return the errors of a configuration from starts that do not decide; None without other starts."""
+        count = self._affordable(point)
+        if not count:
+            return None
+        errors = [self._error(point, self.start_count + number) for number in range(1, count + 1)]
+        return Confirmation.of(errors, self.objective.tolerance)
+
+    def _affordable(self, point: Evaluation) -> int:
+        """Return the number of starts from which a configuration is run: counted work decides, not the clock."""
+        if self.start_count < 2:
+            return 0
+        truth, cost = self.context.truth, point.counted_seconds
+        if truth is not None and truth.kind != "closed_form":
+            info = truth.trajectory.info
+            settings = Settings.model_validate(info["settings"])
+            cost += TRUTH_RUNS * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
+        affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.start_count
+        return min(self.start_count, max(affordable, MIN_STARTS))
+
+    def _error(self, point: Evaluation, number: int) -> float:
+        """Return the error of a configuration from another start; infinite if its run fails."""
+        key = point.configuration, number
+        if key not in self._errors:
+            if number not in self._contexts:
+                start = self.starts.start(number)
+                self._contexts[number] = _context(start, self.space.base, self.truth_tolerance, self.context.zoom)
+            limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
+            metric, tolerance = self.objective.metric.name, self.objective.tolerance
+            found = evaluate(point.configuration, self.space, [self._contexts[number]], metric, tolerance, limit)
+            self._errors[key] = found.ranking_error
+        return self._errors[key]
 
     def _error_budgets(self) -> list[ErrorBudget]:
         """Return the error budgets of the engines with a time step, with their own settings."""
         limit = RUN_FRACTION * self.effort
         found = (
-            error_budget(self.contexts[0], name, self.space.own_settings(name), limit, self.deadline)
+            error_budget(self.context, name, self.space.own_settings(name), limit, self.deadline)
             for name in self.space.engines
             if name != "exact"
         )
@@ -435,7 +452,7 @@ class _Study:
             limit=RUN_FRACTION * self.effort,
             deadline=self.deadline,
         )
-        return model_simplifications(self.contexts, replaced)
+        return model_simplifications([self.context], replaced)
 
     def _with_warnings(self, chosen: Recommendation | None) -> Recommendation | None:
         """Return a recommendation with the diagnostics of its setting."""

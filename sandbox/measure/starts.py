@@ -1,0 +1,254 @@
+"""Perturbed starts of a scene: the same level, a little different, as a player meets it.
+
+A measurement on the one start in the file says little about others: whether a fast body misses a wall depends on where
+its steps begin. `Starts` draws starts by their numbers. Number 0 is the start in the file; another one has
+
+- each free body, and each group of bodies that touch or are joined, displaced by up to `spread` times the smallest half
+  width of a body in the scene,
+- each velocity changed by up to `spread` of its value, and that of a free body turned by up to `spread` rad,
+- free bodies turned by up to half a degree for a spread of 1 %, and moved on by a part of a step of free motion,
+  so that the steps fall elsewhere in the motion,
+- groups that hang at one point of the world turned about it by up to half a degree,
+- another seed, if the scene has random bodies.
+
+No start has an overlap that the scene does not have, and none stretches a joint: bodies for which that is not possible,
+such as a rope between two posts, start as in the file.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.formatting import format_quantity
+from sandbox.measure.metrics.clearance import IndexPair, close_pairs
+from sandbox.measure.metrics.perturbation import TOUCH_TOLERANCE, perturb, touching_pairs
+from sandbox.measure.seeds import is_random, with_seed
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.joint_arrays import WORLD
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.random_streams import Stream, draws
+
+DEFAULT_SPREAD = 0.01
+MAX_SPREAD = 0.5
+DEFAULT_STARTS = 30
+MAX_STARTS = 10_000
+TURN_PER_SPREAD = 0.87
+"""rad: a spread of 1 % turns free bodies by up to half a degree"""
+SEED_COUNT = 2**63
+"""Seeds wrap around to 0."""
+MAX_WIDTHS = 16.0
+"""Largest free motion before the start, in half widths of the body; more takes long to check for what is in its way"""
+STRETCH_TOLERANCE = 1e-9
+"""m: ends of a joint that part by more than this count as stretched; rounding of a rigid motion is far smaller"""
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Starts of a scene by their numbers, 0 for that in the file."""
+
+    scene: Scene
+    spread: float = DEFAULT_SPREAD
+    """largest change, as a fraction; 0: all starts are that of the file, but for the seed"""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if the spread is not from 0 to `MAX_SPREAD`."""
+        if not 0.0 <= self.spread <= MAX_SPREAD:
+            raise ValueError(f"spread: must be from 0 to {MAX_SPREAD:g}, such as 0.01 for 1 %; is {self.spread:g}")
+
+    @property
+    def distance(self) -> float:
+        """Largest displacement of a group of bodies, m."""
+        movable = self._movable(self.scene.bodies)
+        return self.spread * float(self.scene.bodies.thin[movable].min()) if movable.any() else 0.0
+
+    @property
+    def vary(self) -> bool:
+        """Whether the starts differ from each other."""
+        return is_random(self.scene) or (self.spread > 0.0 and self.distance > 0.0)
+
+    def __str__(self) -> str:
+        """Return the changes in words: `positions ± 0.5 mm, velocities ± 1 %, angles ± 0.5°, the phase of the step`."""
+        parts = []
+        if self.distance > 0.0:
+            parts += [
+                f"positions ± {format_quantity(self.distance, 'm')}",
+                f"velocities ± {100.0 * self.spread:g} %",
+                f"angles ± {math.degrees(TURN_PER_SPREAD * self.spread):.2g}°",
+                "the phase of the step",
+            ]
+        if is_random(self.scene):
+            parts.append("the seed")
+        return ", ".join(parts) if parts else "no changes"
+
+    def start(self, number: int) -> Scene:
+        """Return the scene with a start.
+
+        Args:
+            number: of the start, not negative; the same number gives the same start, bit for bit.
+        """
+        if number == 0:
+            return self.scene
+        scene = self.scene
+        if is_random(scene):
+            scene = with_seed(scene, (scene.world.seed + number) % SEED_COUNT)
+        if not self.spread:
+            return scene
+        random = draws(Stream.STARTS, self.scene.world.seed, number)
+        bodies = self._changed(scene, random, number)
+        perturbed = scene.model_copy()
+        # The compiled state of a scene is computed at the first use and kept; here it is that of this start.
+        perturbed.__dict__["bodies"] = bodies
+        perturbed.__dict__["joint_arrays"] = scene.joint_arrays
+        return perturbed
+
+    def _movable(self, bodies: Bodies) -> BoolArray:
+        return ~(bodies.fixed | is_driven(self.scene, bodies))
+
+    def _changed(self, scene: Scene, random: np.random.Generator, number: int) -> Bodies:
+        """Return the bodies of a scene in another start."""
+        setup = Setup.of(scene)
+        own, movable = setup.bodies, self._movable(setup.bodies)
+        free, group = movable & self._is_free(setup, own), _joined_groups(setup)
+        # Numbers for all bodies, so that those of one do not depend on the state of another.
+        heading, length = 2.0 * math.pi * random.uniform(size=len(own)), np.sqrt(random.uniform(size=len(own)))
+        factor, turn, rotation = random.uniform(-1.0, 1.0, (3, len(own)))
+        time = random.uniform() * scene.solver.dt
+        factor = 1.0 + self.spread * factor[group]  # one for joined bodies, so that they keep moving together
+        velocity = own.velocity * factor[:, None]
+        velocity[free] = _rotated(velocity, self.spread * turn)[free]
+        fall = np.asarray(scene.world.gravity) * time
+        shift = self.distance * length[:, None] * np.column_stack((np.cos(heading), np.sin(heading)))
+        shift += _limited((velocity + 0.5 * fall) * time, MAX_WIDTHS * own.thin)
+        velocity[free] += fall
+        rotation *= TURN_PER_SPREAD * self.spread
+        together = self._moved_together(setup, random, number, group, rotation)
+        changed = replace(
+            own,
+            position=np.where(free[:, None], own.position + shift, together.position),
+            angle=np.where(free, own.angle + np.where(own.round, 0.0, rotation), together.angle),
+            velocity=np.where(movable[:, None], velocity, own.velocity),
+            angular_velocity=np.where(movable, own.angular_velocity * factor, own.angular_velocity),
+            roll=np.where(movable[:, None], own.roll * factor[:, None], own.roll),
+        )
+        return _without_faults(setup, changed, group, free)
+
+    def _moved_together(
+        self, setup: Setup, random: np.random.Generator, number: int, group: IntArray, rotation: FloatArray
+    ) -> Bodies:
+        """Return the bodies with those that touch or are joined moved, so that they still touch and are joined.
+
+        A group that hangs at one point of the world is rotated about it; one that hangs at several is not moved.
+        """
+        own, amount = setup.bodies, self.distance * math.sqrt(random.uniform())
+        reverse = bool(random.integers(2))
+        moved = perturb(setup, amount, seed=number, reverse=reverse) if amount > 0.0 else None
+        found = own if moved is None else moved.bodies
+        position, angle = found.position.copy(), found.angle.copy()
+        for label, points in _anchors(setup, group).items():
+            members = np.flatnonzero(group == label)
+            position[members], angle[members] = own.position[members], own.angle[members]
+            if len(points) == 1:
+                (point,) = points
+                by = np.full(len(members), rotation[label])
+                position[members] = point + _rotated(own.position[members] - point, by)
+                angle[members] += by
+        return replace(own, position=position, angle=angle)
+
+    def _is_free(self, setup: Setup, bodies: Bodies) -> BoolArray:
+        """Return which bodies neither touch anything nor have a joint, (N,)."""
+        free = np.ones(len(bodies), np.bool_)
+        for pair, _ in touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * self.distance)):
+            free[[number for number in pair if number >= 0]] = False
+        for ends in (setup.joints.a, setup.joints.b):
+            free[ends[ends != WORLD]] = False
+        return free
+
+
+def _without_faults(setup: Setup, changed: Bodies, group: IntArray, free: BoolArray) -> Bodies:
+    """Return the bodies moved as far as they neither overlap anything nor stretch a joint.
+
+    Free bodies move in steps of about half a width, so that none passes through another one or a wall.
+    """
+    own = setup.bodies
+    shift, turn = changed.position - own.position, changed.angle - own.angle
+    widths = np.hypot(*shift[free].T) / own.thin[free]
+    count = max(1, math.ceil(widths.max(initial=0.0)))
+    allowed, fraction = _overlaps(setup, own), np.zeros(len(own))
+    stopped = np.zeros(len(own), np.bool_)
+    for k in range(1, count + 1):
+        wanted = np.where(free, k / count, float(k == count))  # others move at once, so that they keep together
+        while True:
+            tried = np.where(stopped, fraction, wanted)
+            placed = replace(changed, position=own.position + tried[:, None] * shift, angle=own.angle + tried * turn)
+            faulty = _overlapping(setup, placed, allowed) | _stretched(setup, placed)
+            blocked = np.isin(group, group[sorted(faulty)]) & ~stopped & (tried > 0.0)
+            if not blocked.any():
+                break
+            stopped |= blocked
+        fraction = tried
+    return placed
+
+
+def _limited(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return vectors, (N, 2), shortened to lengths, (N,)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        factor = np.fmin(1.0, lengths / np.hypot(*vectors.T))
+    return np.asarray(vectors * factor[:, None])
+
+
+def _rotated(vectors: FloatArray, angles: FloatArray) -> FloatArray:
+    """Return vectors, (N, 2), rotated by angles, (N,) rad."""
+    (x, y), cos, sin = vectors.T, np.cos(angles), np.sin(angles)
+    return np.column_stack((x * cos - y * sin, x * sin + y * cos))
+
+
+def _joined_groups(setup: Setup) -> IntArray:
+    """Return for each body the lowest index of the bodies that joints connect it with, (N,)."""
+    label = np.arange(len(setup.bodies))
+    pairs = [(a, b) for a, b in zip(setup.joints.a.tolist(), setup.joints.b.tolist(), strict=True) if a != WORLD]
+    pairs = [pair for pair in pairs if not setup.bodies.fixed[[*pair]].any()]
+    for _ in pairs:
+        before = label.copy()
+        for a, b in pairs:
+            label[a] = label[b] = min(label[a], label[b])
+        if np.array_equal(label, before):
+            break
+    return label
+
+
+def _anchors(setup: Setup, group: IntArray) -> dict[int, set[tuple[float, float]]]:
+    """Return the points of the world at which each group hangs, by the label of the group."""
+    joints, bodies = setup.joints, setup.bodies
+    still = bodies.fixed | is_driven(setup.scene, bodies)
+    found: dict[int, set[tuple[float, float]]] = {}
+    first, second = joints.ends(bodies.position, bodies.angle)
+    for k, (a, b) in enumerate(zip(joints.a.tolist(), joints.b.tolist(), strict=True)):
+        for number, other, point in ((a, b, second[k]), (b, a, first[k])):
+            if number != WORLD and not still[number] and (other == WORLD or still[other]):
+                found.setdefault(int(group[number]), set()).add((float(point[0]), float(point[1])))
+    return found
+
+
+def _overlaps(setup: Setup, bodies: Bodies) -> dict[IndexPair, float]:
+    """Return the depth of each overlap, m."""
+    return {pair: -clear for pair, clear in close_pairs(replace(setup, bodies=bodies)) if clear < 0.0}
+
+
+def _overlapping(setup: Setup, bodies: Bodies, allowed: dict[IndexPair, float]) -> set[int]:
+    """Return the bodies that overlap deeper than in the scene."""
+    found = _overlaps(setup, bodies).items()
+    deeper = (pair for pair, depth in found if depth > allowed.get(pair, 0.0) + TOUCH_TOLERANCE)
+    return {number for pair in deeper for number in pair if number >= 0}
+
+
+def _stretched(setup: Setup, changed: Bodies) -> set[int]:
+    """Return the bodies of joints whose ends are farther from each other, or nearer, than in the scene."""
+    joints, own = setup.joints, setup.bodies
+    before, after = joints.ends(own.position, own.angle), joints.ends(changed.position, changed.angle)
+    length = np.hypot(*(before[1] - before[0]).T), np.hypot(*(after[1] - after[0]).T)
+    wrong = np.abs(length[1] - length[0]) > STRETCH_TOLERANCE
+    return {number for ends in (joints.a, joints.b) for number in ends[wrong].tolist() if number != WORLD}
