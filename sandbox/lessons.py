@@ -189,6 +189,86 @@ _EXERCISES: Mapping[str, Exercise] = {
         lambda: 1e3 * G / (4.0 * G / 1e-3),
         {"four contacts share the weight": lambda: 1e3 * G / (G / 1e-3)},
     ),
+    "ragdoll-1": Exercise(
+        "How many degrees of freedom has the figure?",
+        "",
+        lambda: 15 * 3 - 14 * 2,
+        {
+            "a pivot takes two degrees of freedom, not one": lambda: 15 * 3 - 14,
+            "a segment can turn, too": lambda: 15 * 2 - 14 * 2,
+            "a limit takes none": lambda: 15 * 3 - 14 * 3,
+        },
+        is_count=True,
+    ),
+    "ragdoll-2": Exercise(
+        "How fast do both discs turn after the limit, if the second has twice the radius and three times the mass?",
+        "rad/s",
+        lambda: 10.0 / (1.0 + 3.0 * 2.0**2),
+        {
+            "the moment of inertia grows with the square of the radius": lambda: 10.0 / (1.0 + 3.0 * 2.0),
+            "that is the speed for equal radii": lambda: 10.0 / (1.0 + 3.0),
+        },
+    ),
+    "ragdoll-3": Exercise(
+        "How large may a step be so that a shank at 20 rad/s never passes the limit by more than 1°?",
+        "s",
+        lambda: math.radians(1.0) / 20.0,
+        {"1° is 0.01745 rad": lambda: 1.0 / 20.0},
+    ),
+    "cloth-1": Exercise(
+        "How much longer does a column of a cloth of 24 rows become?",
+        "m",
+        lambda: 0.002 * G / 100.0 * 23 * 24 / 2,
+        {
+            "the top row is fixed": lambda: 0.002 * G / 100.0 * 24 * 25 / 2,
+            "the lower springs carry less than the first": lambda: 0.002 * G / 100.0 * 23**2,
+        },
+    ),
+    "cloth-2": Exercise(
+        "Which step is stable for springs of 400 N/m?",
+        "s",
+        lambda: math.sqrt(0.002 / 400.0),
+        {
+            "the highest frequency is twice that of one mass on one spring": lambda: 2.0 * math.sqrt(0.002 / 400.0),
+            "the square root of the stiffness counts": lambda: math.sqrt(0.002 / 100.0) / 4.0,
+        },
+    ),
+    "cloth-3": Exercise(
+        "How heavy may a node be so that the cloth holds if it is loaded slowly?",
+        "kg",
+        lambda: 8.0 / (21 * G),
+        {
+            "the top row is fixed": lambda: 8.0 / (22 * G),
+            "that is the mass for a sudden load": lambda: 4.0 / (21 * G),
+        },
+    ),
+    "artillery-1": Exercise(
+        "How far does the shell of 65 m/s fly at most without drag?",
+        "m",
+        lambda: 65.0**2 / G,
+        {"that is the greatest height of a vertical shot": lambda: 65.0**2 / (2.0 * G)},
+    ),
+    "artillery-2": Exercise(
+        "At which lower angle does it hit a target at 210 m without drag?",
+        "degrees",
+        lambda: math.degrees(math.asin(210.0 * G / 65.0**2)) / 2.0,
+        {
+            "that is twice the angle": lambda: math.degrees(math.asin(210.0 * G / 65.0**2)),
+            "that is the higher angle": lambda: 90.0 - math.degrees(math.asin(210.0 * G / 65.0**2)) / 2.0,
+        },
+    ),
+    "artillery-3": Exercise(
+        "Which terminal velocity has a body in air with a drag of 0.2 1/s?",
+        "m/s",
+        lambda: G / 0.2,
+        {"that is the velocity for 0.05 1/s": lambda: G / 0.05},
+    ),
+    "artillery-4": Exercise(
+        "How far off is a shot of 65 m/s at 30° with explicit Euler and a step of 0.05 s?",
+        "m",
+        lambda: 0.05 * 65.0 * math.cos(math.radians(30.0)),
+        {"the horizontal part of the velocity counts": lambda: 0.05 * 65.0},
+    ),
     "newtons_cradle-2": Exercise(
         "Which speed has the heavy ball at the end?",
         "m/s",
