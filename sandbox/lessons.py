@@ -201,7 +201,8 @@ _EXERCISES: Mapping[str, Exercise] = {
         is_count=True,
     ),
     "ragdoll-2": Exercise(
-        "How fast do both discs turn after the limit, if the second has twice the radius and three times the mass?",
+        "How fast do both discs turn after the limit, if the first had 10 rad/s, and the second has twice its radius "
+        "and three times its mass?",
         "rad/s",
         lambda: 10.0 / (1.0 + 3.0 * 2.0**2),
         {

@@ -5,6 +5,7 @@
 
 from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.config import Config
 
 FOLDER = "lessons/"
 
@@ -24,8 +25,14 @@ def remove_boxes(parent: nodes.Element) -> None:
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register with Sphinx."""
+    app.connect("config-inited", _leave_sources_out)
     app.connect("doctree-read", _remove_answers)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _leave_sources_out(app: Sphinx, config: Config) -> None:
+    if app.tags.has("student"):
+        config.html_copy_source = False  # the sources of the pages have the answers
 
 
 def _remove_answers(app: Sphinx, doctree: nodes.document) -> None:
