@@ -82,6 +82,16 @@ def _first_overlap(new_velocity: bool) -> tuple[int, float]:
     return n, -height
 
 
+def _largest_error(step: float) -> float:
+    """Return the largest error of semi-implicit Euler in the first second of a swing of 0.1 m and 1 Hz, m."""
+    position, velocity, largest = 0.1, 0.0, 0.0
+    for n in range(1, round(1.0 / step) + 1):
+        velocity -= step * 4.0 * math.pi**2 * position
+        position += step * velocity
+        largest = max(largest, abs(position - 0.1 * math.cos(2.0 * math.pi * n * step)))
+    return largest
+
+
 _EXERCISES: Mapping[str, Exercise] = {
     "loop-1": Exercise(
         "After how many steps of 0.01 s is the first contact found?",
@@ -175,6 +185,66 @@ _EXERCISES: Mapping[str, Exercise] = {
         "s",
         lambda: 0.02 / 200.0,
         {"the relative speed counts": lambda: 0.02 / 100.0},
+    ),
+    "order-1": Exercise(
+        "Which order does semi-implicit Euler have between 0.2 s and 0.1 s?",
+        "",
+        lambda: math.log2(_largest_error(0.2) / _largest_error(0.1)),
+        {
+            "the logarithm to base 2 is the order": lambda: _largest_error(0.2) / _largest_error(0.1),
+            "that is the order for short steps": lambda: 1.0,
+        },
+    ),
+    "kepler-1": Exercise(
+        "Which speed at the start gives a circular orbit at radius 0.5?",
+        "",
+        lambda: math.sqrt(1.0 / 0.5),
+        {"with that speed it escapes": lambda: math.sqrt(2.0 / 0.5), "that is the orbit of the scene": lambda: 3**0.5},
+    ),
+    "kepler-3": Exercise(
+        "Which area does the line from the sun to the planet sweep in one step of 0.002 s?",
+        "",
+        lambda: 0.5 * math.sqrt(0.75) * 0.002,
+        {"a triangle has half of base times height": lambda: math.sqrt(0.75) * 0.002},
+    ),
+    "stacks-1": Exercise(
+        "Which force does the contact under box 10 transmit?",
+        "N",
+        lambda: 11 * G,
+        {"box 10 is carried, too": lambda: 10 * G, "the contact carries the boxes above it": lambda: 9 * G},
+    ),
+    "billiards-1": Exercise(
+        "How fast is the ball when it rolls?",
+        "m/s",
+        lambda: 2.0 * 5.0 / 7.0,
+        {"that is the speed of a disc": lambda: 2.0 * 2.0 / 3.0},
+    ),
+    "springs-1": Exercise(
+        "Which stiffness is stable for a mass of 0.1 kg at 240 steps a second?",
+        "N/m",
+        lambda: 4.0 * 0.1 * 240.0**2,
+        {
+            "the limit is at ω h = 2, not 1": lambda: 0.1 * 240.0**2,
+            "the step counts squared": lambda: 4.0 * 0.1 * 240.0,
+        },
+    ),
+    "springs-2": Exercise(
+        "How many times √(k/m) is the ω of two equal masses on one spring?",
+        "",
+        lambda: math.sqrt(2.0),
+        {"half the mass is twice ω², not ω": lambda: 2.0, "the reduced mass is half of m": lambda: math.sqrt(0.5)},
+    ),
+    "machines-1": Exercise(
+        "Which mass of `pull` holds the load of the right pair in balance?",
+        "kg",
+        lambda: 2.0 / 2.0,
+        {"the load hangs on two strands": lambda: 2.0},
+    ),
+    "machines-2": Exercise(
+        "When does the rope of the left pair become taut, with 0.2 m of slack?",
+        "s",
+        lambda: math.sqrt(2.0 * 0.1 / G),
+        {"both bodies fall, each by half of the slack": lambda: math.sqrt(2.0 * 0.2 / G)},
     ),
     "penalty-1": Exercise("How stiff must the spring be for a depth of 1 mm at rest?", "N/m", lambda: G / 1e-3),
     "penalty-2": Exercise(

@@ -202,6 +202,70 @@ def long_fall() -> float:
     return -float(sandbox.run(sandbox.loads(text), engine="reference", integrator="rk4").velocity[-1, 0, 1])
 
 
+def spring_error(dt: float) -> float:
+    run = sandbox.run("spring", engine="reference", integrator="semi_implicit_euler", dt=dt)
+    error = np.abs(run.position[:, 0, 0] - 1.0 - 0.1 * np.cos(2.0 * np.pi * run.time))
+    return float(error[run.time < 1.0 + dt / 2.0].max())
+
+
+def orbit(speed: float = 3**0.5) -> sandbox.Trajectory:
+    """Run the planet for about a turn."""
+    scene = changed("kepler", ("1.7320508075688772", f"{speed}"), ("duration = 31.416", "duration = 6.0"))
+    return sandbox.run(scene, engine="reference", integrator="rk4")
+
+
+def swept_area() -> float:
+    x, y = orbit().position[:, 0].T
+    return float(np.mean(x[:-1] * y[1:] - x[1:] * y[:-1]) / 2.0)
+
+
+def load_of_contact() -> float:
+    """Return the mean force of box 10 on box 9, N, from the impulses of their contacts."""
+    run = sandbox.run("tower", engine="reference", audit=False)
+    lower, upper = run.number("box-9"), run.number("box-10")
+    impulses = run.contact_impulse[(run.contact_pair == (lower, upper)).all(axis=1)]
+    return float(np.abs(impulses[:, 1]).sum() / run.time[-1])
+
+
+def rolling_speed() -> float:
+    text = "[world]\nduration = 1.0\n[surface]\nsliding_friction = 0.2\nrolling_friction = 0.0\n"
+    run = sandbox.run(sandbox.loads(text + DISC.format("[0, 0]", "[2, 0]", 0.03)), engine="exact")
+    return float(run.velocity[-1, 0, 0])
+
+
+def is_bounded(stiffness: float) -> bool:
+    """Return whether a mass of 0.1 kg swings on without growing at 240 steps a second."""
+    scene = changed("stiff_spring", ("3960100.0", f"{stiffness}"), ('name = "mass"', 'name = "mass"\nmass = 0.1'))
+    settings = {"integrator": "semi_implicit_euler", "dt": 1.0 / 240.0}
+    run = sandbox.run(scene.with_duration(20.0), engine="reference", audit=False, **settings)
+    return run.status == "ok" and bool(np.abs(run.position[:, 0, 0] - 10.0).max() < 10.0)
+
+
+def two_masses() -> float:
+    """Return the frequency of two masses of 1 kg on a spring of 1 N/m, 1/s."""
+    text = "[world]\nduration = 12.0\n[solver]\ndt = 0.01\n"
+    for name, x in (("left", 0.0), ("right", 1.1)):
+        text += DISC.format([x, 0.0], "[0, 0]", 0.1) + f'name = "{name}"\ncollides = "none"\n'
+    text += '[[joint]]\nkind = "spring"\nbetween = ["left", "right"]\nrest_length = 1.0\nstiffness = 1.0\n'
+    run = sandbox.run(sandbox.loads(text), engine="reference", integrator="rk4")
+    stretch = run.position[:, 1, 0] - run.position[:, 0, 0] - 1.0
+    crossings = np.flatnonzero((stretch[:-1] > 0.0) & (stretch[1:] <= 0.0))  # one in each swing
+    times = [np.interp(0.0, stretch[[k + 1, k]], run.time[[k + 1, k]]) for k in crossings]
+    return float(2.0 * np.pi / np.diff(times).mean())
+
+
+def rises(mass: float) -> bool:
+    """Return whether the load of the right pair falls, so that `pull` rises."""
+    run = sandbox.run(changed("atwood", ("mass = 1.2", f"mass = {mass}")), engine="reference")
+    return bool(run.position[-1, run.number("pull"), 1] > -0.6)
+
+
+def slack() -> float:
+    scene = changed("atwood", ("wheels = [[-2.0, 0.0]", "length = 3.4\nwheels = [[-2.0, 0.0]"))
+    run = sandbox.run(scene, engine="reference", dt=1e-4)
+    return float(run.time[run.velocity[:, run.number("light"), 1].argmin()])  # falls freely until then
+
+
 MEASURED: dict[str, tuple[Callable[[], float], float]] = {
     "loop-1": (lambda: float(loop().contact_time[0]) / 0.01, 1e-9),
     "loop-2": (lambda: 0.5 - float(loop().position[102, 0, 1]), 1e-9),
@@ -217,6 +281,15 @@ MEASURED: dict[str, tuple[Callable[[], float], float]] = {
     "tunnelling-1": (lambda: 100.0 * safe_dt(sandbox.load("bullet")) * 60.0, 1e-9),
     "tunnelling-2": (wall, 1e-9),
     "tunnelling-3": (bullets, 1e-9),
+    "order-1": (lambda: math.log2(spring_error(0.2) / spring_error(0.1)), 1e-9),
+    "kepler-1": (lambda: bisect(lambda v: np.hypot(*orbit(v).position[:, 0].T).max() <= 0.5 + 1e-6, 1.0, 1.9), 2e-4),
+    "kepler-3": (swept_area, 1e-4),  # triangles are smaller than sectors, by (ω h)²/6
+    "stacks-1": (load_of_contact, 1e-2),  # the tower sinks in at the start
+    "billiards-1": (rolling_speed, 1e-9),
+    "springs-1": (lambda: bisect(is_bounded, 1e4, 5e4), 2e-4),  # grows slowly just above the limit
+    "springs-2": (two_masses, 1e-5),  # crossings between two steps of 0.01 s
+    "machines-1": (lambda: bisect(rises, 0.5, 1.9), 2e-4),
+    "machines-2": (slack, 1e-3),  # a frame of 0.1 ms
     "penalty-1": (lambda: 9810.0 * depth(1.0) / 1e-3, 1e-6),
     "penalty-2": (tenth_of_contact, 1e-2),  # a frame of 0.1 ms
     "penalty-3": (lambda: depth(250.0), 1e-3),  # slides into its place slowly
