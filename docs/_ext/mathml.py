@@ -36,7 +36,7 @@ STYLE = "mathml.css"
 RULES = f"""\
 @font-face {{ font-family: "STIX Two Math"; src: url("{FONT}") format("woff"); font-display: swap; }}
 math {{ font-family: "STIX Two Math", math; font-size: 1.05em; }}
-div.math {{ overflow-x: auto; overflow-y: hidden; padding-block: 0.2em; }}
+div.math {{ overflow-x: auto; }}
 """
 LETTERS_AND_SIGNS = (
     (0x0020, 0x024F),  # Latin

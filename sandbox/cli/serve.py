@@ -34,7 +34,7 @@ class ServeOptions:
     opens: bool
 
 
-class AddressType(click.ParamType[str]):
+class AddressType(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
     """Address to listen at."""
 
     name = "address"
