@@ -56,9 +56,12 @@ class Fraction(FiniteRange):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the fraction; fail unless it is a number within the range."""
         text = str(value).strip()
-        if not text.endswith("%"):
-            return super().convert(value, param, ctx)
-        return super().convert(click.FLOAT.convert(text[:-1].strip(), param, ctx) / 100.0, param, ctx)
+        if text.endswith("%"):
+            try:
+                value = float(text[:-1]) / 100.0
+            except ValueError:
+                self.fail(f"{text!r} is not a fraction, such as 0.01 or 1%.", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 POSITIVE = FiniteRange(min=0.0, min_open=True)

@@ -98,12 +98,7 @@ class Starts:
         if not self.spread:
             return scene
         random = draws(Stream.STARTS, self.scene.world.seed, number)
-        bodies = self._changed(scene, random, number)
-        perturbed = scene.model_copy()
-        # The compiled state of a scene is computed at the first use and kept; here it is that of this start.
-        perturbed.__dict__["bodies"] = bodies
-        perturbed.__dict__["joint_arrays"] = scene.joint_arrays
-        return perturbed
+        return scene.started_from(self._changed(scene, random, number))
 
     def _movable(self, bodies: Bodies) -> BoolArray:
         return ~(bodies.fixed | is_driven(self.scene, bodies))

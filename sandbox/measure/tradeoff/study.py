@@ -121,7 +121,7 @@ def tradeoff(
         starts: number of perturbed starts (`Starts`) from which a setting has to be within the tolerance in 95 % of the
             cases to be recommended; as many others then confirm it. There are fewer if their runs would take too large
             a part of `effort`. 1: only the start in the scene counts.
-        spread: largest change of a start, as a fraction: 0.01 changes positions by up to 1 % of the smallest half width.
+        spread: largest change of a start, as a fraction: 0.01 moves bodies by up to 1 % of the smallest half width.
         zoom: px/m, for errors in pixels; default: the motion fills a window of 1280 × 720.
         effort: counted work of the search, about seconds of computing. The same settings are tried on every machine.
             The default settings of each engine are tried even with a small effort.

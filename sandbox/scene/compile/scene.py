@@ -1,7 +1,10 @@
 """Scene: the contents of a scene file, with the start state that follows from them."""
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import PrivateAttr
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_plural
@@ -19,14 +22,37 @@ if TYPE_CHECKING:  # reading a file needs no numpy
 class Scene(SceneDescription, HtmlRepr):
     """Contents of a scene file."""
 
+    _start: "tuple[Bodies, JointArrays] | None" = PrivateAttr(default=None)
+    """bodies and joints of another start than that of the file; copies with other settings or duration keep them"""
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy with other values, which keeps another start than that of the file."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied._start = self._start
+        return copied
+
+    def started_from(self, bodies: "Bodies") -> Self:
+        """Return the scene with another start state of its bodies; joints keep their rest lengths and angles.
+
+        Args:
+            bodies: bodies of this scene in another state, such as those of `Starts`. A scene file cannot state it.
+        """
+        started = self.model_copy()
+        for name in ("bodies", "joint_arrays"):  # the copy has those that are computed already
+            started.__dict__.pop(name, None)
+        started._start = bodies, self.joint_arrays
+        return started
+
     @cached_property
     def bodies(self) -> "Bodies":
         """Bodies in scene order as arrays, with generators expanded."""
-        return start_bodies(self)
+        return start_bodies(self) if self._start is None else self._start[0]
 
     @cached_property
     def joint_arrays(self) -> "JointArrays":
         """Joints as arrays; they refer to the indices of `bodies`."""
+        if self._start is not None:
+            return self._start[1]
         from sandbox.scene.compile.joints import compile_joints
 
         return compile_joints(self, self.bodies)
