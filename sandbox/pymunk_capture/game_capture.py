@@ -33,7 +33,7 @@ from sandbox.pymunk_capture.space_capture import (
 from sandbox.pymunk_capture.space_form import MotionState, SpaceForm
 from sandbox.pymunk_capture.state_log import StateLog
 from sandbox.recording import RecordedGame, Recording
-from sandbox.scene.errors import SettingsError, quoted
+from sandbox.scene.errors import PartError, SettingsError, quoted
 
 MAX_ACTIONS = 1_000_000
 """Actions of a recording; a game that changes 1,000 bodies at 60 Hz makes as many in 17 s"""
@@ -175,11 +175,9 @@ class SpaceCapture:
         """Add an action at the present time; one with values that a scene cannot have is a remark."""
         try:
             self._actions.append(kind(time=self.time, **values))
-        except ValidationError as error:
-            first = error.errors()[0]
-            what = values.get("body") or values.get("path")
-            key = ".".join(str(each) for each in first["loc"][:1])
-            self._omitted[f"values of {what} that the game sets ({key}: {first['msg']})"] = None
+        except PartError as error:
+            what, fault = values.get("body") or values.get("path"), error.faults[0]
+            self._omitted[f"values of {what} that the game sets ({fault.path}: {fault.message})"] = None
 
     def _note_population(self) -> None:
         """Note bodies that were added or removed. Bodies without shapes and joints are not used."""
