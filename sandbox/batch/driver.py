@@ -56,6 +56,7 @@ from sandbox.batch.job import (
     store_run,
     with_earlier_audit,
 )
+from sandbox.batch.observables import ObservableError
 from sandbox.batch.plan import Plan, PlannedRun
 from sandbox.batch.store import Store, StoreError
 from sandbox.provenance import versions
@@ -256,7 +257,7 @@ class Driver:
                     raise JobError(each.label, error) from error
                 self._faulty(error)
                 continue
-            except (StoreError, TooLargeError) as error:
+            except (StoreError, TooLargeError, ObservableError) as error:
                 raise JobError(each.label, error) from error
             if ready is not None:
                 return ready

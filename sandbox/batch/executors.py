@@ -13,6 +13,7 @@ from typing import Protocol
 
 from sandbox.batch.job import CompletedRun, Job, RunOptions, run_job
 from sandbox.batch.member_runs import MemberTask
+from sandbox.batch.observables import ObservableError
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.errors import SceneError
@@ -83,8 +84,8 @@ class JobFailure:
     """A job that could not be run."""
 
     reason: str
-    error: SceneError | None = None
-    """faults of the job: no attempt can succeed"""
+    error: SceneError | ObservableError | None = None
+    """faults of the job or its observable: no attempt can succeed"""
 
 
 JobOutcome = CompletedRun | JobFailure | None
@@ -151,7 +152,7 @@ class InProcessExecutor:
     def _run(self, job: Job, options: RunOptions) -> JobOutcome:
         try:
             return run_job(job, options, self._progress)
-        except SceneError as error:
+        except (SceneError, ObservableError) as error:
             return JobFailure(str(error), error)
         except TooLargeError as error:
             return JobFailure(str(error))
@@ -187,7 +188,7 @@ def outcomes_of(task: AnyTask) -> Iterator[JobOutcome]:
 def _outcome(job: Job, options: RunOptions) -> JobOutcome:
     try:
         return replace(run_job(job, options), trajectory=None)
-    except SceneError as error:
+    except (SceneError, ObservableError) as error:
         return JobFailure(str(error), error)
     except TooLargeError as error:
         return JobFailure(str(error))

@@ -16,6 +16,7 @@ from sandbox.action import Spawn
 from sandbox.batch.driver import Driver, JobError
 from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor
 from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
+from sandbox.batch.observables import Observable, ObservableError
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.sampling import Sampling
@@ -92,6 +93,7 @@ class _Options(OutputOptions):
     bodies: tuple[str, ...]
     audit: bool | None
     ledger: bool | None
+    observe: str | None
     verbose: bool
 
 
@@ -146,6 +148,12 @@ class _Options(OutputOptions):
     is_flag=True,
     default=None,
     help="account for energy by cause; a pymunk run takes 3 to 12 times as long",
+)
+@click.option(
+    "--observe",
+    metavar="FILE.py:FUNCTION",
+    help="compute figures of your own: FUNCTION gets the Trajectory of each run and returns a number, a text, or a "
+    "dict of them, which become columns",
 )
 @json_option
 @verbose_option
@@ -215,6 +223,7 @@ def _study(options: _Options, faults: list[Fault]) -> Study | None:
         time_limit=options.time_limit,
         audit=options.audit,
         ledger=options.ledger,
+        observe=options.observe,
     )
     if not any(map(is_study, options.scenes)):
         return given
@@ -250,6 +259,7 @@ def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
         faults.append(Fault.of("--workers", "is given with --on too; leave out one of them"))
     with collect_errors(faults, "--sweep", (AddressError,)):
         keeps_ends = study.keep == "end" and study.time_limit is None and not study.ledger and not study.audit
+        keeps_ends = keeps_ends and study.observe is None
         return Plan(found, names, study.overrides, axes, study.seeds, player, keeps_ends)
     return None
 
@@ -277,6 +287,9 @@ def _checked_batch(
         plan.check(is_stored, visit, progress)
     if plan.player is not None and not plan.has_player and not faults:
         faults.append(Fault.of("--player", "has no use: none of the scenes has a game with rules"))
+    observable: Observable | None = None
+    with collect_errors(faults, "--observe", (ObservableError,)):
+        observable = None if study.observe is None else Observable.read(study.observe)
     count = len(plan)
     scene = scenes[0] if count == 1 and scenes else None
     if not faults:
@@ -285,7 +298,7 @@ def _checked_batch(
         with collect_errors(faults):
             _check_drawing(options.plot, options.bodies, count, scene)
     faults += memory
-    return None if faults else RunBatch(plan, study, count, scene)
+    return None if faults else RunBatch(plan, study, count, scene, observable)
 
 
 def _run_options(batch: RunBatch, options: _Options) -> RunOptions:
@@ -297,6 +310,7 @@ def _run_options(batch: RunBatch, options: _Options) -> RunOptions:
         keep=study.keep or "all",
         time_limit=study.time_limit,
         force=options.force,
+        observable=batch.observable,
     )
 
 

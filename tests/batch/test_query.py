@@ -162,8 +162,11 @@ def test_longest_name_is_taken_and_names_may_have_signs() -> None:
 
 
 def test_runs_are_sorted_and_the_last_ones_listed(runs: StoredRuns) -> None:
-    ids = runs.table(kind="numpy")["id"].tolist()
-    assert runs.table(limit=3, kind="numpy")["id"].tolist() == ids[-3:]
+    table = runs.table(kind="numpy")
+    assert table["ball.stone.restitution"].tolist() == [0.2, 0.2, 0.8, 0.8]  # by their values, not as they were added
+    assert table["solver.dt"].tolist() == [0.005, 0.01, 0.005, 0.01]
+    last = runs.table(limit=2, kind="numpy")  # those that were added last
+    assert last["ball.stone.restitution"].tolist() == [0.8, 0.8]
     steps = runs.table(sort=["-solver.dt", "ball.stone.restitution"], kind="numpy")
     assert steps["solver.dt"].tolist() == [0.01, 0.01, 0.005, 0.005]
     assert steps["ball.stone.restitution"].tolist() == [0.2, 0.8, 0.2, 0.8]
@@ -254,11 +257,11 @@ def test_table_is_written_as_parquet(study: Path, runs: StoredRuns, tmp_path: Pa
 
 
 def test_column_of_several_types_is_written_as_text(tmp_path: Path) -> None:
-    synthetic(tmp_path, 3, **{"a.b": lambda k: [1, "x", None][k], "a.c": lambda k: [1, 2.5, None][k]})
+    synthetic(tmp_path, 3, **{"a.b": lambda k: [None, 1, "x"][k], "a.c": lambda k: [1, 2.5, None][k]})
     with open_store(tmp_path) as runs:
         assert runs.to_parquet(tmp_path / "t.parquet") == 3
     found = parquet.read_table(tmp_path / "t.parquet").to_pydict()
-    assert (found["a.b"], found["a.c"]) == (["1", "x", None], [1.0, 2.5, None])
+    assert (found["a.b"], found["a.c"]) == ([None, "1", "x"], [1.0, 2.5, None])
 
 
 def test_damaged_cells_have_no_value(tmp_path: Path) -> None:
