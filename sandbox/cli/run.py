@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any
 
 import click
@@ -33,7 +34,7 @@ from sandbox.cli.common import (
     scene_paths,
     suggest_names,
 )
-from sandbox.cli.estimate import print_estimate
+from sandbox.cli.estimate import print_estimate, size_text
 from sandbox.cli.options import (
     OutputOptions,
     engines_option,
@@ -67,6 +68,8 @@ from sandbox.scene.files.overrides import AddressError
 
 MAX_STATED = 5
 """Swept values that a message states"""
+LARGE_STORE = 1e9
+"""bytes of a study that are reported after its first run"""
 MAX_MISSED = 3
 """Missed contacts that are listed below the table of a single run."""
 
@@ -326,6 +329,8 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
 
             def done(index: int, record: RunRecord) -> None:
                 stored = record.stored
+                if not batch.done and not options.is_silent:
+                    _note_size(record, batch.count, options)
                 batch.add(index, record, run_options, is_chosen)
                 name = _name(record.label, stored.engine, dict(record.values))
                 monitor.add(name, seconds=stored.seconds, is_ok=stored.status == "ok", is_stored=record.repeated)
@@ -353,6 +358,19 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
         batch.status = 1
         option = "--on" if options.cluster is not None else "--workers"
         click.echo(f"{option}: {error}; {batch.done} {kept}", err=True)
+
+
+def _note_size(record: RunRecord, count: int, options: _Options) -> None:
+    """After the first run, say how much space all of them take, if it is much."""
+    size = (record.stored.size or 0) * count
+    if options.out is None or size < LARGE_STORE:
+        return
+    free = disk_usage(options.out).free
+    click.echo(
+        f"{count:,} runs of this size take {size_text(size)} in {options.out}, where {size_text(free)} are free; "
+        "--keep summary stores figures and final states without arrays",
+        err=True,
+    )
 
 
 def _report_members(label: str, engine: str, reported: set[tuple[str, str]], options: _Options) -> None:
