@@ -55,6 +55,8 @@ NUMBERS = (
 FIRST = ("id", "scene", "title", "engine")
 FIGURES = ("seed", "status", "reason", *NUMBERS)
 LAST = ("state_hash", "versions")
+WARNINGS = "CASE WHEN json_valid(details) THEN nullif(json_extract(details, '$.warnings'), '[]') END"
+"""Warnings of a run that is ok, a JSON array; null without any"""
 FINAL = {
     "x": "position[0]", "y": "position[1]", "vx": "velocity[0]", "vy": "velocity[1]", "angle": "angle",
     "angular_velocity": "angular_velocity",
@@ -65,7 +67,7 @@ LAST_DETAILS = "SELECT details FROM runs WHERE rowid IN (SELECT max(rowid) FROM 
 """Details of the last run of each scene, whose bodies have columns"""
 MAX_COLUMNS = 2_000
 """of a query of SQLite"""
-MORE = ("created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
+MORE = ("warnings", "created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
 """Further columns that a table has only if they are named"""
 PROGRESS_STEPS = 100_000
 """Instructions of the database between two looks for Ctrl-C, a few milliseconds"""
@@ -150,7 +152,7 @@ class StoredRuns:
         """values of the functions of `--observe`"""
         self.columns = (*self.default_columns(), *settings, "world.seed", *MORE)
         """names of all columns"""
-        sources = {"title": "scene_title", "world.seed": "seed"}
+        sources = {"title": "scene_title", "world.seed": "seed", "warnings": WARNINGS}
         finals = _final_sources([text for (text,) in ends], MAX_COLUMNS - len(self.columns) - 1)
         sources |= finals
         self.columns += tuple(finals)
