@@ -57,6 +57,8 @@ FIGURES = ("seed", "status", "reason", *NUMBERS)
 LAST = ("state_hash", "versions")
 WARNINGS = "CASE WHEN json_valid(details) THEN nullif(json_extract(details, '$.warnings'), '[]') END"
 """Warnings of a run that is ok, a JSON array; null without any"""
+CPU = "CASE WHEN json_valid(details) THEN json_extract(details, '$.cpu') END"
+"""Processor that computed a run"""
 FINAL = {
     "x": "position[0]", "y": "position[1]", "vx": "velocity[0]", "vy": "velocity[1]", "angle": "angle",
     "angular_velocity": "angular_velocity",
@@ -67,7 +69,9 @@ LAST_DETAILS = "SELECT details FROM runs WHERE rowid IN (SELECT max(rowid) FROM 
 """Details of the last run of each scene, whose bodies have columns"""
 MAX_COLUMNS = 2_000
 """of a query of SQLite"""
-MORE = ("warnings", "created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
+PROVENANCE = ("settings", "created", "cpu")
+"""Columns that a file has beside those of a table"""
+MORE = ("warnings", "created", "cpu", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
 """Further columns that a table has only if they are named"""
 PROGRESS_STEPS = 100_000
 """Instructions of the database between two looks for Ctrl-C, a few milliseconds"""
@@ -152,7 +156,7 @@ class StoredRuns:
         """values of the functions of `--observe`"""
         self.columns = (*self.default_columns(), *settings, "world.seed", *MORE)
         """names of all columns"""
-        sources = {"title": "scene_title", "world.seed": "seed", "warnings": WARNINGS}
+        sources = {"title": "scene_title", "world.seed": "seed", "warnings": WARNINGS, "cpu": CPU}
         finals = _final_sources([text for (text,) in ends], MAX_COLUMNS - len(self.columns) - 1)
         sources |= finals
         self.columns += tuple(finals)
@@ -409,11 +413,13 @@ class StoredRuns:
     def to_csv(self, path: str | Path, where: str | None = None, columns: Sequence[str] | None = None) -> int:
         """Write runs as a CSV file, and return their number; cells without a value are empty.
 
+        The default columns are those of `table`, and `settings` (JSON), `created` and `cpu`.
+
         Raises:
             QueryError: the filter or a name is wrong.
             OSError: the file cannot be written.
         """
-        found = self.arrays(where, columns)
+        found = self.arrays(where, columns or (*self.default_columns(), *PROVENANCE))
         with atomic_write(Path(path)) as temporary, temporary.open("x", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(found)
@@ -423,6 +429,8 @@ class StoredRuns:
     def to_parquet(self, path: str | Path, where: str | None = None, columns: Sequence[str] | None = None) -> int:
         """Write runs as a Parquet file, and return their number. It needs pyarrow, the extra `parquet`.
 
+        The default columns are those of `to_csv`.
+
         Raises:
             QueryError: the filter or a name is wrong.
             OSError: the file cannot be written.
@@ -431,7 +439,7 @@ class StoredRuns:
         import pyarrow
         from pyarrow import parquet
 
-        found = self.arrays(where, columns)
+        found = self.arrays(where, columns or (*self.default_columns(), *PROVENANCE))
         cells = {name: [row[k] for row in cell_rows(found)] for k, name in enumerate(found)}
         typed = {name: _one_type(values) for name, values in cells.items()}
         with atomic_write(Path(path)) as temporary:

@@ -17,6 +17,7 @@ from sandbox.batch.observables import observed_values
 from sandbox.batch.stored_run import StoredRun
 from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
+from sandbox.provenance import machine
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
@@ -232,6 +233,7 @@ def details_of(run: Trajectory, scene: Scene, has_game: bool) -> dict[str, Any]:
         "game": {key: game.get(key) for key in GAME} if has_game else None,
         "ledger": to_json(ledger_of(run, scene).document()) if len(run.energy) else None,
         "final": _final_states(run),
+        "cpu": machine()["cpu"],
     }
 
 

@@ -27,6 +27,7 @@ from sandbox.batch.store import Store, StoreError
 from sandbox.batch.stored_run import StoredRun
 from sandbox.cli.main import call
 from sandbox.measure.proportion import wilson_interval
+from sandbox.provenance import machine
 from sandbox.scene.description.world import Settings
 from tests.batch.test_store import sample_run
 from tests.environment import with_root_on_path
@@ -252,6 +253,10 @@ def test_table_is_written_as_parquet(study: Path, runs: StoredRuns, tmp_path: Pa
     target = tmp_path / "table.parquet"
     assert call(["export", str(study), "--runs", "--to", str(target), "--quiet"]) == 0
     found = parquet.read_table(target).to_pydict()
+    assert set(found["cpu"]) == {machine()["cpu"]}
+    assert json.loads(found["settings"][0])["dt"] == found["solver.dt"][0]
+    assert all(json.loads(each)["sandbox"].startswith("0.") for each in found["versions"])
+    assert len(found["created"]) == len(runs)
     for name, values in runs.table(kind="numpy").items():
         assert found[name] == [None if value != value else value for value in values.tolist()]
 
