@@ -43,6 +43,7 @@ from sandbox.batch.executors import (
     RunTask,
     TaskLostError,
     VersionMismatchError,
+    mismatch_text,
 )
 from sandbox.batch.job import (
     CompletedRun,
@@ -324,9 +325,7 @@ class Driver:
         except TaskLostError as error:
             outcomes, lost = error.outcomes, error
         except VersionMismatchError as error:
-            raise ExecutorError(
-                f"a worker has other versions, so its runs would differ: {error}; install the same ones there"
-            ) from None
+            raise ExecutorError(mismatch_text(str(error))) from None
         except ExecutorError:
             raise
         except CancelledError:

@@ -179,7 +179,7 @@ def outcomes_of(task: AnyTask) -> Iterator[JobOutcome]:
     Raises:
         VersionMismatchError: this worker has other versions.
     """
-    differences = _version_differences(task.versions)
+    differences = version_differences(task.versions)
     if differences:
         raise VersionMismatchError(differences)
     yield from task.outcomes()
@@ -198,11 +198,16 @@ def _outcome(job: Job, options: RunOptions) -> JobOutcome:
         return JobFailure(_located(error))
 
 
-def _version_differences(wanted: Mapping[str, str]) -> str:
+def version_differences(wanted: Mapping[str, str]) -> str:
     """Return the versions of this process that differ from the wanted ones; empty if none do."""
     own = versions()
     names = [name for name in {**wanted, **own} if wanted.get(name) != own.get(name)]
     return ", ".join(f"{name} {own.get(name, 'missing')} instead of {wanted.get(name, 'none')}" for name in names)
+
+
+def mismatch_text(differences: str) -> str:
+    """Return the message about a worker with other versions, from these differences."""
+    return f"a worker has other versions, so its runs would differ: {differences}; install the same ones there"
 
 
 def _located(error: Exception) -> str:
