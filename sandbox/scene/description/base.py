@@ -93,8 +93,8 @@ class Part(BaseModel):
     if not TYPE_CHECKING:  # type checkers derive the arguments from the fields
 
         def __init__(self, /, **data: Any) -> None:
-            try:
-                super().__init__(**data)
+            try:  # what `BaseModel.__init__` does, without a second call, as games make many actions
+                self.__pydantic_validator__.validate_python(data, self_instance=self)
             except ValidationError as error:
                 raise self._error_of(error) from None
 
