@@ -118,7 +118,11 @@ def _for_python(schema: Any) -> Any:
         return [_for_python(each) for each in schema]
     if not isinstance(schema, dict) or schema.get("type") == "json-or-python":  # that of an inner part
         return schema
+    inner = schema.get("choices") if schema.get("type") == "union" else None
     schema = {key: _for_python(value) for key, value in schema.items()}
+    if inner is not None:  # the locations of faults have the names of the types as before
+        pairs = zip(inner, schema["choices"], strict=True)
+        schema["choices"] = [(new, old["type"]) if _is_replaced(old, new) else new for old, new in pairs]
     if schema.get("type") == "tuple":
         lax = core_schema.no_info_before_validator_function(_ordered, {**schema, "strict": False})
     elif schema.get("type") in ("int", "bool"):
@@ -126,6 +130,10 @@ def _for_python(schema: Any) -> Any:
     else:
         return schema
     return core_schema.json_or_python_schema(schema, lax)
+
+
+def _is_replaced(old: Any, new: Any) -> bool:
+    return isinstance(old, dict) and isinstance(new, dict) and old["type"] != new["type"]
 
 
 def _ordered(value: Any) -> Any:
