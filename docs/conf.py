@@ -21,8 +21,11 @@ extensions = [
     "sphinx_click",
     "sphinx_design",
     "sphinx_copybutton",
+    "answers",
     "api_docstrings",
     "generated",
+    "hidden_directives",
+    "lesson_notebooks",
     "mathml",
 ]
 
@@ -51,6 +54,8 @@ napoleon_numpy_docstring = False
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 html_title = f"sandbox {version}"
 exclude_patterns = ["_build"]
 copybutton_exclude = ".linenos, .gp, .go"  # prompts and output stay out of what is copied

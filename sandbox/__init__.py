@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     )
     from sandbox.engines.reference.integrators import (
         INTEGRATORS as INTEGRATORS,
+        add_integrator as add_integrator,
     )
     from sandbox.engines.registry import (
         ENGINES as ENGINES,
@@ -323,7 +324,7 @@ _NAMES = {
     "sandbox.engines.exact.tabletop.shot_result": "ShotEvent ShotResult",
     "sandbox.engines.exact.tabletop.shots": "ShotBatch Table",
     "sandbox.engines.reference.integrate": "IntegrationResult integrate",
-    "sandbox.engines.reference.integrators": "INTEGRATORS",
+    "sandbox.engines.reference.integrators": "INTEGRATORS add_integrator",
     "sandbox.engines.registry": "ENGINES UnknownEngineError",
     "sandbox.engines.segment": "Checkpoint",
     "sandbox.engines.switching": "SwitchableSimulation start",

@@ -82,6 +82,16 @@ def _first_overlap(new_velocity: bool) -> tuple[int, float]:
     return n, -height
 
 
+def _largest_error(step: float) -> float:
+    """Return the largest error of semi-implicit Euler in the first second of a swing of 0.1 m and 1 Hz, m."""
+    position, velocity, largest = 0.1, 0.0, 0.0
+    for n in range(1, round(1.0 / step) + 1):
+        velocity -= step * 4.0 * math.pi**2 * position
+        position += step * velocity
+        largest = max(largest, abs(position - 0.1 * math.cos(2.0 * math.pi * n * step)))
+    return largest
+
+
 _EXERCISES: Mapping[str, Exercise] = {
     "loop-1": Exercise(
         "After how many steps of 0.01 s is the first contact found?",
@@ -176,6 +186,66 @@ _EXERCISES: Mapping[str, Exercise] = {
         lambda: 0.02 / 200.0,
         {"the relative speed counts": lambda: 0.02 / 100.0},
     ),
+    "order-1": Exercise(
+        "Which order does semi-implicit Euler have between 0.2 s and 0.1 s?",
+        "",
+        lambda: math.log2(_largest_error(0.2) / _largest_error(0.1)),
+        {
+            "the logarithm to base 2 is the order": lambda: _largest_error(0.2) / _largest_error(0.1),
+            "that is the order for short steps": lambda: 1.0,
+        },
+    ),
+    "kepler-1": Exercise(
+        "Which speed at the start gives a circular orbit at radius 0.5?",
+        "",
+        lambda: math.sqrt(1.0 / 0.5),
+        {"with that speed it escapes": lambda: math.sqrt(2.0 / 0.5), "that is the orbit of the scene": lambda: 3**0.5},
+    ),
+    "kepler-3": Exercise(
+        "Which area does the line from the sun to the planet sweep in one step of 0.002 s?",
+        "",
+        lambda: 0.5 * math.sqrt(0.75) * 0.002,
+        {"a triangle has half of base times height": lambda: math.sqrt(0.75) * 0.002},
+    ),
+    "stacks-1": Exercise(
+        "Which force does the contact under box 10 transmit?",
+        "N",
+        lambda: 11 * G,
+        {"box 10 is carried, too": lambda: 10 * G, "the contact carries the boxes above it": lambda: 9 * G},
+    ),
+    "billiards-1": Exercise(
+        "How fast is the ball when it rolls?",
+        "m/s",
+        lambda: 2.0 * 5.0 / 7.0,
+        {"that is the speed of a disc": lambda: 2.0 * 2.0 / 3.0},
+    ),
+    "springs-1": Exercise(
+        "Which stiffness is stable for a mass of 0.1 kg at 240 steps a second?",
+        "N/m",
+        lambda: 4.0 * 0.1 * 240.0**2,
+        {
+            "the limit is at ω h = 2, not 1": lambda: 0.1 * 240.0**2,
+            "the step counts squared": lambda: 4.0 * 0.1 * 240.0,
+        },
+    ),
+    "springs-2": Exercise(
+        "How many times √(k/m) is the ω of two equal masses on one spring?",
+        "",
+        lambda: math.sqrt(2.0),
+        {"half the mass is twice ω², not ω": lambda: 2.0, "the reduced mass is half of m": lambda: math.sqrt(0.5)},
+    ),
+    "machines-1": Exercise(
+        "Which mass of `pull` holds the load of the right pair in balance?",
+        "kg",
+        lambda: 2.0 / 2.0,
+        {"the load hangs on two strands": lambda: 2.0},
+    ),
+    "machines-2": Exercise(
+        "When does the rope of the left pair become taut, with 0.2 m of slack?",
+        "s",
+        lambda: math.sqrt(2.0 * 0.1 / G),
+        {"both bodies fall, each by half of the slack": lambda: math.sqrt(2.0 * 0.2 / G)},
+    ),
     "penalty-1": Exercise("How stiff must the spring be for a depth of 1 mm at rest?", "N/m", lambda: G / 1e-3),
     "penalty-2": Exercise(
         "Which is the longest step that has ten steps in a contact?",
@@ -188,6 +258,87 @@ _EXERCISES: Mapping[str, Exercise] = {
         "m",
         lambda: 1e3 * G / (4.0 * G / 1e-3),
         {"four contacts share the weight": lambda: 1e3 * G / (G / 1e-3)},
+    ),
+    "ragdoll-1": Exercise(
+        "How many degrees of freedom has the figure?",
+        "",
+        lambda: 15 * 3 - 14 * 2,
+        {
+            "a pivot takes two degrees of freedom, not one": lambda: 15 * 3 - 14,
+            "a segment can turn, too": lambda: 15 * 2 - 14 * 2,
+            "a limit takes none": lambda: 15 * 3 - 14 * 3,
+        },
+        is_count=True,
+    ),
+    "ragdoll-2": Exercise(
+        "How fast do both discs turn after the limit, if the first had 10 rad/s, and the second has twice its radius "
+        "and three times its mass?",
+        "rad/s",
+        lambda: 10.0 / (1.0 + 3.0 * 2.0**2),
+        {
+            "the moment of inertia grows with the square of the radius": lambda: 10.0 / (1.0 + 3.0 * 2.0),
+            "that is the speed for equal radii": lambda: 10.0 / (1.0 + 3.0),
+        },
+    ),
+    "ragdoll-3": Exercise(
+        "How large may a step be so that a shank at 20 rad/s never passes the limit by more than 1°?",
+        "s",
+        lambda: math.radians(1.0) / 20.0,
+        {"1° is 0.01745 rad": lambda: 1.0 / 20.0},
+    ),
+    "cloth-1": Exercise(
+        "How much longer does a column of a cloth of 24 rows become?",
+        "m",
+        lambda: 0.002 * G / 100.0 * 23 * 24 / 2,
+        {
+            "the top row is fixed": lambda: 0.002 * G / 100.0 * 24 * 25 / 2,
+            "the lower springs carry less than the first": lambda: 0.002 * G / 100.0 * 23**2,
+        },
+    ),
+    "cloth-2": Exercise(
+        "Which step is stable for springs of 400 N/m?",
+        "s",
+        lambda: math.sqrt(0.002 / 400.0),
+        {
+            "the highest frequency is twice that of one mass on one spring": lambda: 2.0 * math.sqrt(0.002 / 400.0),
+            "the square root of the stiffness counts": lambda: math.sqrt(0.002 / 100.0) / 4.0,
+        },
+    ),
+    "cloth-3": Exercise(
+        "How heavy may a node be so that the cloth holds if it is loaded slowly?",
+        "kg",
+        lambda: 8.0 / (21 * G),
+        {
+            "the top row is fixed": lambda: 8.0 / (22 * G),
+            "that is the mass for a sudden load": lambda: 4.0 / (21 * G),
+        },
+    ),
+    "artillery-1": Exercise(
+        "How far does the shell of 65 m/s fly at most without drag?",
+        "m",
+        lambda: 65.0**2 / G,
+        {"that is the greatest height of a vertical shot": lambda: 65.0**2 / (2.0 * G)},
+    ),
+    "artillery-2": Exercise(
+        "At which lower angle does it hit a target at 210 m without drag?",
+        "degrees",
+        lambda: math.degrees(math.asin(210.0 * G / 65.0**2)) / 2.0,
+        {
+            "that is twice the angle": lambda: math.degrees(math.asin(210.0 * G / 65.0**2)),
+            "that is the higher angle": lambda: 90.0 - math.degrees(math.asin(210.0 * G / 65.0**2)) / 2.0,
+        },
+    ),
+    "artillery-3": Exercise(
+        "Which terminal velocity has a body in air with a drag of 0.2 1/s?",
+        "m/s",
+        lambda: G / 0.2,
+        {"that is the velocity for 0.05 1/s": lambda: G / 0.05},
+    ),
+    "artillery-4": Exercise(
+        "How far off is a shot of 65 m/s at 30° with explicit Euler and a step of 0.05 s?",
+        "m",
+        lambda: 0.05 * 65.0 * math.cos(math.radians(30.0)),
+        {"the horizontal part of the velocity counts": lambda: 0.05 * 65.0},
     ),
     "newtons_cradle-2": Exercise(
         "Which speed has the heavy ball at the end?",

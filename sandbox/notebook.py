@@ -62,9 +62,9 @@ def html_of(value: object) -> str:
         raise TypeError(f"no display for {type(value).__name__}")
     module, function, height = _PAGES[name]
     page_of: PageOf = getattr(import_module(module), function)
-    text = _frame(page_of(value), height)
+    text = frame(page_of(value), height)
     if len(text) > MAX_CHARACTERS:
-        text = _frame(page_of(value, **_without_replay(name)), height)
+        text = frame(page_of(value, **_without_replay(name)), height)
     return text
 
 
@@ -73,8 +73,13 @@ def _without_replay(name: str) -> dict[str, Any]:
     return {"replayed": False} if name in ("Trajectory", "Comparison", "ShotResult") else {}
 
 
-def _frame(page: "Page", height: int) -> str:
-    """Return a page as a frame: scripts run, but have no access to the notebook around it."""
+def frame(page: "Page", height: int) -> str:
+    """Return a page as a frame: its scripts run, but have no access to the page around it.
+
+    Args:
+        page: the page.
+        height: height until the page has reported its own, px.
+    """
     document, title = html.escape(page.html(compact=True)), html.escape(page.title)
     style = f"box-sizing: border-box; width: 100%; height: {height}px; border: 1px solid #8886; border-radius: 6px"
     # the listener comes first, because the page may report its height at once
@@ -104,6 +109,12 @@ def live(
         Refusal: the engine does not support something that the scene needs.
         ValueError: a slider is invalid.
         ImportError: anywidget is not installed.
+
+    Example:
+        >>> widget = sandbox.live("bounce", sliders=["ball.ball.restitution=0:1"])
+        >>> widget.simulation.engine
+        'pymunk'
+        >>> widget.close()
     """
     try:
         from sandbox.interactive.widget import LiveWidget

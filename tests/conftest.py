@@ -72,6 +72,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         config.hook.pytest_deselected(items=others)
 
 
+@pytest.fixture
+def own_integrators() -> Iterator[None]:
+    """Remove the integrators that a test adds."""
+    from sandbox.engines.reference.integrators import INTEGRATORS
+    from sandbox.scene.description.world import ADDED_INTEGRATORS
+
+    yield
+    for name in ADDED_INTEGRATORS:
+        del INTEGRATORS[name]  # type: ignore[arg-type]  # added at run time
+    ADDED_INTEGRATORS.clear()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Iterator[None]:
     """Measure the compilation of kernels during a test: any test may be the first to need one."""

@@ -10,6 +10,7 @@ from typing import get_args, get_type_hints
 
 from gallery import gallery
 from python_tables import classes, model_fields
+from replays import replay
 from scene_tables import cell, scene_overview, scene_tables, top_keys
 
 import sandbox
@@ -252,4 +253,5 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "store-columns": store_columns,
     "stored-arrays": stored_arrays,
     "gallery": gallery,
+    "replay": replay,
 }

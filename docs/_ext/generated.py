@@ -4,7 +4,10 @@
     ```
 
 stands for the Markdown that the generator `scene` returns for the arguments `ball` and `grid`. It replaces the block
-before the page is parsed, so that headings, anchors and the table of contents come out as in a hand-written page.
+before the page is parsed, so that headings, anchors and the table of contents come out as in a hand-written page. Where
+the page is read without the site, such as in a repository, an HTML comment in place of the block stays invisible:
+
+    <!-- generated: replay bounce --sweep solver.dt=0.001,0.01 -->
 """
 
 import re
@@ -13,7 +16,9 @@ from typing import Any
 
 from code_tables import GENERATORS
 
-BLOCK = re.compile(r"^```\{generated\}[ ]*(?P<words>[^\n]*)\n```$", re.MULTILINE)
+BLOCK = re.compile(
+    r"^(?:```\{generated\}[ ]*(?P<words>[^\n]*)\n```|<!-- generated: (?P<hidden>[^\n]*) -->)$", re.MULTILINE
+)
 
 
 def generate(words: str) -> str:
@@ -33,7 +38,7 @@ def generate(words: str) -> str:
 
 def expand(text: str) -> str:
     """Return the text of a page with all blocks replaced."""
-    return BLOCK.sub(lambda block: generate(block["words"]), text)
+    return BLOCK.sub(lambda block: generate(block["words"] or block["hidden"] or ""), text)
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -50,4 +55,4 @@ def _expand_page(_: Any, __: str, source: list[str]) -> None:
 def _is_generated(env: Any, page: str) -> bool:
     """Return whether a page has such blocks: those pages are read at every build, as the code may have changed."""
     path = Path(env.doc2path(page))
-    return path.suffix == ".md" and "{generated}" in path.read_text(encoding="utf-8")
+    return path.suffix == ".md" and BLOCK.search(path.read_text(encoding="utf-8")) is not None

@@ -532,6 +532,13 @@ def open_store(directory: str | Path) -> StoredRuns:
 
     Raises:
         StoreError: the folder has no store, or it cannot be read.
+
+    Example:
+        After `sandbox run gas --seeds 3 --set world.duration=0.1 --out study`:
+
+        >>> with sandbox.open_store("study") as runs:
+        ...     len(runs), runs.statuses()
+        (3, {'ok': 3})
     """
     return StoredRuns(directory)
 

@@ -1,5 +1,6 @@
 """Progress of a command on standard error: a status line, or bars. Only on a terminal, and not with `--quiet`."""
 
+import os
 import sys
 from collections import deque
 from collections.abc import Iterator
@@ -18,6 +19,14 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 
+def has_terminal() -> bool:
+    """Return whether standard error is a terminal that can replace its lines.
+
+    A command in a cell of a Jupyter notebook has a terminal, but each change of a line is added to the cell's output.
+    """
+    return sys.stderr.isatty() and "JPY_PARENT_PID" not in os.environ
+
+
 @contextmanager
 def status_line(silent: bool) -> Iterator[ProgressCallback | None]:
     """Show a line with the current activity, which vanishes at the end; yield the function that sets it.
@@ -25,7 +34,7 @@ def status_line(silent: bool) -> Iterator[ProgressCallback | None]:
     Args:
         silent: show nothing, and yield None.
     """
-    if silent or not sys.stderr.isatty():
+    if silent or not has_terminal():
         yield None
         return
     from rich.console import Console
@@ -79,7 +88,7 @@ def progress_bars(silent: bool, has_estimate: bool = True) -> Iterator[ProgressB
         silent: show nothing.
         has_estimate: show an estimate of the remaining time, otherwise the elapsed time.
     """
-    if silent or not sys.stderr.isatty():
+    if silent or not has_terminal():
         yield ProgressBars()
         return
     from rich.console import Console
@@ -110,7 +119,7 @@ class RunMonitor:
 
     def __init__(self, total: int, silent: bool) -> None:
         self._total, self._silent = total, silent
-        self._is_terminal = sys.stderr.isatty()
+        self._is_terminal = has_terminal()
         self._done = self._failed = self._stored = 0
         self._running, self._fraction = "", 0.0
         self._slowest: tuple[float, str] = (0.0, "")

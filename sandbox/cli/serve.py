@@ -34,6 +34,18 @@ class ServeOptions:
     opens: bool
 
 
+class AddressType(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
+    """Address to listen at."""
+
+    name = "address"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the address; an empty one, which would mean every network, is an error."""
+        if not value.strip():
+            self.fail("must be an address, such as 127.0.0.1, or 0.0.0.0 for all networks", param, ctx)
+        return value.strip()
+
+
 @click.command(name="serve")
 @click.argument("scene")
 @click.option("--engine", metavar="NAME", help="engine to start with; default: exact for billiards, otherwise pymunk")
@@ -48,6 +60,7 @@ class ServeOptions:
 @click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="port; default: a free one")
 @click.option(
     "--host",
+    type=AddressType(),
     default="127.0.0.1",
     metavar="ADDRESS",
     help="address to listen at; default: this machine only. Others, such as 0.0.0.0, need the token that is printed",

@@ -76,7 +76,9 @@ def new_console() -> "Console":
     """Return a console of the terminal's width, or `WIDTH_WITHOUT_TERMINAL`."""
     from rich.console import Console
 
-    return Console(width=terminal_width() or WIDTH_WITHOUT_TERMINAL)
+    # With a height too, rich keeps to this width on a terminal of TERM=dumb, whose size it assumes otherwise.
+    height = shutil.get_terminal_size().lines
+    return Console(width=terminal_width() or WIDTH_WITHOUT_TERMINAL, height=height)
 
 
 def print_table(table: "Table", keys: int = 1) -> None:

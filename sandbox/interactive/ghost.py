@@ -1,11 +1,13 @@
 """Ghost: a second run beside a live scene, on another engine or with another time step, with the same actions."""
 
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from sandbox.action import Action, ActionError, Switch
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.engines.switching import SwitchableSimulation
@@ -58,14 +60,16 @@ class Ghost:
             self.ended = str(error)
         self._before = self._after = self._simulation.frame()
 
-    def follow(self, time: float) -> None:
-        """Make the steps up to a time, s."""
-        dt = self.dt
+    def follow(self, time: float, limit: float) -> None:
+        """Make the steps up to a time, s; a ghost that needs a longer computing time than `limit`, s, ends."""
+        dt, until, compiled = self.dt, perf_counter() + limit, COMPILE_CLOCK.seconds
         try:
             while self.ended is None and self._simulation.time < time - 1e-9 * dt:
                 self._before = self._after
                 self._simulation.step()
                 self._after = self._simulation.frame()
+                if perf_counter() > until + COMPILE_CLOCK.seconds - compiled:
+                    self.ended = f"its steps of {dt:.3g} s take longer than {limit:g} s for one of the scene"
         except (Divergence, Exhaustion) as error:
             self.ended = str(error)
 

@@ -85,7 +85,7 @@ class LiveScene:
         """number of changes of what `state` returns"""
         self.picture_revision = 0
         """number of changes of `picture`"""
-        self.picture = Picture(self._file, find_view(self._file, self.simulation.engine, settings))
+        self.picture = Picture(self._file, find_view(self._file, self.simulation.engine, self.simulation.wanted))
         self._before: Frame = self.simulation.frame()  # drawn are states between these two
         self._after: Frame = self._before
 
@@ -133,7 +133,7 @@ class LiveScene:
 
     def _follow(self, ghost: Ghost) -> None:
         ended = ghost.ended
-        ghost.follow(self._after.time)
+        ghost.follow(self._after.time, STEP_TIMEOUT)
         self.revision += ghost.ended != ended
 
     def play(self, on: bool) -> None:

@@ -444,6 +444,16 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
 
     Yields:
         The recordings, which grow with each step.
+
+    Example:
+        >>> import pymunk
+        >>> space = pymunk.Space()
+        >>> space.add(ball := pymunk.Body(1.0, 0.1), pymunk.Circle(ball, 0.5))
+        >>> with sandbox.capture() as game:
+        ...     for _ in range(10):
+        ...         space.step(1 / 60)
+        >>> game.steps, game.recording.scene.solver.dt
+        (10, 0.016666666666666666)
     """
     game, step, add = GameCapture(), pymunk.Space.step, pymunk.Space.add
 

@@ -159,6 +159,17 @@ def from_pymunk(
 
     Raises:
         CaptureError: a body or a value is out of the range of scenes, or `strict` is set and something is left out.
+
+    Example:
+        >>> import pymunk
+        >>> space = pymunk.Space()
+        >>> space.gravity = 0, -9.81
+        >>> ball = pymunk.Body(1.0, 0.1)
+        >>> ball.position = 0, 5
+        >>> space.add(ball, pymunk.Circle(ball, 0.5))
+        >>> scene = sandbox.from_pymunk(space, dt=1 / 60, duration=1.0)
+        >>> scene.balls[0].position
+        (0.0, 5.0)
     """
     captured = capture_space(space, dt=dt, duration=duration, title=title, names=names)
     if strict and captured.omitted:

@@ -221,10 +221,10 @@ def _draw_total_energy(panel: Axes, comparison: Comparison, detail: ChartDetail 
     """Draw the total energy of each engine and of the truth, on an axis that holds the truth."""
     scene, truth = comparison.scene, comparison.best
     totals = {name: energies(run, scene).total for name, run in comparison.trajectories.items()}
-    for (name, index), width in zip(
-        _drawn_indices(comparison).items(), _widths(comparison, detail.width), strict=False
+    for k, ((name, index), width) in enumerate(
+        zip(_drawn_indices(comparison).items(), _widths(comparison, detail.width), strict=False)
     ):
-        run, style = comparison.trajectories[name], {"lw": width, "alpha": OPACITY, "gid": f"css:line e{index}"}
+        run, style = comparison.trajectories[name], {"lw": width, "alpha": OPACITY, "gid": _line_class(index, k)}
         draw(panel, run.time, totals[name], COLOURS[index], detail.max_points, **style)
     true_energy = None
     if truth is not None:
@@ -284,6 +284,11 @@ def _drawn_indices(comparison: Comparison) -> dict[str, int]:
     return {name: indices[name] for name in comparison.trajectories}
 
 
+def _line_class(colour: int, run: int) -> str:
+    """Return the class in a page of the curve of a run: more than six runs share colours, but not numbers."""
+    return f"css:line e{colour} run{run}"
+
+
 def _labels(comparison: Comparison) -> dict[str, str]:
     """Return the label of each row by its name: without the engine if all rows have the same one."""
     has_engines = len({row.engine for row in comparison.rows}) > 1
@@ -319,11 +324,11 @@ def _draw_log(
     smallest = min((float(values.min()) for values in positive if len(values)), default=FLOOR)
     floor = max(FLOOR, 10.0 ** (math.floor(math.log10(smallest)) - 1))
     widths = _widths(comparison, LOG_WIDTH * detail.width)
-    for (name, index), width in zip(_drawn_indices(comparison).items(), widths, strict=False):
+    for k, ((name, index), width) in enumerate(zip(_drawn_indices(comparison).items(), widths, strict=False)):
         if name in curves:
             time, values = curves[name]
             shown = np.where(np.isfinite(values), np.maximum(values, floor), np.nan)
-            style: dict[str, Any] = {"lw": width, "alpha": OPACITY, "gid": f"css:line e{index}"}
+            style: dict[str, Any] = {"lw": width, "alpha": OPACITY, "gid": _line_class(index, k)}
             draw(panel, time, shown, COLOURS[index], detail.max_points, **style)
     if bound is not None:
         panel.axhline(bound, **TOLERANCE_LINE)

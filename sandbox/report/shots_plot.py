@@ -164,7 +164,7 @@ def _draw_rest_position(panel: Axes, offsets: FloatArray, batch: ShotBatch, stru
     for k, axis in enumerate("xy"):
         panel.plot(offsets[stays], batch.position[stays, struck, k], ".", ms=2.4, color=COLOURS[k], label=axis)
     literal(panel.set_ylabel(shortened(f"rest position of {ball}, m", 34)))
-    panel.legend(frameon=False, markerscale=4, loc="upper right", fontsize=9)
+    panel.legend(frameon=True, framealpha=0.9, edgecolor="none", markerscale=4, loc="upper right", fontsize=9)
     panel.spines[["top", "right"]].set_visible(False)
     panel.grid(color="#e4e4e4", lw=0.6)
 

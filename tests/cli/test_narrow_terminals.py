@@ -26,6 +26,8 @@ COMMANDS = (
     "scenes",
     "engines",
     "check SCENE",
+    "runs study",
+    "runs study --by solver.dt",
 )
 
 
@@ -47,7 +49,10 @@ def test_lines_fit_and_words_are_whole(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = command.replace("SCENE", Path(write_scene(tmp_path, TWO_BALLS)).name).split()
+    scene = Path(write_scene(tmp_path, TWO_BALLS)).name
+    words = command.replace("SCENE", scene).split()
+    if words[0] == "runs":
+        assert lines_of(capfd, "run", scene, "--sweep", "solver.dt=0.01,0.005", "--out", "study")[0] == 0
     set_terminal(monkeypatch, 1000)
     status, wide, _ = lines_of(capfd, *words)
     for width in WIDTHS:

@@ -32,6 +32,7 @@ def test_serve_prints_its_address_and_ends_with_ctrl_c(tmp_path) -> None:
         (["--slider", "ball.zzz.radius"], 2, "--slider"),
         (["--port", "99999"], 2, "99999"),
         (["--host", "203.0.113.7", "--port", "1"], 2, "203.0.113.7"),
+        (["--host", ""], 2, "--host"),
     ],
 )
 def test_faults_of_options_are_reported(options, status, words, tmp_path, capfd) -> None:

@@ -24,6 +24,7 @@ def _is_slow(page: Path) -> bool:
 
 
 @pytest.mark.timeout(1200)  # a page with measurements on a busy machine
+@pytest.mark.usefixtures("own_integrators")
 @pytest.mark.parametrize("page", _parameters())
 def test_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     assert list(run_page(page, tmp_path)) == []

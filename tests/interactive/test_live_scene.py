@@ -7,9 +7,10 @@ import pytest
 
 from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import start
+from sandbox.interactive import live_scene as module
 from sandbox.interactive.live_scene import LiveScene
 from sandbox.measure.run.runner import run
-from sandbox.scene.files.load import loads
+from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.overrides import AddressError
 from tests.interactive.conversation import SCENE, Conversation
 
@@ -322,3 +323,20 @@ def test_invalid_request_is_answered_and_changes_nothing(request_text: str) -> N
 def test_scene_that_an_engine_refuses_is_not_started() -> None:
     with pytest.raises(Refusal):
         LiveScene(loads(SCENE), engine="exact")
+
+
+def test_ghost_that_takes_too_long_ends_and_the_scene_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "STEP_TIMEOUT", 0.0)
+    talk = Conversation()
+    talk.ask(type="ghost", engine="pymunk", dt_fraction=0.01)
+    talk.ask(type="step", count=1)
+    assert "longer than 0 s" in talk.reply["state"]["ghost"]["ended"]
+    assert talk.reply["state"]["ended"] is None
+
+
+def test_penalty_contacts_start_with_their_settings() -> None:
+    scene = load("rest_depth", ["solver.response=penalty", "solver.damping=1"])
+    live = LiveScene(scene, "reference", ["solver.stiffness"])
+    live.step(3)
+    assert live.frame.position.tolist() == run(scene, engine="reference", audit=False).position[3].tolist()
+    live.close()

@@ -16,13 +16,15 @@ contains the external forces: gravity, air, constant forces, and penalty contact
 """
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from math import log2
+from typing import NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.echo import short_repr
 from sandbox.engines.forces.air import Air, air_accelerations
-from sandbox.scene.description.world import IntegratorName
+from sandbox.scene.description.world import ADDED_INTEGRATORS, IntegratorName
 
 State: TypeAlias = FloatArray
 """(2, N, D) poses, m and rad, and rates, m/s and rad/s"""
@@ -185,6 +187,95 @@ INTEGRATORS: dict[IntegratorName, Integrator] = {
     "leapfrog": Integrator(leapfrog, order=2, fraction=0.5),
     "rk4": Integrator(runge_kutta(CLASSIC_4), order=4, fraction=0.5),
 }
+
+
+def add_integrator(step: Step, name: str | None = None) -> IntegratorName:
+    """Add an integrator of one's own to the engine `reference`, for this process; the same name replaces it.
+
+    Settings, `run`, `compare` and `integrate` accept its name from then on. The order and `fraction` are measured on an
+    oscillator and a fall. Steps with it are not compiled.
+
+    Args:
+        step: function step(f, t, x, u, h) that returns the state after a step h, s; f(t, x, u) is the derivative of the
+            state x, whose x[0] are positions and x[1] velocities, of any shape. It must not change x.
+        name: name in settings; default: that of the function.
+
+    Returns:
+        The name.
+
+    Raises:
+        ValueError: the name is that of a built-in integrator or not an identifier, or the function does not return a
+            finite state of the shape of x, changes x, or does not converge.
+
+    Example:
+        >>> def midpoint(f, t, x, u, h):
+        ...     return x + h * f(t + h / 2, x + h / 2 * f(t, x, u), u)
+        >>> sandbox.add_integrator(midpoint)
+        'midpoint'
+        >>> sandbox.run("spring", engine="reference", integrator="midpoint").status
+        'ok'
+    """
+    name = step.__name__ if name is None else name
+    if name in get_args(IntegratorName) or not name.isidentifier():
+        problem = "is a built-in integrator" if name.isidentifier() else "is not an identifier"
+        raise ValueError(f"name: {short_repr(name)} {problem}; choose another name, such as 'my_step'")
+    integrator = Integrator(step, _measured_order(step, name), _measured_fraction(step, name))
+    added = cast("IntegratorName", name)  # settings accept it from now on
+    INTEGRATORS[added] = integrator
+    ADDED_INTEGRATORS.add(name)
+    return added
+
+
+def _measured_order(step: Step, name: str) -> int:
+    """Return the order of convergence of the position of an oscillator of 1 rad/s after 1 s, without and with damping.
+
+    Raises:
+        ValueError: the error does not decrease with the step.
+    """
+    orders = []
+    for damping in (0.0, 0.3):
+        frequency = (1.0 - damping**2) ** 0.5
+        exact = np.exp(-damping) * (np.cos(frequency) + damping / frequency * np.sin(frequency))
+
+        def oscillator(_: float, x: State, __: Inputs, damping: float = damping) -> State:
+            return np.stack((x[1], -x[0] - 2.0 * damping * x[1]))
+
+        errors = []
+        for count in (8, 16):
+            x = np.array([[[1.0]], [[0.0]]])
+            for k in range(count):
+                x = _checked(step, name, oscillator, k / count, x, 1.0 / count)
+            errors.append(abs(float(x[0, 0, 0]) - float(exact)))
+        orders.append(log2(errors[0] / errors[1]) if min(errors) > 0.0 else 0.0)
+    order = round(min(orders))
+    if order < 1:
+        raise ValueError(
+            f"{name} does not converge: half the step changes the error by a factor of {2 ** -min(orders):.2g}"
+        )
+    return order
+
+
+def _measured_fraction(step: Step, name: str) -> float:
+    """Return `Integrator.fraction`: the position after a step from rest under the acceleration 1, for a step of 1."""
+    moved = _checked(step, name, lambda _, x, __: np.stack((x[1], np.ones_like(x[1]))), 0.0, np.zeros((2, 1, 1)), 1.0)
+    return float(moved[0, 0, 0])
+
+
+def _checked(step: Step, name: str, f: Transition, t: float, x: State, h: float) -> State:
+    """Return the state after a step.
+
+    Raises:
+        ValueError: it is not a finite state, or the function changed the state before.
+    """
+    before = x.copy()
+    moved = step(f, t, x, Inputs(np.zeros((1, 1))), h)
+    if not isinstance(moved, np.ndarray) or moved.shape != x.shape or not np.isfinite(moved).all():
+        raise ValueError(
+            f"{name} returns {short_repr(moved)}; an array of shape {x.shape} with finite numbers is expected"
+        )
+    if not np.array_equal(x, before):
+        raise ValueError(f"{name} changes x; it must return a new array")
+    return moved
 
 
 def amplification(step: Step, frequency: float, damping: float, h: float) -> float:

@@ -112,6 +112,20 @@ def windows(
     Raises:
         NoSuchShotError: the scene has no such shot, ball or pocket.
         Refusal: the exact engine does not support the scene.
+
+    Example:
+        >>> table = sandbox.loads('''
+        ... surface = {}
+        ... ball = [
+        ...     { name = "cue", position = [0, 0], radius = 0.0286 },
+        ...     { name = "red", position = [0.5, 0], radius = 0.0286 },
+        ... ]
+        ... pocket = [{ name = "far", position = [1, 0.1], radius = 0.06 }]
+        ... shot = [{ ball = "cue", aim = 0, speed = 2 }]
+        ... ''')
+        >>> for window in sandbox.windows(table, "red", "far").found:
+        ...     print(f"{window.low:.4f} to {window.high:.4f} rad")
+        -0.0398 to -0.0102 rad
     """
     setup = shot_setup(scene, shot)
     number, hole = setup.ball_index(ball), setup.pocket_index(pocket)

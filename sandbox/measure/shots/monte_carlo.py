@@ -188,6 +188,13 @@ def odds(
         NoSuchShotError: the scene has no such shot.
         Refusal: the exact engine does not support the scene.
         Exhaustion: the intended shot has too many events.
+
+    Example:
+        >>> found = sandbox.odds(sandbox.load("8-ball"), count=20, seed=1)
+        >>> found.count, found.miscues
+        (20, 0)
+        >>> found.any_pot.low < 0.5  # the lower end of the 95 % interval
+        True
     """
     setup = shot_setup(scene, shot)
     spread = Spread() if spread is None else spread

@@ -209,6 +209,11 @@ def horizon(
         Refusal: the exact engine does not support the scene.
         Exhaustion: a shot has too many events.
         ValueError: the perturbation or the tolerance is not positive, or the ball has no room to be moved.
+
+    Example:
+        >>> found = sandbox.horizon(sandbox.load("8-ball"), nudge=1e-3)
+        >>> found.separation.ball is not None  # a ball moves by more than 1 mm, the tolerance
+        True
     """
     if not (nudge > 0.0 and tolerance > 0.0):
         raise ValueError(f"a nudge of {nudge:g} and a tolerance of {tolerance:g} m; both must be greater than 0")

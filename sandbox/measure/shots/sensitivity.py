@@ -107,6 +107,11 @@ def sensitivity(
         NoSuchShotError: the scene has no such shot.
         Refusal: the exact engine does not support the scene.
         Exhaustion: a shot has too many events.
+
+    Example:
+        >>> slope = sandbox.sensitivity(sandbox.load("8-ball"))[1]
+        >>> slope.ball, slope.variable
+        ('1', 'aim')
     """
     setup = shot_setup(scene, shot)
     nominal = setup.simulate()

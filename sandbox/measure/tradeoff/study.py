@@ -133,6 +133,12 @@ def tradeoff(
         TooLargeError: the frames would not fit into memory.
         ValueError: an argument is out of range.
         SettingsError: a setting is invalid.
+
+    Example:
+        >>> found = sandbox.tradeoff("ball", ("pymunk",), tolerance=0.01, effort=0.3, repeats=1)
+        >>> best = found.within_tolerance
+        >>> best.point.error <= 0.01
+        True
     """
     scene, on_progress = as_scene(scene), on_progress or ignore_progress
     engines = [engines] if isinstance(engines, str) else engines

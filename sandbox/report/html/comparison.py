@@ -167,8 +167,35 @@ def truth_sentence(comparison: Comparison) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
+def swept_numbers(comparison: Comparison) -> tuple[str, dict[str, float]] | None:
+    """Return the key whose numbers distinguish the runs, and its value in each row, by name; None: there is none."""
+    values = {row.name: row.set for row in comparison.rows if row.name in comparison.trajectories}
+    keys = {key for each in values.values() for key in each}
+    if len(keys) != 1 or len(values) < 2:
+        return None
+    (key,) = keys
+    numbers = {name: each[key] for name, each in values.items()}
+    if any(isinstance(number, bool) or not isinstance(number, int | float) for number in numbers.values()):
+        return None
+    return key, {name: float(number) for name, number in numbers.items()}
+
+
+def replay_page(comparison: Comparison) -> Page:
+    """Return the replay of a comparison with its charts, and nothing else, for a frame in a page of documentation.
+
+    Raises:
+        ValueError: the comparison has no runs, or they are of different scenes.
+    """
+    if not comparison.trajectories or not comparison.same_scene:
+        raise ValueError("there are no runs of one scene to replay")
+    section = Section("Replay", linked_plots(comparison, "plot"), lead=truth_sentence(comparison))
+    return Page(comparison.scene.title or "Untitled scene", "Comparison", [section])
+
+
 def linked_plots(comparison: Comparison, name: str) -> Markup:
     """Return the replay, and beside it the charts over time, which share a time cursor.
+
+    In a sweep over one number a slider selects its value.
 
     Args:
         comparison: the comparison.
@@ -176,12 +203,13 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
     """
     scene, truth, duration = comparison.scene, comparison.best, comparison.scene.world.duration
     moving, tracks, classes = ~scene.bodies.fixed, [], css_classes(comparison)
+    swept, values = swept_numbers(comparison) or (None, {})
     for row_name, run in comparison.trajectories.items():
         error, row_truth = None, comparison.truth_of(row_name)
         if row_truth is not None:
             found = errors(run, row_truth.trajectory, moving)
             error = found.time, found.position
-        tracks.append(Track(row_name, classes[row_name], run, error))
+        tracks.append(Track(row_name, classes[row_name], run, error, values.get(row_name)))
     names = ", ".join(comparison.trajectories) or "nothing"
     charts = []
     if truth is not None:
@@ -190,7 +218,7 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
         charts.append(time_chart(error_chart(comparison), f"{name}-error", label, duration))
     label = f"total energy, J, against time, of {names}"
     charts.append(time_chart(energy_chart(comparison), f"{name}-energy", label, duration))
-    return fragment(TEMPLATE, "linked_plots", replay(scene, tracks, comparison.trusted_until), charts)
+    return fragment(TEMPLATE, "linked_plots", replay(scene, tracks, comparison.trusted_until, swept), charts)
 
 
 def engines_table(comparison: Comparison) -> Markup:

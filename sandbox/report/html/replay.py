@@ -50,22 +50,27 @@ class Track:
     run: Trajectory
     error: tuple[FloatArray, FloatArray] | None = None
     """times (K,), s, and position errors (K,), m, shown in the legend"""
+    value: float | None = None
+    """value of the swept key, selected by a slider; None: always shown"""
 
 
-def replay(scene: Scene, tracks: Sequence[Track], trusted_until: float | None) -> Markup:
+def replay(scene: Scene, tracks: Sequence[Track], trusted_until: float | None, swept: str | None = None) -> Markup:
     """Return the canvas with its controls, legend and data.
 
     Args:
         scene: scene of all runs.
         tracks: tracks in the order in which they are drawn; the truth last.
         trusted_until: time until which the truth is trusted, s.
+        swept: swept key, whose values a slider selects; the tracks have the values.
     """
-    document = replay_document(scene, tracks, trusted_until)
+    document = replay_document(scene, tracks, trusted_until, swept)
     names = ", ".join(track.name for track in tracks)
     return fragment("replay.html.j2", "replay", scene.title or "this scene", names, tracks, SPEEDS, document)
 
 
-def replay_document(scene: Scene, tracks: Sequence[Track], trusted_until: float | None) -> dict[str, Any]:
+def replay_document(
+    scene: Scene, tracks: Sequence[Track], trusted_until: float | None, swept: str | None = None
+) -> dict[str, Any]:
     """Return the data of the canvas as JSON: static geometry, tracks, times, and a note on omitted parts."""
     moving = np.flatnonzero(~scene.bodies.fixed)
     drawn = moving[:: max(1, math.ceil(len(moving) / MAX_BODIES))]
@@ -90,6 +95,7 @@ def replay_document(scene: Scene, tracks: Sequence[Track], trusted_until: float 
                 "codes": text,
                 "errors": _errors(track, time),
                 "breaks": _breaks(track.run, scene),
+                "value": track.value,
             }
             for track, text in zip(tracks, texts, strict=True)
         ],
@@ -103,6 +109,8 @@ def replay_document(scene: Scene, tracks: Sequence[Track], trusted_until: float 
         "view": [view[0] - origin[0], view[1] - origin[1], view[2] - origin[0], view[3] - origin[1]],
         "speed": _initial_speed(scene.world.duration),
         "note": "; ".join(notes),
+        "swept": swept,
+        "values": sorted({track.value for track in tracks if track.value is not None}),
     }
 
 
@@ -129,14 +137,37 @@ def _encode(track: Track, time: FloatArray, drawn: IntArray, has_angles: bool, b
     run = track.run
     if not len(run.time):
         return compress(np.full((len(time), len(drawn), 3 if has_angles else 2), ABSENT, np.uint16))
-    nearest = _nearest(run.time, time)
-    known = np.abs(run.time[nearest] - time) <= _half_interval(time)
+    before, weight = _neighbours(run.time, time)
     retired = run.retired_time[drawn]
+    known = time <= run.time[-1] + _half_interval(time)
     present = known[:, None] & (np.isnan(retired) | (time[:, None] < retired))
-    codes = encode_positions(run.position[nearest][:, drawn], present, box)
+    codes = encode_positions(_blended(run.position[:, drawn], before, weight), present, box)
     if has_angles:
-        codes = np.concatenate((codes, encode_angles(run.angle[nearest][:, drawn])[..., None]), axis=2)
+        angles = encode_angles(_blended(run.angle[:, drawn], before, weight))
+        codes = np.concatenate((codes, angles[..., None]), axis=2)
     return compress(codes)
+
+
+def _neighbours(times: FloatArray, wanted: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return for each wanted time the index of the frame before it, and the weight of the frame after it.
+
+    A run with a longer step than the replay has fewer frames; its bodies move in straight lines between them.
+    """
+    if len(times) < 2:
+        return np.zeros(len(wanted), np.int64), np.zeros(len(wanted))
+    before = np.searchsorted(times, wanted).clip(1, len(times) - 1) - 1
+    weight = (wanted - times[before]) / (times[before + 1] - times[before])
+    return before, np.clip(weight, 0.0, 1.0)
+
+
+def _blended(values: FloatArray, before: IntArray, weight: FloatArray) -> FloatArray:
+    """Return values (T, …) between the frames `before` and the next ones; a frame of weight 0 does not matter."""
+    shape = (-1,) + (1,) * (values.ndim - 1)
+    first, second = values[before], values[np.minimum(before + 1, len(values) - 1)]
+    fraction = weight.reshape(shape)
+    with np.errstate(invalid="ignore", over="ignore"):
+        mixed = first + fraction * (second - first)
+    return np.where(fraction == 0.0, first, np.where(fraction == 1.0, second, mixed))
 
 
 def _nearest(times: FloatArray, wanted: FloatArray) -> IntArray:
@@ -167,7 +198,7 @@ def _errors(track: Track, time: FloatArray) -> list[float | None] | None:
         return None
     times, values = track.error
     nearest = _nearest(times, time)
-    known = np.abs(times[nearest] - time) <= _half_interval(time)
+    known = np.abs(times[nearest] - time) <= max(_half_interval(time), _half_interval(times))
     found = zip(known.tolist(), values[nearest].tolist(), strict=True)
     return [float(f"{value:.3g}") if is_known and math.isfinite(value) else None for is_known, value in found]
 

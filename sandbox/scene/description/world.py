@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self, TypedDict
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
 
 from sandbox.scene.description.base import (
     Acceleration,
@@ -61,6 +61,14 @@ class World(Part):
 
 
 IntegratorName = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+ADDED_INTEGRATORS: set[str] = set()
+"""Integrators that `sandbox.add_integrator` has added in this process; settings accept them too."""
+
+
+def _known_integrator(value: object, check: ValidatorFunctionWrapHandler) -> object:
+    return value if isinstance(value, str) and value in ADDED_INTEGRATORS else check(value)
+
+
 DetectionName = Literal["discrete", "bisect", "swept", "shrink"]
 Response = Literal["impulse", "penalty"]
 ImpactLaw = Literal["newton", "dissipative"]
@@ -131,7 +139,7 @@ class Settings(Part):
     """Damping of penalty springs as a fraction of critical damping; default: from the restitution of each pair."""
     half_kick: bool = False
     """Start with the velocity v + g·h/2, which makes uniformly accelerated motion exact."""
-    integrator: IntegratorName | None = None
+    integrator: Annotated[IntegratorName | None, WrapValidator(_known_integrator)] = None
     """Integrator of free motion; pymunk supports explicit_euler only."""
     detection: DetectionName | None = None
     """Contact detection: at the end of each step, by bisection, by time of impact, or by shorter steps."""

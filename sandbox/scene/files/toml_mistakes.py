@@ -41,7 +41,7 @@ def syntax_fault(file: str, text: str, error: tomllib.TOMLDecodeError) -> Fault:
         text: the text.
         error: of the parser.
     """
-    message, lines = str(error), text.rstrip("\n").split("\n")
+    message, lines = str(error), text.replace("\r\n", "\n").rstrip("\n").split("\n")
     at = re.search(r" \(at line (\d+), column (\d+)\)$", message)
     line, column = (int(at[1]), int(at[2])) if at else (len(lines), len(lines[-1]) + 1)
     row, position = (lines[line - 1] if line <= len(lines) else ""), column - 1
@@ -139,15 +139,18 @@ def _key_remedies(row: str, position: int) -> Iterator[str]:
     if match := re.search(r"([+-]?\d+),(\d+)[ \t]*$", row[:position], re.ASCII):
         yield f"decimals have a point: {match[1]}.{match[2]}"
     if "{" in row[:position]:
-        if rest.startswith("}"):
+        if rest.startswith("}") and row[:position].rstrip().endswith(","):
             yield "remove the comma before }"
+        elif match := re.match(rf"\s*({_KEY})\s*=\s*\{{\s*([^{{}}=]+?)\s*\}}", row, re.ASCII):
+            value = f"[{match[2]}]" if "," in match[2] else match[2]
+            yield f"braces hold keys with values; write {match[1]} = {value}"
         elif not rest or rest.startswith("#"):
             yield "a table in braces must be on one line; put longer ones under a heading, such as [world]"
     if match := re.match(rf"\s*({_KEY})\s*:\s*(\S.*)$", row, re.ASCII):
         yield f"write = in place of the colon: {match[1]} = {match[2]}"
     if match := re.match(r"\s*(\w+(?:[ \t]+\w+)+)[ \t]*(=.*)$", row, re.ASCII):
         yield f"a key has no spaces: {'_'.join(match[1].split())} {match[2]}"
-    if match := re.match(rf"\s*({_KEY})[ \t]+(\S.*)$", row, re.ASCII):
+    if match := re.match(rf"\s*({_KEY})[ \t]+([^\s=].*)$", row, re.ASCII):
         yield f"= is missing after the key: {match[1]} = {match[2]}"
     if not rest and (word := row.strip()) and (word in list_tables() or word in ("world", "solver", "play")):
         yield f"write the heading as {_heading(word, word in list_tables())}"
@@ -254,7 +257,8 @@ def number_remedy(text: str) -> tuple[str, str] | None:
     if match := _WITH_UNIT.fullmatch(text):
         return "numbers have no unit; all are in SI units", f"{float(match[1]) * _PREFIXES.get(match[2], 1.0):.9g}"
     try:
-        number = f"{evaluated(text):.9g}"
+        value = float(evaluated(text))
+        number = f"{value:.0f}" if value.is_integer() and abs(value) < 1e15 else repr(value)
     except ValueError:
         return None
     plain = text.lstrip("+-−")

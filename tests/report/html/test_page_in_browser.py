@@ -7,6 +7,9 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
+from sandbox.measure.compare import compare
+from sandbox.report.html.comparison import replay_page
+from sandbox.scene.files.load import load
 from tests.browser import Browser
 from tests.report.html.page_documents import HOSTILE
 
@@ -210,3 +213,32 @@ def test_page_is_not_wider_than_its_window(kind: str, width: int, browser: Brows
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     assert browser.do("return document.documentElement.scrollWidth") <= width
+
+
+def test_slider_of_a_sweep_shows_one_value_at_a_time(browser: Browser, tmp_path: Path) -> None:
+    steps = [0.01, 0.02, 0.04, 0.05, 0.1, 0.2, 0.25]  # more runs than colours
+    comparison = compare(load("ball"), ("pymunk",), sweep={"solver.dt": steps})
+    page = tmp_path / "sweep.html"
+    page.write_text(replay_page(comparison).html(), encoding="utf-8")
+    show_page(browser, page)
+    shown = "return document.querySelector('.replay').dataset.shown"
+    solid = "return document.querySelectorAll('svg.time:first-child .line:not([data-off])').length"
+    assert browser.do(shown) == "pymunk, dt 0.25,truth"
+    slide = "const it = document.querySelector('.swept input'); it.value = 1; it.dispatchEvent(new Event('input'))"
+    before = next_picture(browser)
+    browser.do(SCRUB, 0.9)
+    browser.do(slide)
+    assert next_picture(browser) != before
+    assert browser.do(shown) == "pymunk, dt 0.02,truth"
+    assert browser.do("return document.querySelector('output.value').textContent") == "0.02"
+    assert browser.do(solid) == 1  # its error
+    browser.do("document.querySelector('[data-action=all]').click()")
+    next_picture(browser)
+    assert browser.do(shown).count("pymunk") == len(steps)
+    assert browser.do(solid) == len(steps)
+
+
+def test_sweep_over_words_has_no_slider() -> None:
+    sweep = {"solver.integrator": ["explicit_euler", "rk4"]}
+    comparison = compare(load("ball"), ("reference",), sweep=sweep)
+    assert 'class="swept"' not in replay_page(comparison).html()

@@ -101,3 +101,17 @@ def test_data_budget_limits_the_number_of_frames(
     monkeypatch.setattr(module, "BUDGET", 100)
     document = replay_document(scene, [Track("pymunk", "e0", found)], None)
     assert len(document["time"]) == module.MIN_FRAMES
+
+
+def test_bodies_of_a_run_with_a_longer_step_are_shown_between_its_frames(
+    fall_run: tuple[Scene, Trajectory],
+) -> None:
+    scene, fine = fall_run
+    coarse = run(scene, "pymunk", audit=False, dt=0.1)
+    document = replay_document(scene, [Track("fine", "e0", fine), Track("coarse", "e1", coarse)], None)
+    time, step = np.asarray(document["time"]), document["step"]
+    codes = decompress(document["tracks"][1]["codes"], (len(time), 2, 3))
+    assert (codes[..., 0] != ABSENT).all()
+    height = codes[:, 0, 1] * step
+    expected = np.interp(time, coarse.time, coarse.position[:, 0, 1])
+    assert np.ptp(height - expected) <= step + 1e-9  # half a step up and down; rounding of 1e6 m

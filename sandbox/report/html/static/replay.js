@@ -85,8 +85,13 @@ class Replay {
     figure.querySelector(".speed").addEventListener("change", (event) => {
       this.speed = Number(event.target.value);
     });
-    for (const box of figure.querySelectorAll("[data-track]")) {
-      box.addEventListener("change", () => this.toggle(box.dataset.track, box.checked));
+    this.boxes = [...figure.querySelectorAll("[data-track]")];
+    for (const box of this.boxes) box.addEventListener("change", () => this.toggle(box.dataset.track, box.checked));
+    const slider = figure.querySelector(".swept input");
+    if (slider) {
+      slider.addEventListener("input", () => this.select(this.scene.values[Number(slider.value)]));
+      this.find("all").addEventListener("click", () => this.select(null));
+      this.select(this.scene.values[Number(slider.value)]);
     }
     figure.addEventListener("keydown", (event) => this.press(event, actions));
     canvas.addEventListener(
@@ -204,11 +209,22 @@ class Replay {
   toggle(name, on) {
     if (on) this.hidden.delete(name);
     else this.hidden.add(name);
-    const cssClass = this.scene.tracks.find((track) => track.name === name).css_class;
-    for (const line of this.figure.parentElement.querySelectorAll(`svg.time .line.${cssClass}`)) {
+    const k = this.scene.tracks.findIndex((track) => track.name === name);
+    const own = this.scene.tracks[k].css_class === "truth" ? "truth" : `run${k}`;
+    for (const line of this.figure.parentElement.querySelectorAll(`svg.time .line.${own}`)) {
       line.toggleAttribute("data-off", !on);
     }
     this.draw();
+  }
+
+  /* Show the runs with this value of the swept key; null: all runs. */
+  select(value) {
+    if (value !== null) this.figure.querySelector("output.value").textContent = String(Number(value.toPrecision(6)));
+    for (const [k, track] of this.scene.tracks.entries()) {
+      const on = value === null || track.value === null || track.value === value;
+      this.boxes[k].checked = on;
+      this.toggle(track.name, on);
+    }
   }
 
   /* The frame before a time, and the fraction of the interval to the next one. */
@@ -259,9 +275,8 @@ class Replay {
     }
     const digits = Math.max(0, Math.min(6, 3 - Math.floor(Math.log10(scene.duration))));
     figure.querySelector("output.time").textContent = `${time.toFixed(digits)} s`;
-    const boxes = figure.querySelectorAll("[data-track]");
     for (const [k, track] of scene.tracks.entries()) {
-      const output = boxes[k].closest("li").querySelector("output");
+      const output = this.boxes[k].closest("li").querySelector("output");
       if (output === null || track.errors === null) continue;
       output.textContent = formatNumber(track.errors[Math.round(before + fraction)], output.dataset.unit);
     }
