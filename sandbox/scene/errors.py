@@ -90,6 +90,8 @@ EXPECTED = {
 """What a value must be, by the type of pydantic's error"""
 
 
+EXPECTED_IN_PYTHON = {"tuple_type": "a list or a tuple", "string_type": "a text", "bool_type": "True or False"}
+"""What an argument must be, where it is not written as in a file"""
 SMALLEST_STATED = 1e-5
 """Smaller positive bounds only protect the engines; the message for a value that is not positive leaves them out."""
 _BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
@@ -124,6 +126,8 @@ def _explain(details: Any, known: Collection[str]) -> str:
         expected = f"one of the kinds {context.get('expected_tags', 'of this table')}"
     elif kind == "string_pattern_mismatch":
         expected = f"text that matches {context['pattern']}"
+    elif kind in EXPECTED_IN_PYTHON:
+        expected = EXPECTED_IN_PYTHON[kind]
     elif kind in EXPECTED:
         expected = EXPECTED[kind].format(**context)
     else:
