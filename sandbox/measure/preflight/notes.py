@@ -85,9 +85,9 @@ def _flight(scene: Scene) -> Iterator[Diagnostic]:
             continue
         body, scheme = bodies.names[number], solver.integrator or "explicit_euler"
         message = (
-            f"{scheme} displaces {body!r} by g·h·t/2, up to {error[k]:.3g} m within one flight of {time[k]:.3g} s, more "
-            f"than its half width, {bodies.thin[number]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the "
-            "reference, and `exact` have no such error"
+            f"{scheme} displaces {body!r} by g·h·t/2, up to {error[k]:.3g} m within one flight of {time[k]:.3g} s, "
+            f"more than its half width, {bodies.thin[number]:.3g} m; solver.half_kick on pymunk, velocity_verlet on "
+            "the reference, and `exact` have no such error"
         )
         yield Diagnostic("flight", message, {"body": body, "error": float(error[k])})
         return

@@ -550,19 +550,25 @@ def test_first_order_flight_is_noted_with_its_error() -> None:
     assert "flight" not in [each.kind for each in notes(exact)]
 
 
+CRATE = "[[box]]\nname = 'b'\nsize = [1, 1]\n"
+STANDING_BALL = "[[ball]]\nname = 'b'\nradius = 0.5\nposition = [0, 0.5]\n"
+WALL = "[[wall]]\npoints = [[-1, 0], [-1, 9]]\nthickness = 0.2\n"
+NAIL = "[[joint]]\nkind = 'pivot'\nbetween = ['b']\nanchors = [[0, 0], [0, 5]]\n"
+
+
 @pytest.mark.parametrize(
     ("tables", "body"),
     [
-        ("[[box]]\nname = 'crate'\nposition = [0, 0.5]\nsize = [1, 1]\n", None),
-        ("[[ball]]\nname = 'ball'\nposition = [0, 0.5]\nradius = 0.5\n", None),
-        ("[[box]]\nname = 'crate'\nposition = [0, 0.6]\nsize = [1, 1]\n", "crate"),
-        ("[[ball]]\nname = 'ball'\nposition = [0, 0.5]\nradius = 0.5\nvelocity = [0, 9]\n", "ball"),
-        ("[[stack]]\nname = 's'\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 1\nrows = 2\n", None),
-        ("[[wall]]\npoints = [[-1, 0], [-1, 9]]\nthickness = 0.2\n[[box]]\nname = 'b'\nposition = [-0.4, 5]\nsize = [1, 1]\n", "b"),
-        ("[[box]]\nname = 'b'\nposition = [-0.4, 5]\nsize = [1, 1]\n[[joint]]\nkind = 'pivot'\nbetween = ['b']\nanchors = [[0, 0], [0, 5]]\n", None),
+        (CRATE + "position = [0, 0.5]\n", None),
+        (STANDING_BALL, None),
+        (CRATE + "position = [0, 0.6]\n", "b"),
+        (STANDING_BALL + "velocity = [0, 9]\n", "b"),
+        ("[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 1\nrows = 2\n", None),
+        (CRATE + "position = [-0.4, 5]\n" + WALL, "b"),
+        (CRATE + "position = [-0.4, 5]\n" + NAIL, None),
     ],
     ids=["crate", "ball", "crate above", "ball thrown", "stack", "beside a wall", "hangs"],
-)  # fmt: skip
+)
 def test_bodies_that_stand_or_hang_do_not_fly(tables: str, body: str | None) -> None:
     text = "[world]\ngravity = [0, -10]\n[solver]\ndt = 0.5\n[[plane]]\npoint = [0, -9]\nnormal = [0, 1]\n"
     floor = "[[wall]]\npoints = [[-9, -0.5], [9, -0.5]]\nthickness = 1.0\n"
