@@ -46,6 +46,7 @@ class AdviceMeasurements:
     knobs: list[Evaluation] = field(default_factory=list)
     others: dict[str, Evaluation] = field(default_factory=dict)
     replays: list[ReplayedActions] = field(default_factory=list)
+    is_still_without_actions: bool = False
     untried_knobs: int = 0
     within_until: dict[tuple[str, str], float] = field(default_factory=dict)
     """s, time from which on the error exceeds the tolerance, by `evaluation_key`"""
@@ -90,6 +91,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         unit=metric.unit,
         tolerance=score.tolerance,
         tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
+        position_tolerance=request.length,
         budget=request.budget,
         invariant=score.invariant,
         invariant_tolerance=score.invariant_tolerance,
@@ -113,6 +115,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         code=_code(request, chosen),
         recorded_actions=0 if request.recording is None else len(request.recording.actions),
         replays=tuple(measured.replays),
+        is_still_without_actions=measured.is_still_without_actions,
         tried=0 if found is None else sum(point.status != "refused" for point in found.points),
         tried_here=0
         if found is None
