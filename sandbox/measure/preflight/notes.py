@@ -281,9 +281,10 @@ def _audit(scene: Scene) -> Iterator[Diagnostic]:
     count, without = int(not_round.sum()), int((not_round & (bodies.core <= 0.0)).sum())
     if not count:
         return
+    who = "the body that is not a ball" if count == 1 else f"the {count:,} bodies that are not balls"
     message = (
-        f"missed contacts are a lower bound: of the {count:,} bodies that are not balls, only passages of the largest "
-        "inscribed disc about the centre of mass, and through the axis of slender bodies, are counted"
+        f"missed contacts are a lower bound: of {who}, only passages of the largest inscribed disc about the centre of "
+        "mass, and through the axis of slender bodies, are counted"
     )
     if without:
         message += f"; {without:,} have no such disc and are not counted"

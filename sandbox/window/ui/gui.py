@@ -37,6 +37,8 @@ from sandbox.window.view_bounds import field_rect, has_field
 
 GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
+TIME_STEPS = 100
+"""Number of times that the seek bar distinguishes in the duration of a scene, at least"""
 
 
 class GuiFrame(NamedTuple):
@@ -316,7 +318,8 @@ class Gui:
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
                 times = show.start_time, show.frame.time, show.end_time
-                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale)
+                step = show.scene.world.duration / TIME_STEPS
+                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale, step)
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])

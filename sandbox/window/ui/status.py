@@ -65,7 +65,7 @@ def settings_text(settings: Settings) -> str:
     """Return a one-line summary of settings, without those that the engine does not use."""
     words = [f"dt {format_si(settings.dt, 's')}"]
     if settings.integrator is not None:
-        words.append(f"{settings.substeps} × {settings.iterations}")
+        words.append(f"{settings.substeps} × {settings.iterations} iterations")  # those of a step
         words.append(settings.integrator.replace("_", " "))
         if settings.detection not in (None, "discrete"):
             words.append(str(settings.detection))
