@@ -127,7 +127,7 @@ def coverage_sentence(advice: Advice) -> str | None:
             f"Not judged: positions, because {advice.metric_reason}. Judged: {advice.metric} ({advice.metric_about}), "
             f"{judged}."
         )
-    if advice.invariant is not None:
+    if advice.invariant not in (None, "joint_error", "missed_contacts"):  # these are named already
         judged = f"{advice.invariant}, {judged}"
     return (
         f"Judged: positions up to {advice.trusted_until:.3g} s of {advice.duration:.4g} s. Not judged: positions after "
