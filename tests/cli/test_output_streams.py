@@ -188,6 +188,7 @@ def test_warnings_are_folded_between_words(tmp_path: Path) -> None:
 SCRIPT = """
 import json, resource, sys
 from sandbox.cli.main import call
+sys.dont_write_bytecode = True  # of modules that are imported later: Python would leave half a file
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 print(json.dumps([call(words) for words in json.loads(sys.argv[2])]))
 """

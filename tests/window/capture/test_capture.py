@@ -103,7 +103,7 @@ def test_notice_of_a_film_with_few_pictures_names_the_export(elapsed: float, is_
         controller.update(lambda: pygame.Surface((64, 48)), elapsed)
     controller.stop_recording()
     (notice,) = notices
-    assert notice.startswith(f"recorded: {tmp_path / 'film'}")
+    assert notice.startswith(f"recorded: {tmp_path / 'sandbox-film'}")
     assert ("sandbox export" in notice, "5 pictures a second" in notice) == (is_named, is_named)
 
 
