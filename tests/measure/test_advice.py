@@ -299,6 +299,16 @@ joint = [{ kind = "pivot", between = ["puck"], anchors = [[0.0, 0.0], [0.0, 0.0]
     assert farthest[-1] < 0.5 * farthest[0]
 
 
+@pytest.mark.parametrize("zoom", [1.0, 50.0])
+def test_forecast_is_in_px_if_the_unit_of_length_is_the_pixel(zoom: float) -> None:
+    advice = advice_of(BULLET, zoom=zoom)
+    (text,) = {risk.message for risk in advice.risks if risk.kind == "tunnelling"}
+    assert ("20 px/s, 0.333 px per substep" in text, "20 m/s, 0.333 m per substep" in text) == (
+        zoom == 1.0,
+        zoom != 1.0,
+    )
+
+
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bullet becomes so fast that no number of substeps that is tried stops it."""
     monkeypatch.setattr(study, "MAX_DOUBLINGS", 1)

@@ -1,5 +1,7 @@
 """Measurements of an advice, and the advice made of them; after Ctrl-C of those that there are."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -100,8 +102,8 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
         duration=scene.world.duration,
         left_at=_left_at(score.context),
-        risks=tuple(measured.risks),
-        notes=tuple(measured.notes),
+        risks=_in_own_unit(measured.risks, request),
+        notes=tuple(_own_unit_text(each, request) for each in measured.notes),
         present=present,
         is_in_loop=request.is_in_loop,
         recommended=recommended,
@@ -145,7 +147,7 @@ def _measured_setting(
         error_px=point.error * request.zoom if is_length and point.error is not None else None,
         invariant=None if score.invariant is None else point.metrics.get(score.invariant),
         missed_contacts=point.metrics.get("missed_contacts"),
-        objections=point.objections,
+        objections=tuple(_own_unit_text(each, request) for each in point.objections),
         worst=point.worst if score.metric == "max_position" else None,
         within_until=measured.within_until.get(evaluation_key(point)),
         frame_ms=None if timed is None else timed.frame_time(request.fps),
@@ -168,7 +170,20 @@ def _ratio(value: float | None, base: float | None) -> float | None:
 def _remaining_risks(request: AdviceRequest, chosen: MeasuredSetting | None) -> tuple[Risk, ...]:
     if chosen is None:
         return ()
-    return tuple(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps))
+    return _in_own_unit(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps), request)
+
+
+METRES = re.compile(r"(?<=\d )m(?=[ ,;)/]|$)")
+"""Unit of a number in a message"""
+
+
+def _own_unit_text(text: str, request: AdviceRequest) -> str:
+    """Return a message with px for m if the unit of length of the game is the pixel."""
+    return METRES.sub("px", text) if request.zoom == 1.0 else text
+
+
+def _in_own_unit(risks: Sequence[Risk], request: AdviceRequest) -> tuple[Risk, ...]:
+    return tuple(replace(each, message=_own_unit_text(each.message, request)) for each in risks)
 
 
 def _code(request: AdviceRequest, chosen: MeasuredSetting | None) -> GameCode | None:
