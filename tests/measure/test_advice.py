@@ -15,7 +15,7 @@ from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.advice.text import fallback_head
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
@@ -297,6 +297,19 @@ joint = [{ kind = "pivot", between = ["puck"], anchors = [[0.0, 0.0], [0.0, 0.0]
     farthest = [each.farthest for each in advice.replays]
     assert farthest == sorted(farthest, reverse=True)  # the finer, the closer to the finest
     assert farthest[-1] < 0.5 * farthest[0]
+
+
+@pytest.mark.parametrize("omitted", [(), ("1 collision callback (space.on_collision)",)])
+def test_code_with_other_substeps_names_the_impulses_of_callbacks(omitted: tuple[str, ...]) -> None:
+    scene = scene_of(BULLET)
+    push = Impulse(time=0.01, body="bullet", impulse=(1.0, 0.0))
+    game = RecordedGame(omitted)
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2, game=game), zoom=50.0, **QUICK)
+    assert advice.recommended is not None and advice.code is not None
+    substeps = advice.recommended.settings.substeps
+    assert substeps > 1
+    remarks = [each for each in advice.code.remarks if "callbacks" in each]
+    assert [f"{1.0 / substeps:.3g} times as long" in each for each in remarks] == [True] * len(omitted)
 
 
 @pytest.mark.parametrize("zoom", [1.0, 50.0])

@@ -18,7 +18,7 @@ from sandbox.measure.advice.result import (
     OtherEngine,
     ReplayedActions,
 )
-from sandbox.measure.advice.scoring import AdviceRequest, AdviceScore
+from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.run.bounded_run import clock_without_compilation
@@ -190,7 +190,23 @@ def _code(request: AdviceRequest, chosen: MeasuredSetting | None) -> GameCode | 
     if chosen is None:
         return None
     is_slop_stated = request.scene.solver.slop is not None
-    return game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
+    code = game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
+    return replace(code, remarks=(*code.remarks, *_callback_remarks(request, chosen)))
+
+
+def _callback_remarks(request: AdviceRequest, chosen: MeasuredSetting) -> list[str]:
+    """Return the effect of other substeps on the impulses in the callbacks of a recorded game; empty without any."""
+    game = None if request.recording is None else request.recording.game
+    if game is None or not any("space.on_collision" in each for each in game.omitted):
+        return []
+    present, now = (request.scene.solver.dt / request.scene.solver.substeps, chosen.settings.h)
+    if abs(now / present - 1.0) <= SAME_STEP:
+        return []
+    return [
+        f"collision callbacks of the game: an impulse is that of a step, which is now {now / present:.3g} times as "
+        "long. A threshold for impulses, such as arbiter.total_impulse, has to be changed by this factor, or impulses "
+        "are summed over the frame"
+    ]
 
 
 def _knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> tuple[Knob, ...]:
