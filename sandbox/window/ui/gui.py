@@ -145,8 +145,11 @@ class Gui:
         show, area = app_state.view, self.area
         if show is None:
             return []
-        frame = self._frame
-        status = hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None) if frame is None else frame.status
+        keys = app_state.key_bindings.help_rows
+        if self._frame is None:
+            status = hud_status(app_state, keys, 0.0, None, self.panel.visible)
+        else:
+            status = self._frame.status
         longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
         rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
@@ -179,7 +182,7 @@ class Gui:
 
     def _hud_width(self, show: LiveView | RecordedView) -> int:
         """Return the right edge of the status plate, px."""
-        return hud_width(f"{show.engine}  ·  {settings_text(show.settings)}", self.ui_scale)
+        return hud_width(f"{show.engine}  ·  {settings_text(show.settings, not self.panel.visible)}", self.ui_scale)
 
     @property
     def covers_scene(self) -> bool:
@@ -271,7 +274,8 @@ class Gui:
         if host is not None and not self.help.open and (controls is None or controls.is_own_score):
             for note in self._high_scores.update(host):
                 app_state.messages.add(note, "warning")
-        self._frame = GuiFrame(hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording), display)
+        rows = app_state.key_bindings.help_rows
+        self._frame = GuiFrame(hud_status(app_state, rows, frame_rate, recording, self.panel.visible), display)
         return self._frame
 
     def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState, frame: GuiFrame) -> None:
