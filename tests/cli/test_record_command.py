@@ -43,6 +43,7 @@ def test_session_is_recorded_and_replayed(game: Path, tmp_path: Path, capfd: pyt
     assert "written: jump.json (1 body, 20 steps of 16.67 ms, 1 action)" in output
     recording = Recording.load(tmp_path / "jump.json")
     assert recording.actions[0].time == pytest.approx(5 / 60)
+    assert recording.scene.title == "jump"
     assert call(["run", "jump.json"]) == 0
 
 
