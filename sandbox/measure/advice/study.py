@@ -372,8 +372,8 @@ def _is_still(request: AdviceRequest, measured: AdviceMeasurements) -> bool:
 
 
 def _finer_replay(request: AdviceRequest, measured: AdviceMeasurements) -> Trajectory | None:
-    """Return the run with the actions and finer steps; None if it costs more than the effort, or fails."""
-    if ENGINES[request.engine].missing(request.scene, request.loop):
+    """Return the run with the actions and finer steps; None if it costs more than the effort or the time, or fails."""
+    if ENGINES[request.engine].missing(request.scene, request.loop) or clock_without_compilation() > request.deadline:
         return None
     per_run = measured.present.counted_seconds
     factor = next((each for each in FINER if each * per_run <= request.effort), None)
