@@ -292,6 +292,7 @@ if TYPE_CHECKING:
     )
     from sandbox.scene.errors import (
         Fault as Fault,
+        PartError as PartError,
         SceneError as SceneError,
         SettingsError as SettingsError,
     )
@@ -375,7 +376,7 @@ _NAMES = {
     "sandbox.scene.description.play": "Marking Play PlayPart Spot",
     "sandbox.scene.description.surface": "ContactModels Floor Pocket Shot Stroke",
     "sandbox.scene.description.world": "Kick Material Pair Settings SettingsChanges World",
-    "sandbox.scene.errors": "Fault SceneError SettingsError",
+    "sandbox.scene.errors": "Fault PartError SceneError SettingsError",
     "sandbox.scene.files.load": "dumps load loads",
     "sandbox.scene.geometry.shapes": "Shapes",
     "sandbox.trajectory": "Contacts Frame RunFailedError Trajectory",

@@ -23,6 +23,8 @@ class Environment:
     """number of steps per action"""
     engine: str = "pymunk"
     """name of the engine"""
+    duration: float | None = None
+    """longest simulated time of an episode, s; None for the duration of the scene"""
 
 
 @dataclass(frozen=True)

@@ -32,14 +32,15 @@ from sandbox.engines.common.kernel import COMPILED
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.game_names import game_specs
-from sandbox.games.contract import HasObservation, Rules
+from sandbox.games.contract import HasObservation, HasPlayers, Rules
 from sandbox.games.registry import required_rules
 from sandbox.measure.run.episode_batch import EpisodeBatch
 from sandbox.measure.run.sessions import Episode
 from sandbox.measure.seeds import with_seed
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.files.load import load
+from sandbox.scene.description.world import World
+from sandbox.scene.files.load import as_scene
 
 GAMES = {each.name: (each.scene, each.frame_skip) for spec in game_specs() for each in spec.environments}
 """Shipped scene and number of steps per action, by the name in the environment id."""
@@ -60,13 +61,14 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
     Observation: x, y, vx, vy, angle, ω and presence of each observed body; then the observation of the rules (such as
     fuel, wind, or the setting of a gun), the time in s, and the score. `observed` has the name of each number. Numbers
-    are clipped to ±1e6.
+    are clipped to ±1e6; the bounds of presence and time are closer.
 
     Action: one number for each control. If a control is analogue, the space is a `Box` from 0 to 1; other controls are
     then on above 0.5, and values out of range are clipped. Otherwise the space is a `MultiDiscrete` of 0 and 1.
 
-    Reward: increase of the score. An episode is terminated when the game is over. It is truncated at the scene's
-    duration, or if the physics fails; `info["failed"]` then has the reason.
+    Reward: increase of the score. In games of several players, `info["scores"]` has the score of each player by name,
+    and `info["player"]` the one whose turn it is. An episode is terminated when the game is over. It is truncated at
+    its `duration`, or if the physics fails; `info["failed"]` then has the reason.
 
     An environment can be pickled and copied before its first episode. During an episode it can be copied
     (`copy.deepcopy`) on engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for bit.
@@ -77,12 +79,14 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         bodies: names of the observed bodies; default: all bodies that are not fixed.
         every: number of steps per action.
         render_mode: None, or `rgb_array`.
+        duration: longest simulated time of an episode, s; default: the duration of the scene.
 
     Raises:
         SceneError: the file has faults, or no file and no shipped scene has that name.
         UnsuitableSceneError: the scene has no game with rules, or lacks an element that its game needs.
         Refusal: the engine does not support the scene.
-        ValueError: an engine, body or render mode does not exist, or `every` is not an integer of at least 1.
+        ValueError: an engine, body or render mode does not exist, `every` is not an integer of at least 1, or the
+            duration is out of range.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
@@ -94,9 +98,12 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         bodies: Sequence[str] | None = None,
         every: int = 1,
         render_mode: str | None = None,
+        duration: float | None = None,
     ) -> None:
         """Create an environment; `reset` begins an episode."""
-        self.scene = scene if isinstance(scene, Scene) else load(scene)
+        self.scene = as_scene(scene)
+        if duration is not None:
+            self.scene = self.scene.with_duration(_checked_duration(duration))
         self.engine, self.every, self.render_mode = engine, _steps_per_action(every), render_mode
         rules = required_rules(self.scene)
         self.controls = rules.controls
@@ -118,11 +125,21 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         self.action_space = (
             spaces.Box(0.0, 1.0, (count,), np.float32) if self.analogue else spaces.MultiDiscrete([2] * count)
         )
-        self.observation_space = spaces.Box(-LIMIT, LIMIT, (len(self.observed),), np.float32)
+        self.observation_space = spaces.Box(*self._bounds(), dtype=np.float32)
         self.metadata = self.metadata | {"render_fps": max(round(1.0 / (self.scene.solver.dt * every)), 1)}
         self._episode: Episode | None = None
         self._ended = False
         self._canvas: Any = None
+
+    def _bounds(self) -> tuple[Observation, Observation]:
+        """Return the lower and upper bounds of an observation."""
+        upper = np.full(len(self.observed), LIMIT, np.float32)
+        lower, presence = -upper, len(STATES) - 1
+        states = slice(presence, len(STATES) * len(self.observed_bodies), len(STATES))
+        lower[states], upper[states] = 0.0, 1.0
+        last = self.scene.world.duration + self.every * self.scene.solver.dt  # an episode ends with a whole action
+        lower[-2], upper[-2] = 0.0, min(last, LIMIT)
+        return lower, upper
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -220,12 +237,15 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
     def _info(self) -> dict[str, Any]:
         episode = self._current_episode()
         rules = episode.rules
-        return {
+        info: dict[str, Any] = {
             "time": episode.time,
             "score": rules.score,
             "over": rules.game_over,
             "seed": episode.scene.world.seed,
         }
+        if isinstance(rules, HasPlayers):
+            info |= {"player": rules.player, "scores": dict(rules.scores)}
+        return info
 
     def display_lines(self) -> dict[str, str]:
         """Return the lines of the score panel, texts by label."""
@@ -275,6 +295,7 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         engine: name of the engine.
         bodies: as for `SandboxEnv`.
         every: number of steps per action.
+        duration: as for `SandboxEnv`.
 
     Raises:
         CompiledOnlyError: the scene, its game or the engine does not allow compiled calls.
@@ -293,9 +314,10 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         engine: str = "reference",
         bodies: Sequence[str] | None = None,
         every: int = 1,
+        duration: float | None = None,
     ) -> None:
         """Create an environment; `reset` begins the episodes."""
-        self._single = single = SandboxEnv(scene, engine, bodies, every)
+        self._single = single = SandboxEnv(scene, engine, bodies, every, duration=duration)
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, is {num_envs!r}")
         batch = EpisodeBatch.start_batch(single.scene, engine, num_envs)
@@ -498,6 +520,15 @@ def _steps_per_action(every: int) -> int:
     return steps
 
 
+def _checked_duration(duration: float) -> float:
+    """Return a duration that a scene may have.
+
+    Raises:
+        PartError: it is out of range.
+    """
+    return World(duration=duration).duration
+
+
 def _rules_observation(rules: Rules) -> Sequence[tuple[str, float]]:
     """Return the names and values that the rules of the game observe; empty if they observe nothing."""
     return rules.observation() if isinstance(rules, HasObservation) else ()
@@ -521,9 +552,10 @@ def _body_indices(scene: Scene, names: Sequence[str] | None) -> list[int]:
 
 for _spec in game_specs():
     for _each in _spec.environments:
+        _options = {"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine}
         gymnasium.register(
             f"sandbox/{_each.name}-v0",
             entry_point="sandbox.gym:SandboxEnv",
-            kwargs={"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine},
+            kwargs=_options if _each.duration is None else _options | {"duration": _each.duration},
             vector_entry_point="sandbox.gym:make_vector_env" if _spec.vector_rules is not None else None,
         )

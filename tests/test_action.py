@@ -163,3 +163,10 @@ def test_speed_above_the_limit_or_not_finite_is_refused() -> None:
 def test_actions_are_frozen() -> None:
     with pytest.raises(ValidationError, match="frozen"):
         Remove(time=0.0, body="a").time = 1.0  # type: ignore[misc] # the point of the test
+
+
+def test_faults_of_a_value_of_several_types_name_the_types() -> None:
+    with pytest.raises(ActionError) as caught:
+        actions_from_json('[{"kind": "set", "time": 0, "path": "ball.a.restitution", "value": {}}]')
+    kinds = [line.partition(":")[0].removeprefix("0.set.value.") for line in str(caught.value).splitlines()]
+    assert kinds == ["float", "int", "bool", "str", "list[float]"]

@@ -400,3 +400,61 @@ def test_gymnasium_is_imported_only_by_sandbox_gym() -> None:
     code = "import sys; sys.modules['gymnasium'] = None\ntry:\n import sandbox.gym\nexcept ImportError as e: print(e)"
     printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     assert printed == "sandbox.gym needs gymnasium: pip install -e '.[gym]'\n"
+
+
+SIDES = {
+    "ArtilleryDuel": {"Red", "Blue"},
+    "Curling": {"red", "yellow"},
+    "EightBall": {"player 1", "player 2"},
+    "NineBall": {"player 1", "player 2"},
+}
+"""Players of games of several"""
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_info_has_the_scores_of_all_players_and_whose_turn_it_is(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v0")
+    _, info = env.reset(seed=1)
+    if name in SIDES:
+        assert info["scores"] == dict.fromkeys(SIDES[name], 0)
+        assert info["player"] in SIDES[name]
+    else:
+        assert ("scores" in info) == (name == "ArtilleryFour")
+
+
+def test_reward_of_the_duel_is_that_of_its_first_player_while_the_bot_scores_too() -> None:
+    env = gymnasium.make("sandbox/ArtilleryDuel-v0")
+    _, info = env.reset(seed=3)
+    idle, total, over = np.zeros(env.action_space.shape or ()), 0.0, False
+    fire = idle.copy()
+    fire[[control.name for control in env.unwrapped.controls].index("fire")] = 1.0  # type: ignore[attr-defined]
+    turns, is_pressed = set(), False
+    while not over:
+        turns.add(info["player"])
+        is_pressed = not is_pressed
+        _, reward, over, _, info = env.step(fire if is_pressed else idle)
+        total += reward
+    assert total == info["scores"]["Red"] == info["score"]
+    assert turns == {"Red", "Blue"}
+    assert info["scores"]["Blue"] > 0
+
+
+@pytest.mark.parametrize("name", ["EightBall", "NineBall"])
+def test_frame_of_billiards_has_time_for_many_shots(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v0")
+    assert env.unwrapped.scene.world.duration == 1800.0  # type: ignore[attr-defined]
+
+
+def test_duration_ends_an_episode_and_bounds_its_time() -> None:
+    env = SandboxEnv("landing", every=50, duration=1.2)
+    check_env(env, skip_render_check=True)  # the render check makes an environment from an id
+    env.reset()
+    times, ended = [0.0], False
+    while not ended:
+        observation, _, _, ended, info = env.step([0.0, 0.0, 0.0])
+        assert env.observation_space.contains(observation)
+        times.append(info["time"])
+    assert times == pytest.approx([0.0, 0.5, 1.0, 1.2], abs=1e-9)  # rounding of sums of dt
+    for wrong in (0.0, -1.0, float("nan")):
+        with pytest.raises(ValueError, match="duration"):
+            SandboxEnv("landing", duration=wrong)

@@ -12,11 +12,21 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, NamedTuple
 
-from sandbox.batch.executors import AnyTask, ExecutorError, JobOutcome, TaskLostError, hang_time, run_task
+from sandbox.batch.executors import (
+    AnyTask,
+    ExecutorError,
+    JobOutcome,
+    TaskLostError,
+    VersionMismatchError,
+    hang_time,
+    mismatch_text,
+    run_task,
+)
 from sandbox.batch.job import timeout_reason
 from sandbox.echo import MAX_NAMED
+from sandbox.provenance import versions
 
 CONNECT_TIME = 10.0
 """s for the connection to the scheduler"""
@@ -29,15 +39,28 @@ RETRIES = 2
 """Further attempts at a task that ended with an exception, such as of a broken connection"""
 
 
+class _Submitted(NamedTuple):
+    """A task that the scheduler has."""
+
+    ours: "Future[tuple[JobOutcome, ...]]"
+    theirs: Any
+    """future of Dask"""
+    task: AnyTask
+    workers: frozenset[str]
+    """addresses of the workers that may run it; empty for all"""
+
+
 class ClusterExecutor:
     """Runs tasks on the workers of a Dask cluster, and leaves the cluster running.
+
+    Workers with other versions get no tasks.
 
     Args:
         address: of the scheduler, such as `tcp://host:8786`, or the path of its `--scheduler-file` (.json).
         notice: called with messages for the user.
 
     Raises:
-        ExecutorError: distributed is not installed, or the scheduler does not answer.
+        ExecutorError: distributed is not installed, the scheduler does not answer, or all workers have other versions.
     """
 
     is_remote = True
@@ -69,31 +92,47 @@ class ClusterExecutor:
         self._pool = self._client.get_executor(pure=False, retries=RETRIES)
         self._killed_worker: type[Exception] = distributed.scheduler.KilledWorker
         self._run, self._count = uuid.uuid4().hex[:8], 0
-        self._pending: dict[str, tuple[Future[tuple[JobOutcome, ...]], Any, AnyTask]] = {}
-        """our future, that of Dask, and the task, by key"""
+        self._pending: dict[str, _Submitted] = {}
+        """tasks that the scheduler has, by key"""
+        self._held: list[tuple[Future[tuple[JobOutcome, ...]], AnyTask]] = []
+        """tasks that wait for a worker with the same versions"""
+        self._workers: set[str] = set()
+        """addresses of the workers that have the same versions"""
+        self._excluded: dict[str, str] = {}
+        """differences of the versions of all other workers, by address"""
         self._since: dict[str, float] = {}
         """when a task was first seen on a worker, by key"""
         self._connected = self._looked = monotonic()
         self._slots = 0
         self._look()
+        if self._excluded and not self._workers:
+            raise ExecutorError(mismatch_text(next(iter(self._excluded.values()))))
         if not self._slots:
             self._notice(f"{address}: the cluster has no workers yet; the runs start when there are some")
 
     @property
     def slots(self) -> int:
-        """Number of threads of all workers; they may come and go."""
+        """Number of threads of all workers with the same versions; they may come and go."""
         return max(self._slots, 1)
 
     def submit(self, task: AnyTask) -> "Future[tuple[JobOutcome, ...]]":
         """Queue a task on the scheduler."""
-        self._count += 1
-        key = f"sandbox-{self._run}-{self._count}"
         ours: Future[tuple[JobOutcome, ...]] = Future()
         ours.set_running_or_notify_cancel()
-        theirs = self._pool.submit(run_task, task, key=key)
-        self._pending[key] = ours, theirs, task
-        theirs.add_done_callback(lambda done: self._finish(key, done))
+        self._send(ours, task)
         return ours
+
+    def _send(self, ours: "Future[tuple[JobOutcome, ...]]", task: AnyTask) -> None:
+        """Send a task to the scheduler: for any worker, or, if some have other versions, for those that have not."""
+        if self._excluded and not self._workers:
+            self._held.append((ours, task))
+            return
+        self._count += 1
+        key = f"sandbox-{self._run}-{self._count}"
+        workers = sorted(self._workers) if self._excluded else []
+        theirs = self._pool.submit(run_task, task, key=key, **({"workers": workers} if workers else {}))
+        self._pending[key] = _Submitted(ours, theirs, task, frozenset(workers))
+        theirs.add_done_callback(lambda done: self._finish(key, done))
 
     def check(self) -> None:
         """Look for a lost scheduler, for workers that came or went, and for tasks that hang.
@@ -106,26 +145,59 @@ class ClusterExecutor:
             self._connected = now
         elif self._client.status == "closed" or now - self._connected > LOST_TIME:
             raise self._lost_scheduler()
-        if now - self._looked > LOOK_INTERVAL and self._client.status == "running":
+        if (self._held or now - self._looked > LOOK_INTERVAL) and self._client.status == "running":
             self._looked = now
             self._look()
 
     def shut_down(self) -> None:
         """Cancel all tasks, and close the connection."""
-        for _, theirs, _ in list(self._pending.values()):
-            theirs.cancel()
+        for each in list(self._pending.values()):
+            each.theirs.cancel()
         self._pending.clear()
+        self._held.clear()
         self._client.close(timeout=CONNECT_TIME)
 
     def _look(self) -> None:
-        """Count the threads of the workers, and end tasks that hang."""
+        """Count the threads of the workers, exclude those with other versions, and end tasks that hang."""
         try:
-            self._slots = sum(self._client.nthreads().values())
-            limits = [task.options.time_limit for _, _, task in list(self._pending.values())]
+            threads: dict[str, int] = self._client.nthreads()
+            self._check_versions([each for each in threads if each not in self._workers | self._excluded.keys()])
+            self._workers &= threads.keys()
+            self._slots = sum(count for each, count in threads.items() if each in self._workers)
+            self._send_again()
+            limits = [each.task.options.time_limit for each in list(self._pending.values())]
             if any(limit is not None for limit in limits):
                 self._end_hanging_tasks(self._client.processing())
         except (OSError, TimeoutError):  # the connection has broken; `check` waits for it
             return
+
+    def _check_versions(self, new: list[str]) -> None:
+        """Ask workers for their versions, and exclude those that differ from this process."""
+        if not new:
+            return
+        wanted = dict(versions())
+
+        def differences() -> str:  # a function within another one is sent by value
+            from sandbox.batch.executors import version_differences
+
+            return version_differences(wanted)
+
+        for address, found in self._client.run(differences, workers=new, on_error="return").items():
+            if found == "":
+                self._workers.add(address)
+                continue
+            self._excluded[address] = found if isinstance(found, str) else f"{type(found).__name__}: {found}"[:300]
+            self._notice(f"worker {address} is left out, as its runs would differ: {self._excluded[address]}")
+
+    def _send_again(self) -> None:
+        """Send the tasks that were held, and those whose workers have all left."""
+        for key, each in list(self._pending.items()):
+            if each.workers and not each.workers & self._workers and self._pending.pop(key, None) is not None:
+                each.theirs.cancel()
+                self._held.append((each.ours, each.task))
+        held, self._held = self._held, []
+        for ours, task in held:
+            self._send(ours, task)
 
     def _end_hanging_tasks(self, processing: Any) -> None:
         """End tasks that are on a worker for too long, and restart their workers."""
@@ -135,14 +207,14 @@ class ClusterExecutor:
             for key in map(str, keys):
                 if key not in self._pending:
                     continue
-                ours, theirs, task = self._pending[key]
+                submitted = self._pending[key]
                 since = self._since.setdefault(key, now)
-                limit = task.options.time_limit
-                if limit is not None and now - since > hang_time(limit) * task.runs:
+                limit = submitted.task.options.time_limit
+                if limit is not None and now - since > hang_time(limit) * submitted.task.runs:
                     hanging.append(worker)
                     del self._pending[key]
-                    theirs.cancel()
-                    ours.set_exception(TaskLostError(timeout_reason(limit), is_timeout=True))
+                    submitted.theirs.cancel()
+                    submitted.ours.set_exception(TaskLostError(timeout_reason(limit), is_timeout=True))
         if hanging:
             self._client.restart_workers(hanging, timeout=CONNECT_TIME, raise_for_error=False)
 
@@ -155,11 +227,13 @@ class ClusterExecutor:
         self._since.pop(key, None)
         if found is None:
             return
-        ours = found[0]
+        ours = found.ours
         if done.cancelled():
             ours.set_exception(self._lost_scheduler())
         elif (error := done.exception()) is None:
             ours.set_result(done.result())
+        elif isinstance(error, VersionMismatchError):  # of a worker that has just joined
+            self._held.append((ours, found.task))
         elif isinstance(error, self._killed_worker):
             ours.set_exception(TaskLostError("the workers that ran it died", is_final=True))
         else:

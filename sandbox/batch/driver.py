@@ -43,6 +43,7 @@ from sandbox.batch.executors import (
     RunTask,
     TaskLostError,
     VersionMismatchError,
+    mismatch_text,
 )
 from sandbox.batch.job import (
     CompletedRun,
@@ -56,6 +57,7 @@ from sandbox.batch.job import (
     store_run,
     with_earlier_audit,
 )
+from sandbox.batch.observables import ObservableError
 from sandbox.batch.plan import Plan, PlannedRun
 from sandbox.batch.store import Store, StoreError
 from sandbox.provenance import versions
@@ -256,7 +258,7 @@ class Driver:
                     raise JobError(each.label, error) from error
                 self._faulty(error)
                 continue
-            except (StoreError, TooLargeError) as error:
+            except (StoreError, TooLargeError, ObservableError) as error:
                 raise JobError(each.label, error) from error
             if ready is not None:
                 return ready
@@ -323,9 +325,7 @@ class Driver:
         except TaskLostError as error:
             outcomes, lost = error.outcomes, error
         except VersionMismatchError as error:
-            raise ExecutorError(
-                f"a worker has other versions, so its runs would differ: {error}; install the same ones there"
-            ) from None
+            raise ExecutorError(mismatch_text(str(error))) from None
         except ExecutorError:
             raise
         except CancelledError:

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from sandbox.batch.job import CompletedRun, Job, RunOptions, run_job
 from sandbox.batch.member_runs import MemberTask
+from sandbox.batch.observables import ObservableError
 from sandbox.provenance import versions
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.errors import SceneError
@@ -83,8 +84,8 @@ class JobFailure:
     """A job that could not be run."""
 
     reason: str
-    error: SceneError | None = None
-    """faults of the job: no attempt can succeed"""
+    error: SceneError | ObservableError | None = None
+    """faults of the job or its observable: no attempt can succeed"""
 
 
 JobOutcome = CompletedRun | JobFailure | None
@@ -151,7 +152,7 @@ class InProcessExecutor:
     def _run(self, job: Job, options: RunOptions) -> JobOutcome:
         try:
             return run_job(job, options, self._progress)
-        except SceneError as error:
+        except (SceneError, ObservableError) as error:
             return JobFailure(str(error), error)
         except TooLargeError as error:
             return JobFailure(str(error))
@@ -178,7 +179,7 @@ def outcomes_of(task: AnyTask) -> Iterator[JobOutcome]:
     Raises:
         VersionMismatchError: this worker has other versions.
     """
-    differences = _version_differences(task.versions)
+    differences = version_differences(task.versions)
     if differences:
         raise VersionMismatchError(differences)
     yield from task.outcomes()
@@ -187,7 +188,7 @@ def outcomes_of(task: AnyTask) -> Iterator[JobOutcome]:
 def _outcome(job: Job, options: RunOptions) -> JobOutcome:
     try:
         return replace(run_job(job, options), trajectory=None)
-    except SceneError as error:
+    except (SceneError, ObservableError) as error:
         return JobFailure(str(error), error)
     except TooLargeError as error:
         return JobFailure(str(error))
@@ -197,11 +198,16 @@ def _outcome(job: Job, options: RunOptions) -> JobOutcome:
         return JobFailure(_located(error))
 
 
-def _version_differences(wanted: Mapping[str, str]) -> str:
+def version_differences(wanted: Mapping[str, str]) -> str:
     """Return the versions of this process that differ from the wanted ones; empty if none do."""
     own = versions()
     names = [name for name in {**wanted, **own} if wanted.get(name) != own.get(name)]
     return ", ".join(f"{name} {own.get(name, 'missing')} instead of {wanted.get(name, 'none')}" for name in names)
+
+
+def mismatch_text(differences: str) -> str:
+    """Return the message about a worker with other versions, from these differences."""
+    return f"a worker has other versions, so its runs would differ: {differences}; install the same ones there"
 
 
 def _located(error: Exception) -> str:

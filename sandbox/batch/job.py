@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any, Literal, Self
 
 from sandbox.action import in_order
+from sandbox.batch.observables import Observable, observed_columns
 from sandbox.batch.run_row import ReplayResult, RunRow, details_of
 from sandbox.batch.store import Store, run_id
 from sandbox.batch.stored_run import StoredRun
@@ -84,6 +85,8 @@ class RunOptions:
     """s, computing time of a run, after which it is stopped and recorded as failed"""
     force: bool = False
     """run again what is stored already"""
+    observable: Observable | None = None
+    """function whose values are kept; a stored run without them is observed, or run again if it has no arrays"""
 
 
 @dataclass(frozen=True)
@@ -194,6 +197,7 @@ def run_job(
     Raises:
         TooLargeError: the frames would not fit into memory.
         SceneError: the game of the scene cannot be played by the player.
+        ObservableError: the observable cannot be computed.
     """
     began = perf_counter()
     bout = None if job.player is None else job.player.start_game(job.scene, job.label)
@@ -224,6 +228,8 @@ def run_job(
         assert limit is not None
         return failed_run(job, timeout_reason(limit))
     row = _stored(job, job.run_id or identify(job)[1], trajectory)
+    if options.observable is not None:
+        row = replace(row, details=options.observable.added_to(row.details, trajectory))
     if options.keep == "end":
         row = replace(row, contacts=None, first_contact=None, missed_contacts=None, work=None)
     arrays = trajectory.to_bytes() if options.keep == "all" else None
@@ -252,6 +258,8 @@ def fetch(job: Job, store: Store, options: RunOptions) -> RunRecord | str | None
 
     Raises:
         StoreError: the store cannot be used, or the file of this run cannot be opened.
+        ObservableError: the observable cannot be computed.
+        TooLargeError: the arrays of a run that is observed would not fit into memory.
     """
     found = store.find(job.run_id or identify(job)[1])
     if found is None or options.force:
@@ -259,8 +267,14 @@ def fetch(job: Job, store: Store, options: RunOptions) -> RunRecord | str | None
     fault = store.fault_of_file(found)
     if fault is not None:
         return fault
-    if found.details is None or not is_sufficient(found, options):
+    if found.details is None:
         return None
+    if not is_sufficient(found, options):
+        file = store.file(found)
+        if options.observable is None or file is None or not is_sufficient(found, replace(options, observable=None)):
+            return None
+        found = replace(found, details=options.observable.added_to(found.details, Trajectory.load(file)))
+        store.add_rows([(found, json.loads(found.set_values or "{}") | observed_columns(found.details))])
     if job.plan_key is not None and job.plan_key != found.plan_key:
         store.set_plan_key(found, job.plan_key)
     return RunRecord.of(job, found, store.file(found), repeated=True)
@@ -272,9 +286,11 @@ def is_sufficient(stored: StoredRun, options: RunOptions) -> bool:
         return False
     if stored.status == "refused":
         return True
-    has_ledger = not options.ledger or json.loads(stored.details or "{}").get("ledger") is not None
+    details = json.loads(stored.details or "{}")
+    has_ledger = not options.ledger or details.get("ledger") is not None
     has_contacts = stored.contacts is not None or options.keep == "end"
-    return has_ledger and has_contacts and (stored.path is not None or options.keep != "all")
+    has_observed = options.observable is None or options.observable.has_observed(details)
+    return has_ledger and has_contacts and has_observed and (stored.path is not None or options.keep != "all")
 
 
 def is_audited(stored: StoredRun) -> bool:
@@ -288,7 +304,8 @@ def store_run(store: Store, job: Job, completed: CompletedRun, damaged: str | No
     Raises:
         StoreError: the store cannot be used.
     """
-    row = store.add(completed.stored, completed.arrays, values=dict(job.point), replace_run=True)
+    values = dict(job.point) | observed_columns(completed.stored.details)
+    row = store.add(completed.stored, completed.arrays, values=values, replace_run=True)
     return RunRecord.of(job, row, store.file(row), repeated=False, damaged=damaged, computed=completed.trajectory)
 
 

@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
+from itertools import islice
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, Self, overload
@@ -28,11 +29,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.atomic_write import atomic_write
+from sandbox.batch.observables import OBSERVED
 from sandbox.batch.store import DATABASE, VERSION, Store, StoreError, value_columns
 from sandbox.batch.stored_run import SOLVER, quoted_column
 from sandbox.echo import short_repr
 from sandbox.measure.proportion import wilson_interval
 from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import quoted
 from sandbox.signals import reraise_interrupt
 from sandbox.trajectory import Trajectory
 
@@ -50,9 +53,26 @@ NUMBERS = (
 )  # fmt: skip
 """Columns of figures"""
 FIRST = ("id", "scene", "title", "engine")
-LAST = ("seed", "status", "reason", *NUMBERS, "state_hash", "versions")
-MORE = ("created", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
-"""Columns that a table has only if they are named"""
+FIGURES = ("seed", "status", "reason", *NUMBERS)
+LAST = ("state_hash", "versions")
+WARNINGS = "CASE WHEN json_valid(details) THEN nullif(json_extract(details, '$.warnings'), '[]') END"
+"""Warnings of a run that is ok, a JSON array; null without any"""
+CPU = "CASE WHEN json_valid(details) THEN json_extract(details, '$.cpu') END"
+"""Processor that computed a run"""
+FINAL = {
+    "x": "position[0]", "y": "position[1]", "vx": "velocity[0]", "vy": "velocity[1]", "angle": "angle",
+    "angular_velocity": "angular_velocity",
+}  # fmt: skip
+"""Columns of the state of a body at the end, such as `final.ball.x`, which a table has only if they are named: their
+places in its JSON"""
+LAST_DETAILS = "SELECT details FROM runs WHERE rowid IN (SELECT max(rowid) FROM runs GROUP BY scene)"
+"""Details of the last run of each scene, whose bodies have columns"""
+MAX_COLUMNS = 2_000
+"""of a query of SQLite"""
+PROVENANCE = ("settings", "created", "cpu")
+"""Columns that a file has beside those of a table"""
+MORE = ("warnings", "created", "cpu", "scene_hash", "path", "size", "settings", "set_values", "work", "details")
+"""Further columns that a table has only if they are named"""
 PROGRESS_STEPS = 100_000
 """Instructions of the database between two looks for Ctrl-C, a few milliseconds"""
 READ_ACTIONS = (sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ, sqlite3.SQLITE_FUNCTION)
@@ -124,18 +144,25 @@ class StoredRuns:
                 self._connection = self._opened()
             self._connection.text_factory = lambda data: data.decode("utf-8", "replace")
             values = value_columns(self._connection)
+            ends = self._connection.execute(LAST_DETAILS).fetchall()
         except OSError as error:
             raise StoreError(f"{self.directory}: {error.strerror or error}") from None
         except sqlite3.Error as error:
             raise StoreError(f"{self._database}: {error}; it is damaged, or not a database of runs") from None
         settings = [f"{SOLVER}{key}" for key in Settings.model_fields if f"{SOLVER}{key}" not in values]
-        self.value_columns = tuple(values)
+        self.value_columns = tuple(name for name in values if not name.startswith(OBSERVED))
         """paths of the values that runs have set, swept or sampled"""
-        self.columns = (*FIRST, *values, *LAST, *settings, "world.seed", *MORE)
+        self.observed_columns = tuple(name for name in values if name.startswith(OBSERVED))
+        """values of the functions of `--observe`"""
+        self.columns = (*self.default_columns(), *settings, "world.seed", *MORE)
         """names of all columns"""
-        sources = {"title": "scene_title", "world.seed": "seed"}
+        sources = {"title": "scene_title", "world.seed": "seed", "warnings": WARNINGS, "cpu": CPU}
+        finals = _final_sources([text for (text,) in ends], MAX_COLUMNS - len(self.columns) - 1)
+        sources |= finals
+        self.columns += tuple(finals)
         sources |= {name: f"json_extract(settings, '$.{name.removeprefix(SOLVER)}')" for name in settings}
         parts = (f"{sources.get(name, quoted_column(name))} AS {quoted_column(name)}" for name in self.columns)
+        self._order = [quoted_column(name) for name in ("scene", "engine", *self.value_columns, "seed", "id")]
         self._source = f"(SELECT rowid AS added, {', '.join(parts)} FROM runs)"
         self._connection.set_authorizer(_authorize)
         self._connection.set_progress_handler(lambda: 0, PROGRESS_STEPS)  # lets Python handle signals
@@ -173,6 +200,7 @@ class StoredRuns:
         """Return the folder, the number of runs by status, and the values that they set."""
         counts = ", ".join(f"{count:,} {status}" for status, count in self.statuses().items())
         values = f"; values: {', '.join(self.value_columns)}" if self.value_columns else ""
+        values += f"; {', '.join(self.observed_columns)}" if self.observed_columns else ""
         return f"<StoredRuns in {self.directory}: {counts or 'no runs'}{values}>"
 
     def statuses(self, where: str | None = None) -> dict[str, int]:
@@ -235,13 +263,17 @@ class StoredRuns:
         limit: int | None = None,
         kind: TableKind | None = None,
     ) -> Any:
-        """Return runs as a table, in the order of adding unless sorted.
+        """Return runs as a table.
+
+        Unless sorted, runs are in the order of their scenes, engines, values and seeds, which does not depend on the
+        order in which workers complete them.
 
         Args:
             where: SQL expression that selects runs, such as `solver.dt < 0.01 and status = 'ok'`.
-            columns: names of `columns`; default: the scene, the engine, the values that were set, and all figures.
+            columns: names of `columns`; default: the scene, the engine, the values that were set, and all figures,
+                with those of `--observe`.
             sort: columns to sort by; `-` before a name sorts in descending order.
-            limit: largest number of rows, the last ones.
+            limit: largest number of rows: the first ones of `sort`, or the last ones that were added.
             kind: `pandas` or `polars` for a data frame, `numpy` for arrays by column; default: what is installed, in
                 this order.
 
@@ -275,17 +307,19 @@ class StoredRuns:
             QueryError: the filter or a name is wrong.
         """
         names = list(dict.fromkeys(self.default_columns() if columns is None else map(self.column, columns)))
-        order = ", ".join([*map(self._sort_term, sort), "added"])
-        text = f"SELECT added, {', '.join(map(quoted_column, names))} FROM {self._source}{self._filter(where)}"
-        if limit is not None and not sort:  # the last ones, in the order of adding
-            text = f"SELECT * FROM ({text} ORDER BY added DESC LIMIT {int(limit)})"
-        rows = self._execute(f"{text} ORDER BY {order}" + (f" LIMIT {int(limit)}" if limit is not None else ""))
-        cells = zip(*rows, strict=True) if rows else [()] * (len(names) + 1)
-        return {name: _array(name, values) for name, values in zip(names, list(cells)[1:], strict=True)}
+        order = ", ".join([*map(self._sort_term, sort), *self._order])
+        source = f"{self._source}{self._filter(where)}"
+        if limit is not None and not sort:  # the last ones that were added
+            last = f"SELECT added FROM {source} ORDER BY added DESC LIMIT {int(limit)}"
+            source = f"{self._source} WHERE added IN ({last})"
+        text = f"SELECT {', '.join(map(quoted_column, names))} FROM {source} ORDER BY {order}"
+        rows = self._execute(text + (f" LIMIT {int(limit)}" if limit is not None else ""))
+        cells = list(zip(*rows, strict=True)) if rows else [()] * len(names)
+        return {name: _array(name, values) for name, values in zip(names, cells, strict=True)}
 
     def default_columns(self) -> tuple[str, ...]:
         """Return the columns of a table for which none are named."""
-        return (*FIRST, *self.value_columns, *LAST)
+        return (*FIRST, *self.value_columns, *FIGURES, *self.observed_columns, *LAST)
 
     def group(
         self,
@@ -352,15 +386,15 @@ class StoredRuns:
         return Trajectory.load(self.directory / str(found[1]))
 
     def trajectories(self, where: str | None = None) -> Iterator[tuple[str, Trajectory]]:
-        """Yield the id and the trajectory of runs with arrays, in the order of adding; each is read when it is due.
+        """Yield the id and the trajectory of runs with arrays, in the order of `table`; each is read when it is due.
 
         Raises:
             QueryError: the filter is wrong.
             OSError: a file cannot be read.
             ValueError: a file is damaged.
         """
-        selected = f"{self._filter(where)} {'AND' if where else 'WHERE'} path IS NOT NULL ORDER BY added"
-        for run, path in self._execute(f"SELECT id, path FROM {self._source}{selected}"):
+        selected = f"{self._source}{self._filter(where)} {'AND' if where else 'WHERE'} path IS NOT NULL"
+        for run, path in self._execute(f"SELECT id, path FROM {selected} ORDER BY {', '.join(self._order)}"):
             yield str(run), Trajectory.load(self.directory / str(path))
 
     def final(self, run: str) -> dict[str, dict[str, Any]]:
@@ -379,11 +413,13 @@ class StoredRuns:
     def to_csv(self, path: str | Path, where: str | None = None, columns: Sequence[str] | None = None) -> int:
         """Write runs as a CSV file, and return their number; cells without a value are empty.
 
+        The default columns are those of `table`, and `settings` (JSON), `created` and `cpu`.
+
         Raises:
             QueryError: the filter or a name is wrong.
             OSError: the file cannot be written.
         """
-        found = self.arrays(where, columns)
+        found = self.arrays(where, columns or (*self.default_columns(), *PROVENANCE))
         with atomic_write(Path(path)) as temporary, temporary.open("x", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(found)
@@ -393,6 +429,8 @@ class StoredRuns:
     def to_parquet(self, path: str | Path, where: str | None = None, columns: Sequence[str] | None = None) -> int:
         """Write runs as a Parquet file, and return their number. It needs pyarrow, the extra `parquet`.
 
+        The default columns are those of `to_csv`.
+
         Raises:
             QueryError: the filter or a name is wrong.
             OSError: the file cannot be written.
@@ -401,7 +439,7 @@ class StoredRuns:
         import pyarrow
         from pyarrow import parquet
 
-        found = self.arrays(where, columns)
+        found = self.arrays(where, columns or (*self.default_columns(), *PROVENANCE))
         cells = {name: [row[k] for row in cell_rows(found)] for k, name in enumerate(found)}
         typed = {name: _one_type(values) for name, values in cells.items()}
         with atomic_write(Path(path)) as temporary:
@@ -509,6 +547,28 @@ def cell_rows(found: Columns) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of a table, with None for cells without a value."""
     for row in zip(*(values.tolist() for values in found.values()), strict=True):
         yield tuple(None if cell != cell else cell for cell in row)
+
+
+def _final_sources(texts: Sequence[str | None], count: int) -> dict[str, str]:
+    """Return the columns of the states at the end, at most `count`, and the SQL of each.
+
+    Args:
+        texts: details of runs, with the names of their bodies.
+        count: largest number of columns.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        try:
+            details = json.loads(text or "{}")
+        except ValueError:  # a damaged row
+            continue
+        bodies = details.get("final") if isinstance(details, dict) else None
+        for name in bodies if isinstance(bodies, dict) else ():
+            if '"' not in name and "\\" not in name:  # which paths of SQLite cannot have
+                stem = name.replace("'", "''")
+                for part, key in FINAL.items():
+                    found[f"final.{quoted(name)}.{part}"] = f"json_extract(details, '$.final.\"{stem}\".{key}')"
+    return dict(islice(found.items(), max(count, 0)))
 
 
 def _row_count(found: Columns) -> int:

@@ -13,9 +13,11 @@ from typing import Any, Self
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.batch.observables import observed_values
 from sandbox.batch.stored_run import StoredRun
 from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
+from sandbox.provenance import machine
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
@@ -125,6 +127,8 @@ class RunRow:
     """None if the ledger was not asked for"""
     final: Mapping[str, FinalBodyState] | None = field(metadata=in_json(optional=True))
     """state of each body at the end, by name; None if it was not asked for"""
+    observed: Mapping[str, float | int | str | None] | None = field(metadata=in_json(optional=True))
+    """values of the functions of `--observe`, by name; None if there was none"""
     path: str | None
     """of the stored arrays"""
     repeated: bool
@@ -198,6 +202,7 @@ class RunRow:
             game=None if game is None else GameResult(**game),
             account=RunLedger(_ledger(details.get("ledger"))) if ledger else None,
             final={name: _final_state(state) for name, state in details.get("final", {}).items()} if final else None,
+            observed=observed_values(details),
             path=path,
             repeated=repeated,
             damaged=damaged,
@@ -228,6 +233,7 @@ def details_of(run: Trajectory, scene: Scene, has_game: bool) -> dict[str, Any]:
         "game": {key: game.get(key) for key in GAME} if has_game else None,
         "ledger": to_json(ledger_of(run, scene).document()) if len(run.energy) else None,
         "final": _final_states(run),
+        "cpu": machine()["cpu"],
     }
 
 

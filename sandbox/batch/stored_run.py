@@ -122,7 +122,8 @@ class StoredRun:
     digest: str | None = None
     """32 hex digits: SHA-256 of that file, shortened"""
     details: str | None = None
-    """JSON object: final state of each body, removed and pocketed bodies, game, energy ledger"""
+    """JSON object: final state of each body, removed and pocketed bodies, game, energy ledger, observed values,
+    warnings, processor"""
 
     @classmethod
     def of(

@@ -53,6 +53,7 @@ class _StudyTable(BaseModel):
     time_limit: Annotated[float, Field(gt=0.0, allow_inf_nan=False, strict=False)] | None = None
     audit: bool | None = None
     ledger: bool | None = None
+    observe: str | None = None
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Study:
     time_limit: float | None = None
     audit: bool | None = None
     ledger: bool | None = None
+    observe: str | None = None
+    """`FILE.py:FUNCTION`"""
     source: str = field(default="", compare=False)
     """file of the study; empty for the command line"""
 
@@ -116,6 +119,7 @@ class Study:
             time_limit=table.time_limit,
             audit=table.audit,
             ledger=table.ledger,
+            observe=None if table.observe is None else str(Path(path).parent / table.observe),
             source=file,
         )
 
@@ -137,6 +141,7 @@ class Study:
             time_limit=given.time_limit or self.time_limit,
             audit=self.audit if given.audit is None else given.audit,
             ledger=self.ledger if given.ledger is None else given.ledger,
+            observe=given.observe or self.observe,
             source=self.source,
         )
 

@@ -106,6 +106,7 @@ class _Answers:
 @click.option(
     "--expand", is_flag=True, help="print the scene as TOML with its presets (tables, racks) expanded to primitives"
 )
+@click.option("-v", "--verbose", is_flag=True, help="list the physics that a scene does not need, too")
 def check_command(
     scenes: tuple[str, ...],
     overrides: tuple[str, ...],
@@ -114,6 +115,7 @@ def check_command(
     as_json: bool,
     quiet: bool,
     expand: bool,
+    verbose: bool,
 ) -> int:
     """Validate scenes and predict numerical problems: required physics, engines that can run the scene, warnings.
 
@@ -151,7 +153,7 @@ def check_command(
             answers.add(document, _status(document, engine))
             report_remarks(name, document.remarks or ())
             if not as_json:
-                _print(scene, document, quiet)
+                _print(scene, document, quiet, verbose)
     if as_json:
         documents = to_json(answers.documents)
         print_json(documents[0] if len(documents) == len(names) == 1 else {"scenes": documents})
@@ -216,17 +218,22 @@ def _faulty(name: str, faults: Sequence[Fault]) -> CheckDocument:
     return CheckDocument(scene=name, ok=False, faults=shown)
 
 
-def _print(scene: Scene, document: CheckDocument, quiet: bool) -> None:
-    """Print the result for a scene; with `quiet`, only the warnings."""
+def _print(scene: Scene, document: CheckDocument, quiet: bool, verbose: bool) -> None:
+    """Print the result for a scene, warnings first; with `quiet`, only these, and with `verbose`, all demands."""
     name = document.scene
     if quiet:
         for warning in document.warnings:
             click.echo(f"{name}: warning: {warning.message}")
         return
     click.echo(f"{name}: {scene.title}" if scene.title else name)
+    for warning in document.warnings:
+        print_item(f"warning: {warning.message}")
     on, off = click.style("on ", fg="green", bold=True), click.style("off", dim=True)
-    demands = _demand_lines(document.bill)
-    print_descriptions({f"{on if is_on else off}  {what:<15}": why for is_on, what, why in demands}, "  ")
+    demands = [*_demand_lines(document.bill)]
+    shown = [line for line in demands if verbose or line[0]]
+    print_descriptions({f"{on if is_on else off}  {what:<15}": why for is_on, what, why in shown}, "  ")
+    if len(shown) < len(demands):
+        click.echo(f"  {off}  {len(demands) - len(shown)} others, which -v lists")
     for engine, support in document.engines.items():
         print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
     print_item(_step_text(scene, document))
@@ -238,8 +245,6 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool) -> None:
         print_item(f"game {document.game.name}: {', '.join(keys)}")
     for note in document.notes:
         print_item(f"note: {note.message}")
-    for warning in document.warnings:
-        print_item(f"warning: {warning.message}")
 
 
 def _step_text(scene: Scene, document: CheckDocument) -> str:

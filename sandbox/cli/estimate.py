@@ -132,7 +132,7 @@ def _print(document: EstimateDocument, plan: Plan, axes: Sequence[int], workers:
         f"{duration_text(document.seconds_per_run)} a run; measured on {made}, not stored"
     )
     if out is not None:
-        click.echo(f"about {_size_text(document.bytes)} in {out}")
+        click.echo(f"about {size_text(document.bytes)} in {out}")
 
 
 def _samples(plan: Plan) -> list[PlannedRun]:
@@ -191,7 +191,8 @@ def _name(planned: PlannedRun) -> str:
     return " ".join((planned.label, planned.engine, *(f"{key}={value}" for key, value in planned.values)))
 
 
-def _size_text(size: float) -> str:
+def size_text(size: float) -> str:
+    """Return a size in bytes as text."""
     for unit, factor in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
         if size >= factor:
             return f"{size / factor:.3g} {unit}"

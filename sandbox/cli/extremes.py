@@ -48,6 +48,8 @@ from sandbox.scene.errors import Fault
 
 MIN_WIDTH = 60
 """Smallest width to which a line of results is cut on a narrow terminal."""
+LARGE_ERROR = 0.01
+"""Error, as a fraction, from which a level that passes is named with its error"""
 LETTERS = {"exact": "E", "degraded": "d", "refused": "–", "failed": "✗"}
 STYLES = {"exact": "bold green", "degraded": "yellow", "refused": "dim", "failed": "bold red"}
 
@@ -105,13 +107,24 @@ def _print_limits(result: Extremes) -> None:
         cells = list(_row(result, limit))
         for cell in cells:
             line.append(LETTERS[cell.verdict], STYLES[cell.verdict])
-        line.append(f"{'':<{levels - len(cells)}}  {_reached(limit)}")
+        line.append(f"{'':<{levels - len(cells)}}  {_reached(limit)}{_worst(cells)}")
         line.truncate(max(console.width, MIN_WIDTH), overflow="ellipsis")
         console.print(line, soft_wrap=True)
         previous_axis = limit.axis
     if result.limits:
         legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
         print_line(f"one letter per level, from the easiest to the hardest: {legend}", "dim")
+
+
+def _worst(cells: Sequence[Sample]) -> str:
+    """Return the largest error of the levels that pass, where it is more than `LARGE_ERROR`; empty otherwise."""
+    degraded = [(cell.outcome.error, cell) for cell in cells if cell.verdict == "degraded" and cell.outcome.error]
+    error, worst = max(degraded, key=lambda each: each[0], default=(0.0, None))
+    return "" if worst is None or error < LARGE_ERROR else f"; at {_level(worst)} {worst.outcome.reason}"
+
+
+def _level(cell: Sample) -> str:
+    return format_optional(cell.level, ".4g") if isinstance(cell.level, float | int) else str(cell.level)
 
 
 def _row(result: Extremes, limit: Boundary) -> Iterator[Sample]:

@@ -5,7 +5,7 @@ import runpy
 import sys
 import traceback
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 OWN_OPTIONS = ("--to", "--force", "--steps", "--json", "--quiet")
 """Options of this command, which a game after whose name they stand gets instead"""
+
+
+MAX_TITLE = 200
+"""Characters of the title of a scene"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +119,7 @@ def record_command(
     if not faults:
         try:
             captured.recording.save(path)  # before the replay, which may take as long as the game
-            recording = _checked(captured, as_json or quiet)
+            recording = _with_title(_checked(captured, as_json or quiet), Path(game).stem)
             recording.save(path)
         except CaptureError as error:
             faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
@@ -168,6 +172,13 @@ def _checked(captured: "GameCapture", is_silent: bool) -> Recording:
     except KeyboardInterrupt:
         click.echo("interrupted: the recording is kept, and its replay was not compared with the game", err=True)
         return captured.recording
+
+
+def _with_title(recording: Recording, title: str) -> Recording:
+    """Return a recording whose scene has a title of at most the length of titles; unchanged if it cannot be printed."""
+    if not title.isprintable():
+        return recording
+    return replace(recording, scene=recording.scene.model_copy(update={"title": title[:MAX_TITLE]}))
 
 
 def _faults(game: str, path: Path, force: bool) -> list[Fault]:

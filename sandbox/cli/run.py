@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from shutil import disk_usage
 from typing import Any
 
 import click
@@ -16,6 +17,7 @@ from sandbox.action import Spawn
 from sandbox.batch.driver import Driver, JobError
 from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor
 from sandbox.batch.job import KEEP, Job, KeptParts, RunOptions, RunRecord
+from sandbox.batch.observables import Observable, ObservableError
 from sandbox.batch.plan import Plan
 from sandbox.batch.process_pool import ProcessExecutor
 from sandbox.batch.sampling import Sampling
@@ -32,7 +34,7 @@ from sandbox.cli.common import (
     scene_paths,
     suggest_names,
 )
-from sandbox.cli.estimate import print_estimate
+from sandbox.cli.estimate import print_estimate, size_text
 from sandbox.cli.options import (
     OutputOptions,
     engines_option,
@@ -66,6 +68,8 @@ from sandbox.scene.files.overrides import AddressError
 
 MAX_STATED = 5
 """Swept values that a message states"""
+LARGE_STORE = 1e9
+"""bytes of a study that are reported after its first run"""
 MAX_MISSED = 3
 """Missed contacts that are listed below the table of a single run."""
 
@@ -92,6 +96,7 @@ class _Options(OutputOptions):
     bodies: tuple[str, ...]
     audit: bool | None
     ledger: bool | None
+    observe: str | None
     verbose: bool
 
 
@@ -146,6 +151,12 @@ class _Options(OutputOptions):
     is_flag=True,
     default=None,
     help="account for energy by cause; a pymunk run takes 3 to 12 times as long",
+)
+@click.option(
+    "--observe",
+    metavar="FILE.py:FUNCTION",
+    help="compute figures of your own: FUNCTION gets the Trajectory of each run and returns a number, a text, or a "
+    "dict of them, which become columns",
 )
 @json_option
 @verbose_option
@@ -215,6 +226,7 @@ def _study(options: _Options, faults: list[Fault]) -> Study | None:
         time_limit=options.time_limit,
         audit=options.audit,
         ledger=options.ledger,
+        observe=options.observe,
     )
     if not any(map(is_study, options.scenes)):
         return given
@@ -250,6 +262,7 @@ def _plan(study: Study, options: _Options, faults: list[Fault]) -> Plan | None:
         faults.append(Fault.of("--workers", "is given with --on too; leave out one of them"))
     with collect_errors(faults, "--sweep", (AddressError,)):
         keeps_ends = study.keep == "end" and study.time_limit is None and not study.ledger and not study.audit
+        keeps_ends = keeps_ends and study.observe is None
         return Plan(found, names, study.overrides, axes, study.seeds, player, keeps_ends)
     return None
 
@@ -277,6 +290,9 @@ def _checked_batch(
         plan.check(is_stored, visit, progress)
     if plan.player is not None and not plan.has_player and not faults:
         faults.append(Fault.of("--player", "has no use: none of the scenes has a game with rules"))
+    observable: Observable | None = None
+    with collect_errors(faults, "--observe", (ObservableError,)):
+        observable = None if study.observe is None else Observable.read(study.observe)
     count = len(plan)
     scene = scenes[0] if count == 1 and scenes else None
     if not faults:
@@ -285,7 +301,7 @@ def _checked_batch(
         with collect_errors(faults):
             _check_drawing(options.plot, options.bodies, count, scene)
     faults += memory
-    return None if faults else RunBatch(plan, study, count, scene)
+    return None if faults else RunBatch(plan, study, count, scene, observable)
 
 
 def _run_options(batch: RunBatch, options: _Options) -> RunOptions:
@@ -297,6 +313,7 @@ def _run_options(batch: RunBatch, options: _Options) -> RunOptions:
         keep=study.keep or "all",
         time_limit=study.time_limit,
         force=options.force,
+        observable=batch.observable,
     )
 
 
@@ -312,6 +329,8 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
 
             def done(index: int, record: RunRecord) -> None:
                 stored = record.stored
+                if not batch.done and not options.is_silent:
+                    _note_size(record, batch.count, options)
                 batch.add(index, record, run_options, is_chosen)
                 name = _name(record.label, stored.engine, dict(record.values))
                 monitor.add(name, seconds=stored.seconds, is_ok=stored.status == "ok", is_stored=record.repeated)
@@ -339,6 +358,19 @@ def _run_all(batch: RunBatch, options: _Options, store: Store | None) -> None:
         batch.status = 1
         option = "--on" if options.cluster is not None else "--workers"
         click.echo(f"{option}: {error}; {batch.done} {kept}", err=True)
+
+
+def _note_size(record: RunRecord, count: int, options: _Options) -> None:
+    """After the first run, say how much space all of them take, if it is much."""
+    size = (record.stored.size or 0) * count
+    if options.out is None or size < LARGE_STORE:
+        return
+    free = disk_usage(options.out).free
+    click.echo(
+        f"{count:,} runs of this size take {size_text(size)} in {options.out}, where {size_text(free)} are free; "
+        "--keep summary stores figures and final states without arrays",
+        err=True,
+    )
 
 
 def _report_members(label: str, engine: str, reported: set[tuple[str, str]], options: _Options) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import click
 
 from sandbox.batch.job import RunOptions, RunRecord
+from sandbox.batch.observables import Observable
 from sandbox.batch.plan import Plan
 from sandbox.batch.run_row import RunRow
 from sandbox.batch.study import Study
@@ -32,6 +33,8 @@ class RunBatch:
     """number of runs; an upper bound in a large plan"""
     scene: Scene | None = None
     """of the run, if there is only one"""
+    observable: Observable | None = None
+    """function of `--observe`"""
     rows: dict[int, RunRow] = field(default_factory=dict)
     """rows of completed runs by their number, if there are few; without those that only JSON prints"""
     spool: JsonSpool | None = None

@@ -155,6 +155,7 @@ def print_runs(rows: Sequence[RunRow], verbose: bool = False) -> None:
         add_columns(table, ["game"])
     if show.pocketed:
         add_columns(table, ["falls"])
+    add_columns(table, show.observed, "right")
     for row in rows:
         table.add_row(*_cells(row, show))
 
@@ -168,6 +169,7 @@ def print_runs(rows: Sequence[RunRow], verbose: bool = False) -> None:
     if verbose:
         meanings = {key: f"setting `solver.{key}`" for key in show.differing}
         meanings |= {key: f"value of {key!r}" for key in show.swept}
+        meanings |= {key: f"value of {key!r} by the function of --observe" for key in show.observed}
         print_legend(heads_of(table), LEGEND | meanings)
     elif sys.stdout.isatty():  # without a terminal, every line of the output is a row of the table
         print_line("; ".join(_legend(show)), "dim")
@@ -190,6 +192,8 @@ class _Columns(NamedTuple):
     velocities: bool
     games: bool
     pocketed: bool
+    observed: list[str]
+    """names of the values of `--observe`"""
 
     @classmethod
     def of(cls, rows: Sequence[RunRow], verbose: bool) -> "_Columns":
@@ -214,6 +218,7 @@ class _Columns(NamedTuple):
             velocities=verbose and is_small and len({_vector(body.velocity) for body in ends}) > 1,
             games=games,
             pocketed=any(row.pocketed for row in rows),
+            observed=list(dict.fromkeys(name for row in rows for name in row.observed or ())),
         )
 
 
@@ -254,6 +259,13 @@ def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
         yield Text(_game_end(row))
     if show.pocketed:
         yield Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row.pocketed.items()))
+    yield from (_observed((row.observed or {}).get(name)) for name in show.observed)
+
+
+def _observed(value: float | int | str | None) -> "Text":
+    from rich.text import Text
+
+    return Text("–" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value))
 
 
 def _legend(show: _Columns) -> Iterator[str]:

@@ -227,6 +227,9 @@ def _answer(runs: StoredRuns, options: _Options) -> int:
         _print_csv(list(table), cell_rows(table))
     elif not options.quiet:
         _print_list(table if columns is not None else _informative(table), count, statuses)
+        has_warnings = " AND ".join(f"({each}\n)" for each in (*options.wheres, "warnings IS NOT NULL"))
+        if columns is None and (warned := sum(runs.statuses(has_warnings).values())):
+            print_line(f"runs with warnings: {warned:,}; --columns id,warnings lists them", "dim")
     return 0
 
 

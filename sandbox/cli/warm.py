@@ -27,6 +27,7 @@ def warm_command(quiet: bool) -> int:
     from sandbox.measure.compare import compare
     from sandbox.window.warm_up import warm_up, warm_ups
 
+    COMPILE_CLOCK.announces = False
     entries = warm_ups()
     with progress_bars(quiet) as bars:
         bar = bars.add("compiling", len(entries) + 1.0)

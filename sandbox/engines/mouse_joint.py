@@ -8,10 +8,9 @@ and therefore stable at any h; a spring force would be unstable beyond ω·h of 
 import math
 from collections.abc import Mapping
 
-from pydantic import ValidationError
-
 from sandbox.action import ActionError, Impulse, Pull
 from sandbox.engines.contract import Simulation
+from sandbox.scene.errors import PartError
 from sandbox.scene.geometry.vectors import rotate
 
 FREQUENCY = 7.5  # Hz
@@ -126,5 +125,5 @@ class MouseJoints:
             )
             try:
                 simulation.apply(Impulse(time=0.0, body=name, impulse=impulse, angular=angular))
-            except (ActionError, ValidationError):  # the speed or impulse exceeds its limit: remove the joint
+            except (ActionError, PartError):  # the speed or impulse exceeds its limit: remove the joint
                 del self._pulls[name]

@@ -17,7 +17,7 @@ Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `
 The skill of a bot is a number from 0 to 1.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
@@ -129,6 +129,19 @@ class HasObservation(Protocol):
 
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return names and finite values; names and order are constant during a game, for every seed."""
+
+
+@runtime_checkable
+class HasPlayers(Protocol):
+    """Rules of a game of several players or teams, who take turns."""
+
+    @property
+    def player(self) -> str:
+        """Name of the player whose turn it is."""
+
+    @property
+    def scores(self) -> Mapping[str, int | float]:
+        """Score of each player by name; the names are constant during a game."""
 
 
 @runtime_checkable

@@ -4,8 +4,6 @@ import math
 from time import perf_counter
 from typing import Any
 
-from pydantic import ValidationError
-
 from sandbox.action import ActionError, Impulse, Move, Pull
 from sandbox.engines.contract import Refusal
 from sandbox.interactive.live_scene import STEP_TIMEOUT, LiveScene
@@ -28,6 +26,7 @@ from sandbox.interactive.messages import (
     read_inputs,
 )
 from sandbox.scene.description.base import Point
+from sandbox.scene.errors import PartError
 from sandbox.scene.geometry.vectors import rotate
 
 PUSH_SPEED = 1.0
@@ -146,7 +145,7 @@ class Viewer:
             except ActionError:
                 self._held = None
                 raise
-            except ValidationError:  # beyond the range of coordinates, with the origin of the picture
+            except PartError:  # beyond the range of coordinates, with the origin of the picture
                 self._held = None
                 raise ActionError("the point is out of range") from None
 

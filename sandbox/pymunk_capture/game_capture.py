@@ -33,7 +33,7 @@ from sandbox.pymunk_capture.space_capture import (
 from sandbox.pymunk_capture.space_form import MotionState, SpaceForm
 from sandbox.pymunk_capture.state_log import StateLog
 from sandbox.recording import RecordedGame, Recording
-from sandbox.scene.errors import SettingsError, quoted
+from sandbox.scene.errors import PartError, SettingsError, quoted
 
 MAX_ACTIONS = 1_000_000
 """Actions of a recording; a game that changes 1,000 bodies at 60 Hz makes as many in 17 s"""
@@ -78,6 +78,7 @@ class SpaceCapture:
         """step in which the space first has such a body, and its name"""
         self._not_finite: dict[str, None] = {}  # names of bodies for which pymunk has computed such values
         self._form = SpaceForm.of(space, self._names)
+        self._scene_joints = {joint: form for joint, form in self._form.joints.items() if joint in self._joint_paths}
         self.log = StateLog()
         """states after each step"""
         self.log.eccentric |= {body for body in self._names if any(body.center_of_gravity)}
@@ -95,7 +96,10 @@ class SpaceCapture:
             self._note_forces()
         self._dts.append(dt)
         self.has_constant_step &= dt == self._dts[0]
-        self._set_in_step = {body for body in self._names if _has_functions(body)}
+        self._set_in_step = {
+            body for body, name in self._names.items() if _has_functions(body) or self._has_other_type(body, name)
+        }
+        self._set_in_step |= self._bodies_of_other_joints() & self._names.keys()
         self._is_stepping = True
 
     def after_physics(self, has_callbacks: bool) -> None:
@@ -112,6 +116,21 @@ class SpaceCapture:
         self._elapsed = self.steps * dt if self.has_constant_step else self._elapsed + dt
         self._states = {body: MotionState.of(body) for body in self._names}
         self.log.add(self.steps, self._logged(), self._states, self._set_in_step)
+
+    def _has_other_type(self, body: pymunk.Body, name: str) -> bool:
+        """Return whether a body has another type, static, kinematic or dynamic, than in the scene."""
+        in_scene = pymunk.Body.STATIC
+        if name in self._moving:
+            in_scene = pymunk.Body.DYNAMIC if name in self._dynamic else pymunk.Body.KINEMATIC
+        return name in self._scene_bodies and body.body_type != in_scene
+
+    def _bodies_of_other_joints(self) -> set[pymunk.Body]:
+        """Return the bodies of joints that are not as in the scene: added, removed or changed by the game."""
+        scene, now = self._scene_joints, self._form.joints
+        if now == scene:
+            return set()
+        others = (joint for joint in now.keys() | scene.keys() if now.get(joint) != scene.get(joint))
+        return {body for joint in others for body in (joint.a, joint.b)}
 
     def _logged(self) -> dict[pymunk.Body, str]:
         return {body: name for body, name in self._names.items() if name in self._scene_bodies}
@@ -162,10 +181,10 @@ class SpaceCapture:
                     f"space.damping = {space.damping:g}, which the game sets; `world.damping` is above 0 and at most 1"
                 ] = None
         if self.steps:
-            form, known = SpaceForm.of(space, self._names), dict(self._names)
+            form, known, joints = SpaceForm.of(space, self._names), dict(self._names), self._scene_joints
             self._note_population()
             exchanged = known.keys() ^ self._names.keys()
-            self._omitted |= dict.fromkeys(form.changes_since(self._form, exchanged | self._missing, known))
+            self._omitted |= dict.fromkeys(form.changes_since(self._form, exchanged | self._missing, known, joints))
             self._note_coefficients(form)
             self._note_motors(form)
             self._note_motion()
@@ -175,11 +194,9 @@ class SpaceCapture:
         """Add an action at the present time; one with values that a scene cannot have is a remark."""
         try:
             self._actions.append(kind(time=self.time, **values))
-        except ValidationError as error:
-            first = error.errors()[0]
-            what = values.get("body") or values.get("path")
-            key = ".".join(str(each) for each in first["loc"][:1])
-            self._omitted[f"values of {what} that the game sets ({key}: {first['msg']})"] = None
+        except PartError as error:
+            what, fault = values.get("body") or values.get("path"), error.faults[0]
+            self._omitted[f"values of {what} that the game sets ({fault.path}: {fault.message})"] = None
 
     def _note_population(self) -> None:
         """Note bodies that were added or removed. Bodies without shapes and joints are not used."""
@@ -187,6 +204,9 @@ class SpaceCapture:
         for body in self._form.bodies.keys() - {*self.space.bodies, self.space.static_body}:
             name = self._names.pop(body)
             self._paths = {shape: path for shape, path in self._paths.items() if shape.body is not body}
+            self._scene_joints = {
+                joint: form for joint, form in self._scene_joints.items() if body not in (joint.a, joint.b)
+            }
             if name in self._scene_bodies:
                 self._act(Remove, body=name)
             else:
@@ -259,7 +279,11 @@ class SpaceCapture:
         """Note bodies whose motion is not that after the physics of the last step, or was set within it."""
         for body, name in self._names.items():
             before, now = self._states[body], MotionState.of(body)
-            was_set = body in self._set_in_step and name in self._moving and not body.is_sleeping
+            was_set = (
+                body in self._set_in_step
+                and (name in self._moving or self._has_other_type(body, name))
+                and not body.is_sleeping
+            )
             if before == now and not was_set:
                 continue
             self._states[body] = now
@@ -271,7 +295,7 @@ class SpaceCapture:
                     self._omitted["walls and posts that the game moves"] = None
                 continue
             is_moving = name in self._moving
-            if not is_moving and now.velocity != before.velocity:
+            if not is_moving and now.velocity != before.velocity and not was_set:
                 self._omitted[f"the velocity of {name}, which is fixed in the scene"] = None
             x, y = body.local_to_world(body.center_of_gravity) if any(body.center_of_gravity) else now.position
             values: dict[str, Any] = {"body": name, "position": (x, y)}

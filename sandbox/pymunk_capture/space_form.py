@@ -1,7 +1,7 @@
 """States of a pymunk space in which a game's changes are seen: motion of bodies, and form of the space."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -76,7 +76,11 @@ class SpaceForm:
         )
 
     def changes_since(
-        self, before: "SpaceForm", explained: Set[pymunk.Body], names: Mapping[pymunk.Body, str]
+        self,
+        before: "SpaceForm",
+        explained: Set[pymunk.Body],
+        names: Mapping[pymunk.Body, str],
+        joints: Container[pymunk.Constraint],
     ) -> Iterator[str]:
         """Yield what has changed since an earlier form.
 
@@ -84,6 +88,7 @@ class SpaceForm:
             before: the earlier form.
             explained: bodies that were added or removed by actions, with their shapes.
             names: names of bodies.
+            joints: the joints of the scene.
         """
         if self.settings != before.settings:
             yield "settings and callbacks of the space that the game changes"
@@ -97,17 +102,18 @@ class SpaceForm:
             return
         yield from _joints("adds", [joint for joint in self.joints if joint not in before.joints])
         # A body that is removed takes its joints along.
-        gone = [joint for joint in before.joints if joint not in self.joints]
+        gone = [joint for joint in before.joints if joint not in self.joints and joint in joints]
         yield from _joints("removes", [joint for joint in gone if not {joint.a, joint.b} & explained])
         if any(self.joints[joint] != before.joints[joint] for joint in self.joints.keys() & before.joints.keys()):
-            yield "joints that the game changes, other than the rate and the largest torque of motors"
+            yield f"joints that the game changes, other than the rate and the largest torque of motors; {MOVED}"
 
     def _changes_of_bodies(self, before: "SpaceForm", names: Mapping[pymunk.Body, str]) -> Iterator[str]:
         both = [body for body in self.bodies if body in before.bodies]
         for body in both:
             was, now = (form.bodies[body][0] for form in (before, self))
             if was != now:
-                yield f"the type of {names[body]}, which the game changes from {TYPES[was]} to {TYPES[now]}"
+                change = f"which the game changes from {TYPES[was]} to {TYPES[now]}"
+                yield f"the type of {names[body]}, {change}; {SET_MOTION}"
         if any(_differ(self.bodies[body], before.bodies[body]) for body in both):
             yield "masses, moments and functions of bodies that the game changes"
 
@@ -121,6 +127,12 @@ class SpaceForm:
 
 
 TYPES = {pymunk.Body.DYNAMIC: "dynamic", pymunk.Body.KINEMATIC: "kinematic", pymunk.Body.STATIC: "static"}
+
+
+SET_MOTION = "the recording sets its motion after each step"
+"""Effect of a type that differs from that in the scene."""
+MOVED = "the recording sets the motion of their bodies after each step"
+"""Effect of joints that differ from those of the scene."""
 
 
 def _differ(now: tuple[Any, ...], before: tuple[Any, ...]) -> bool:
@@ -139,4 +151,4 @@ def _joint_form(joint: pymunk.Constraint, default_bias: float) -> tuple[Any, ...
 def _joints(verb: str, joints: Sequence[pymunk.Constraint]) -> Iterator[str]:
     kinds = dict.fromkeys(type(joint).__name__ for joint in joints)
     if kinds:
-        yield f"joints that the game {verb} while it runs: {', '.join(kinds)}"
+        yield f"joints that the game {verb} while it runs: {', '.join(kinds)}; {MOVED}"

@@ -5,7 +5,8 @@ besides the run itself.
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.atomic_write import atomic_write
+from sandbox.jsonable import to_json
 from sandbox.trajectory import Trajectory
 
 STATES = ("time", "body", "x", "y", "vx", "vy", "angle", "angular_velocity", "present")
@@ -22,6 +24,8 @@ CONTACTS = ("time", "a", "b", "point_x", "point_y", "normal_x", "normal_y", "imp
 """Columns of contacts, SI units; `a` and `b` are names."""
 CHUNK = 1 << 16
 """Rows of a chunk, about 10 MB."""
+METADATA = "sandbox"
+"""Key of the metadata of a parquet file"""
 NEEDS_PARQUET = 'parquet needs the `parquet` extra: pip install -e ".[parquet]"; csv works without it'
 
 ColumnValues = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
@@ -49,7 +53,7 @@ def write_states(trajectory: Trajectory, path: Path) -> int:
         MissingExtraError: parquet without its extra.
         ValueError: another suffix.
     """
-    return _write(STATES, _states(trajectory), path)
+    return _write(STATES, _states(trajectory), path, trajectory.info)
 
 
 def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Path) -> int:
@@ -65,7 +69,7 @@ def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Pat
         MissingExtraError: parquet without its extra.
         ValueError: another suffix.
     """
-    return _write(CONTACTS, _contacts(trajectory, fixed_names), path)
+    return _write(CONTACTS, _contacts(trajectory, fixed_names), path, trajectory.info)
 
 
 def _states(run: Trajectory) -> Iterator[list[ColumnValues]]:
@@ -107,7 +111,7 @@ def _contacts(run: Trajectory, fixed_names: Sequence[str]) -> Iterator[list[Colu
         ]
 
 
-def _write(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path) -> int:
+def _write(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path, info: Mapping[str, Any]) -> int:
     match path.suffix.lower():
         case ".csv":
             with atomic_write(path) as temporary:
@@ -116,7 +120,7 @@ def _write(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: P
             if not can_write_parquet():
                 raise MissingExtraError(NEEDS_PARQUET)
             with atomic_write(path) as temporary:
-                return _write_parquet(columns, chunks, temporary)
+                return _write_parquet(columns, chunks, temporary, info)
         case suffix:
             raise ValueError(f"a table ends in .csv or .parquet, not {suffix!r}")
 
@@ -142,13 +146,17 @@ def _listed(column: ColumnValues) -> list[Any]:
     return list(column.tolist())
 
 
-def _write_parquet(columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path) -> int:
+def _write_parquet(
+    columns: Sequence[str], chunks: Iterator[list[ColumnValues]], path: Path, info: Mapping[str, Any]
+) -> int:
+    """Write a table; its metadata have the `info` of the run, with scene, settings and versions, as JSON."""
     import pyarrow as pa
     from pyarrow import parquet
 
     words = pa.dictionary(pa.int32(), pa.string())
     kinds = {"body": words, "a": words, "b": words, "present": pa.bool_()}
-    schema = pa.schema([(column, kinds.get(column, pa.float64())) for column in columns])
+    fields = [(column, kinds.get(column, pa.float64())) for column in columns]
+    schema = pa.schema(fields, metadata={METADATA: json.dumps(to_json(info), ensure_ascii=False)})
 
     def array(column: ColumnValues) -> Any:
         if isinstance(column, tuple):

@@ -1,9 +1,10 @@
 """Faults: errors in a scene, each with file, line, path and a message that states the valid values."""
 
+import difflib
 import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, Self
@@ -61,7 +62,11 @@ class SceneError(Exception):
         return type(self), (self.faults,)
 
 
-class SettingsError(SceneError, ValueError):
+class PartError(SceneError, ValueError):
+    """A table of a scene, an action or a stroke has invalid values in Python. Each fault has its path, as `radius`."""
+
+
+class SettingsError(PartError):
     """A setting is unknown or has an invalid value. Each fault has its path, such as `solver.dt`."""
 
 
@@ -83,6 +88,54 @@ EXPECTED = {
     "literal_error": "one of {expected}",
 }
 """What a value must be, by the type of pydantic's error"""
+
+
+EXPECTED_IN_PYTHON = {"tuple_type": "a list or a tuple", "string_type": "a text", "bool_type": "True or False"}
+"""What an argument must be, where it is not written as in a file"""
+SMALLEST_STATED = 1e-5
+"""Smaller positive bounds only protect the engines; the message for a value that is not positive leaves them out."""
+_BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+"""Violated bounds of a number in words"""
+
+
+def explain_arguments(details: Iterable[Any], known: Collection[str]) -> list[LocatedMessage]:
+    """Return location and message of each error of pydantic about the arguments of a class in Python.
+
+    Args:
+        details: errors of pydantic. A default that was not computed because of another error is no fault.
+        known: names of the arguments.
+    """
+    return [(each["loc"], _explain(each, known)) for each in details if each["type"] != "default_factory_not_called"]
+
+
+def _explain(details: Any, known: Collection[str]) -> str:
+    kind, context = details["type"], details.get("ctx", {})
+    if kind == "missing":
+        return "is missing; it is required"
+    if kind == "extra_forbidden":
+        name, names = str(details["loc"][-1]), known if len(details["loc"]) == 1 else ()
+        close = difflib.get_close_matches(name.lower(), names, n=1)
+        if close:
+            return f"unknown key; did you mean {close[0]!r}?"
+        return f"unknown key; known: {', '.join(names)}" if names else "unknown key"
+    if kind == "value_error":
+        return str(context["error"])
+    if kind in ("model_type", "model_attributes_type"):
+        expected = f"of the class {context['class_name']}" if context else "of a class of this kind"
+    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        expected = f"one of the kinds {context.get('expected_tags', 'of this table')}"
+    elif kind == "string_pattern_mismatch":
+        expected = f"text that matches {context['pattern']}"
+    elif kind in EXPECTED_IN_PYTHON:
+        expected = EXPECTED_IN_PYTHON[kind]
+    elif kind in EXPECTED:
+        expected = EXPECTED[kind].format(**context)
+    else:
+        expected = details["msg"].removeprefix("Input should be ")
+    expected = next((f"{words} {context[key]:g}" for key, words in _BOUNDS.items() if key in context), expected)
+    if 0.0 < context.get("ge", 0.0) < SMALLEST_STATED and details["input"] <= 0.0:
+        expected = "more than 0"
+    return f"must be {expected}, is {shown(details['input'])}"
 
 
 def shown(value: Any) -> str:

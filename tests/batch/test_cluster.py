@@ -2,12 +2,13 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import monotonic, sleep
@@ -36,12 +37,24 @@ executors.run_job = run
 """Code that a worker runs at its start, for a run that does it harm"""
 
 
+OTHER_IF_FIRST = """
+import multiprocessing
+from pathlib import Path
+from sandbox.batch import executors
+if multiprocessing.parent_process() is not None and not Path("{first}").exists():  # not in its nanny
+    Path("{first}").mkdir()
+    executors.versions = lambda: {{'python': '2.7'}}
+"""
+"""Code that gives the first worker that runs it other versions"""
+
+
 class Cluster:
     """A scheduler and its workers."""
 
     def __init__(self, folder: Path, scheduler: subprocess.Popen[bytes]) -> None:
         self.folder, self.scheduler = folder, scheduler
         self.workers: list[subprocess.Popen[bytes]] = []
+        self.start_worker: Callable[[], subprocess.Popen[bytes]]
         self.file = folder / "scheduler.json"
         wait_until(self.file.exists)
         wait_until(lambda: self.file.read_text() != "")
@@ -71,8 +84,9 @@ def cluster(folder: Path, preload: str = "", workers: int = 2) -> Iterator[Clust
         if preload:
             (folder / "harm.py").write_text(preload)
             options += ["--preload", str(folder / "harm.py")]
+        found.start_worker = lambda: start("worker", found.address, *options)
         for _ in range(workers):
-            found.workers.append(start("worker", found.address, *options))
+            found.workers.append(found.start_worker())
         with distributed.Client(found.address, set_as_default=False) as client:
             client.wait_for_workers(workers, timeout=60)
         yield found
@@ -240,6 +254,22 @@ def test_worker_with_other_versions_is_refused(scene: str, tmp_path: Path, capfd
     assert (status, document["runs"]) == (1, [])
     assert "--on: a worker has other versions" in err[-1]
     assert "python 2.7 instead of 3." in err[-1]
+
+
+def test_workers_with_other_versions_are_left_out(scene: str, tmp_path: Path) -> None:
+    with cluster(tmp_path / "cluster", OTHER_IF_FIRST.format(first=tmp_path / "first")) as found:
+        with drive(scene, tmp_path / "runs", found) as driver:
+            wait_until(lambda: len(stored(tmp_path / "runs")) >= 30)
+            joined = found.start_worker()  # others may join in the middle
+            _, err = driver.communicate(timeout=240)
+        assert driver.returncode == 0
+        assert joined.poll() is None
+    lines = err.splitlines()
+    assert len(lines) == 1
+    assert re.fullmatch(
+        r"worker tcp://\S+ is left out, as its runs would differ: .*python 2.7 instead of 3.*", lines[0]
+    )
+    assert sorted(seed for _, seed, _ in stored(tmp_path / "runs")) == list(range(1, 301))
 
 
 def test_address_without_a_scheduler_is_an_error(

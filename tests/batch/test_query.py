@@ -27,6 +27,7 @@ from sandbox.batch.store import Store, StoreError
 from sandbox.batch.stored_run import StoredRun
 from sandbox.cli.main import call
 from sandbox.measure.proportion import wilson_interval
+from sandbox.provenance import machine
 from sandbox.scene.description.world import Settings
 from tests.batch.test_store import sample_run
 from tests.environment import with_root_on_path
@@ -162,8 +163,11 @@ def test_longest_name_is_taken_and_names_may_have_signs() -> None:
 
 
 def test_runs_are_sorted_and_the_last_ones_listed(runs: StoredRuns) -> None:
-    ids = runs.table(kind="numpy")["id"].tolist()
-    assert runs.table(limit=3, kind="numpy")["id"].tolist() == ids[-3:]
+    table = runs.table(kind="numpy")
+    assert table["ball.stone.restitution"].tolist() == [0.2, 0.2, 0.8, 0.8]  # by their values, not as they were added
+    assert table["solver.dt"].tolist() == [0.005, 0.01, 0.005, 0.01]
+    last = runs.table(limit=2, kind="numpy")  # those that were added last
+    assert last["ball.stone.restitution"].tolist() == [0.8, 0.8]
     steps = runs.table(sort=["-solver.dt", "ball.stone.restitution"], kind="numpy")
     assert steps["solver.dt"].tolist() == [0.01, 0.01, 0.005, 0.005]
     assert steps["ball.stone.restitution"].tolist() == [0.2, 0.8, 0.2, 0.8]
@@ -249,16 +253,20 @@ def test_table_is_written_as_parquet(study: Path, runs: StoredRuns, tmp_path: Pa
     target = tmp_path / "table.parquet"
     assert call(["export", str(study), "--runs", "--to", str(target), "--quiet"]) == 0
     found = parquet.read_table(target).to_pydict()
+    assert set(found["cpu"]) == {machine()["cpu"]}
+    assert json.loads(found["settings"][0])["dt"] == found["solver.dt"][0]
+    assert all(json.loads(each)["sandbox"].startswith("0.") for each in found["versions"])
+    assert len(found["created"]) == len(runs)
     for name, values in runs.table(kind="numpy").items():
         assert found[name] == [None if value != value else value for value in values.tolist()]
 
 
 def test_column_of_several_types_is_written_as_text(tmp_path: Path) -> None:
-    synthetic(tmp_path, 3, **{"a.b": lambda k: [1, "x", None][k], "a.c": lambda k: [1, 2.5, None][k]})
+    synthetic(tmp_path, 3, **{"a.b": lambda k: [None, 1, "x"][k], "a.c": lambda k: [1, 2.5, None][k]})
     with open_store(tmp_path) as runs:
         assert runs.to_parquet(tmp_path / "t.parquet") == 3
     found = parquet.read_table(tmp_path / "t.parquet").to_pydict()
-    assert (found["a.b"], found["a.c"]) == (["1", "x", None], [1.0, 2.5, None])
+    assert (found["a.b"], found["a.c"]) == ([None, "1", "x"], [1.0, 2.5, None])
 
 
 def test_damaged_cells_have_no_value(tmp_path: Path) -> None:

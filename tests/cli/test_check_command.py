@@ -88,7 +88,7 @@ def test_scene_without_possible_tunnelling_has_no_safe_dt(tmp_path: Path, capfd:
 
 def test_demands_and_engines_are_printed_one_per_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = write_scene(tmp_path)
-    status, out, err = lines_of(capfd, "check", scene)
+    status, out, err = lines_of(capfd, "check", scene, "-v")
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
     # all kinds of joints are one line if the scene has none
     engines_begin = 1 + len(Demand) - len(JOINTS | JOINT_LIMITS) + 1
@@ -98,6 +98,18 @@ def test_demands_and_engines_are_printed_one_per_line(tmp_path: Path, capfd: pyt
         f"  engine {name}: models everything in the scene" for name in ENGINES
     ]
     assert len(out) == engines_begin + 1 + len(ENGINES)
+
+
+def test_warnings_come_first_and_physics_that_is_not_needed_is_counted(capfd: pytest.CaptureFixture[str]) -> None:
+    _, all_lines, _ = lines_of(capfd, "check", "bullet", "--no-trial", "-v")
+    _, out, _ = lines_of(capfd, "check", "bullet", "--no-trial")
+    off = [line for line in all_lines if line.startswith("  off")]
+    assert len(off) > 1
+    assert out[1].startswith("  warning: ")
+    assert [line for line in out if line.startswith("  off")] == [f"  off  {len(off)} others, which -v lists"]
+    # the columns are as wide as their longest cell
+    on = [line.split() for line in all_lines if line not in off]
+    assert [line.split() for line in out if not line.startswith("  off")] == on
 
 
 def test_quiet_prints_only_warnings_and_faults(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

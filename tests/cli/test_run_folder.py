@@ -12,6 +12,7 @@ import pytest
 
 from sandbox.batch.store import Store
 from sandbox.cli import progress
+from sandbox.cli import run as run_module
 from sandbox.cli import run_batch as module
 from sandbox.trajectory import Trajectory
 from tests.cli.calling import DROP, SPARKS, document_from, document_of, json_of, lines_of, output_of, write_scene
@@ -259,3 +260,17 @@ def test_ends_of_many_runs_are_computed_in_one_call(tmp_path, scene, capfd):
     status, out, _ = lines_of(capfd, *sweep, "--keep", "end", "--dry-run")
     assert (status, out[0]) == (0, "3 runs: 1 scene; 3 × ball.a.velocity")
     assert out[2].endswith("measured on 2 runs, not stored")
+
+
+def test_size_of_a_large_study_is_said_after_its_first_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run_module, "LARGE_STORE", 100.0)  # bytes, in place of a gigabyte
+    words = ("run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "3", "--out", str(tmp_path / "runs"))
+    assert lines_of(capfd, *words, "--dry-run")[2] == []
+    notes = [line for line in lines_of(capfd, *words)[2] if "--keep summary" in line]
+    with Store(tmp_path / "runs") as store:
+        size = 3 * (store.rows()[0].size or 0)
+    assert notes[0].startswith(f"3 runs of this size take {size / 1e3:.3g} kB in ")
+    assert len(notes) == 1
+    assert not any("--keep summary" in line for line in lines_of(capfd, *words, "--keep", "summary", "--force")[2])

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+import sandbox
 from sandbox.cli.main import call
 from tests.cli.calling import DROP, SPARKS, json_of, lines_of, output_of, write_scene
 from tests.cli.json_validation import assert_valid_document
@@ -160,3 +161,18 @@ def test_runs_of_several_versions_are_told_apart(study: str, tmp_path: Path, cap
     _, out, _ = lines_of(capfd, "runs", folder, "--where", "engine = 'pymunk'")
     assert out[0].split()[-1] == "versions"
     assert "versions" not in lines_of(capfd, "runs", study)[1][0]
+
+
+def test_runs_that_are_ok_with_warnings_are_counted_and_filtered(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    store = ("--out", str(tmp_path / "runs"))
+    sweep = ("--sweep", "solver.integrator=explicit_euler,velocity_verlet", "--set", "world.duration=20")
+    assert lines_of(capfd, "run", "spring", "--engine", "reference", *sweep, *store)[0] == 0
+    _, lines, _ = lines_of(capfd, "runs", str(tmp_path / "runs"))
+    assert lines[-2:] == ["2 runs: 2 ok", "runs with warnings: 1; --columns id,warnings lists them"]
+    with sandbox.open_store(tmp_path / "runs") as runs:
+        found = runs.table(where="warnings IS NOT NULL", columns=["solver.integrator", "warnings"], kind="numpy")
+        assert found["solver.integrator"].tolist() == ["explicit_euler"]
+        assert "without a source" in json.loads(found["warnings"][0])[0]
+        assert runs.statuses("warnings IS NULL") == {"ok": 1}

@@ -34,6 +34,7 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "run landing --seeds 2 --player none --set world.duration=0.2",
         "run session.json",
         "run lacking.json",
+        "run tunnel.toml --observe figures.py:figure",
     ),
     "sandbox run --dry-run": ("run tunnel.toml --sweep solver.dt=0.01,0.005 --dry-run",),
     "sandbox runs": ("runs store", "runs store --by engine --of contacts"),
@@ -174,6 +175,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("tunnel.toml").write_text(TUNNEL)
     Path("bent.toml").write_text(BENT)
     Path("played.py").write_text(PLAYED)
+    Path("figures.py").write_text("def figure(run):\n    return len(run.time)\n")
     Path("level.svg").write_text('<svg viewBox="0 0 9 9"><circle r="5"/><text>x</text></svg>')
     limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
     Path("against.json").write_text(json.dumps({"limits": [limit]}))

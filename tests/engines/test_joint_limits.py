@@ -1,4 +1,4 @@
-"""Joints with a largest force, a largest speed of correction or their own bias, and ratchets, on `pymunk`."""
+"""Joints with a largest force, a largest speed of correction or their own bias, and ratchets."""
 
 import math
 from typing import Any
@@ -93,6 +93,39 @@ def test_ratchet_keeps_its_click_when_the_engine_is_started_again() -> None:
 def test_reference_refuses_the_largest_force_of_springs_and_grooves(joint: dict[str, Any]) -> None:
     with pytest.raises(Refusal, match="max_force of a "):
         start(scene_of(joint), "reference")
+
+
+@pytest.mark.parametrize("method", ["relaxation", "xpbd", "rattle"])
+def test_other_methods_than_impulses_refuse_a_largest_speed_of_correction(method: str) -> None:
+    with pytest.raises(Refusal, match=r"max_bias of .* needs joints = 'impulses'"):
+        start(scene_of(GROUND), "reference", joints=method)
+
+
+ERRORS: list[dict[str, Any]] = [
+    {"kind": "pivot", "anchors": [[0.0, 0.3], [0.0, 0.4]]},
+    {"kind": "rod", "anchors": [[0.0, 0.5], [0.0, 0.0]], "length": 3.0},
+    {"kind": "slide", "anchors": [[0.0, 0.0], [0.0, 0.0]], "least": 0.0, "most": 0.2},
+    {"kind": "rotary_limit", "least": 0.5, "most": 1.0},
+    {"kind": "gear", "ratio": 1.0, "phase": 2.0},
+]
+"""Joints that are not fulfilled at the start, by more than 0.05 m/s or rad/s corrects in the run"""
+
+
+@pytest.mark.parametrize("joint", ERRORS, ids=lambda joint: str(joint["kind"]))
+@pytest.mark.parametrize("max_bias", [0.0, 0.05])
+def test_reference_corrects_errors_at_the_bounded_speed_as_pymunk_does(joint: dict[str, Any], max_bias: float) -> None:
+    scene = scene_of({**joint, "max_bias": max_bias}, velocity=[0.2, -0.1])
+    one, other = (run_of(scene, engine) for engine in ("pymunk", "reference"))
+    assert other.position == pytest.approx(one.position, abs=1e-9)  # the same scheme; rounding of 100 steps
+    assert other.angle == pytest.approx(one.angle, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_friction_of_the_ground_stops_a_body_after_its_stopping_distance(engine: str) -> None:
+    scene = scene_of({**GROUND, "max_force": 4.0}, velocity=[1.2, 1.6])  # 2 m/s and 2 m/s²: 1 m in 1 s
+    end = run_of(scene, engine).position[-1, 0]
+    assert np.hypot(*(end - [1.0, 0.0])) == pytest.approx(1.0, abs=2.0 * H)  # first order: v·h
+    assert (end - [1.0, 0.0]).tolist() == pytest.approx([0.6, 0.8], abs=2.0 * H)
 
 
 @pytest.mark.parametrize("limit", [{"max_force": 1e3}, {"max_bias": 1e3}])

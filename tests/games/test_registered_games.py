@@ -111,7 +111,9 @@ def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
         loads(SCENE.replace("count-bounces", "count"))
     (fault,) = caught.value.faults
     assert (fault.line, fault.path) == (3, "play.game")
-    assert fault.message.endswith("'curling', 'landing', 'broken', 'count-bounces' or 'tabled', is \"count\"")
+    names, remedy = fault.message.split(", is ")
+    assert names.endswith("'curling', 'landing', 'broken', 'count-bounces' or 'tabled'")
+    assert remedy == '"count"; if another package has this game, install it'
 
 
 def test_unknown_game_is_refused_with_the_builtin_names() -> None:
@@ -119,7 +121,7 @@ def test_unknown_game_is_refused_with_the_builtin_names() -> None:
         loads(SCENE.replace("count-bounces", "pinbal"))
     assert caught.value.faults[0].message == (
         "must be one of '8-ball', '9-ball', 'three-cushion', 'straight-rail', 'snooker', 'free', 'pinball', "
-        "'artillery', 'curling' or 'landing', is \"pinbal\""
+        "'artillery', 'curling' or 'landing', is \"pinbal\"; did you mean 'pinball'?"
     )
 
 

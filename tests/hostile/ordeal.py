@@ -12,7 +12,6 @@ from sandbox.engines.common.compile_clock import ANNOUNCEMENT
 PRELUDE = """
 import json, math, sys
 import numpy as np
-from pydantic import ValidationError
 from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
@@ -23,7 +22,7 @@ from sandbox.scene.files.load import from_document, loads
 from sandbox.scene.description.discs import Ball
 
 EXPECTED = (
-    SceneError, ValidationError, ActionError, Refusal, Divergence, Exhaustion, TooLargeError, UnknownEngineError
+    SceneError, ActionError, Refusal, Divergence, Exhaustion, TooLargeError, UnknownEngineError
 )
 
 def outcome(do, *arguments, **named):

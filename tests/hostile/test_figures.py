@@ -125,7 +125,7 @@ report([found, others, places, is_finite(simulation)])
 """
     found, others, places, finite = run_isolated(SCENE + code, flags)
     for path, outcomes in found.items():
-        wrong = {name: "ValidationError" if name in ("nan", "inf", "-inf") else "ActionError" for name in outcomes}
+        wrong = {name: "PartError" if name in ("nan", "inf", "-inf") else "ActionError" for name in outcomes}
         assert outcomes == wrong | {"0": "done"}, path
     assert set(others.values()) == {"ActionError"}, others
     assert places == ["ActionError"] * 14

@@ -15,7 +15,7 @@ from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.advice.text import fallback_head
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
-from sandbox.recording import Recording
+from sandbox.recording import RecordedGame, Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
@@ -235,8 +235,8 @@ def test_code_of_box2d_steps_with_the_recommended_substeps() -> None:
 
 
 def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() -> None:
-    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.1, 0.0]")
-    push = Impulse(time=0.05, body="bullet", impulse=(19.9, 0.0))  # of 1 kg
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.5, 0.0]")
+    push = Impulse(time=0.05, body="bullet", impulse=(19.5, 0.0))  # of 1 kg
     recording = Recording(scene, "pymunk", scene.solver, (push,), duration=0.2)
     advice = advise(recording, **QUICK)
     assert (advice.engine, advice.recorded_actions, advice.duration) == ("pymunk", 1, 0.2)
@@ -250,10 +250,82 @@ def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() ->
     assert again.missed_contacts == 0
 
 
+def test_setting_that_departs_sooner_from_finer_steps_with_the_actions_is_not_recommended() -> None:
+    """Without its push the tower stands with any number of iterations; with it, the cheapest setting leans first."""
+    text = """
+world = { gravity = [0.0, -10.0], duration = 1.0 }
+solver = { dt = 0.016666666666666666, iterations = 30 }
+plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0], friction = 1.0 }]
+stack = [{ name = "box", base = [0.0, 0.0], size = [0.5, 0.5], columns = 1, rows = 5, friction = 0.5 }]
+ball = [{ name = "ball", position = [-2.0, 1.2], velocity = [0.0, 0.0], radius = 0.2, fixed_rotation = true }]
+"""
+    scene = scene_of(text)
+    push = Impulse(time=0.1, body="ball", impulse=(8.0, 0.0))
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=1.0), tolerance=0.01, **QUICK)
+    assert not advice.is_still_without_actions
+    present = advice.replays[0]
+    assert present.setting == "present"
+    assert present.finer_substeps == 8
+    for each in advice.replays[1:]:
+        is_hasty = each.departs_at is not None and (
+            present.departs_at is None or each.departs_at < 0.8 * present.departs_at
+        )
+        assert (each.setting == "rejected") == (bool(each.missed_contacts) or is_hasty)
+    own, finer = (
+        sandbox.run(scene, "pymunk", actions=[push], iterations=30, substeps=substeps).position for substeps in (1, 8)
+    )
+    distance = ((own - finer) ** 2).sum(axis=2) ** 0.5
+    assert present.farthest == pytest.approx(distance.max(), rel=1e-12)
+    assert present.departs_at == pytest.approx((distance > 0.01).any(axis=1).argmax() / FPS, rel=1e-9)
+
+
+def test_scene_at_rest_without_its_actions_gives_no_recommendation() -> None:
+    """A puck on a table seen from above: the recording compares more substeps instead."""
+    text = """
+world = { duration = 1.0 }
+solver = { dt = 0.016666666666666666 }
+ball = [{ name = "puck", position = [0.0, 0.0], radius = 0.2, mass = 1.0 }]
+wall = [{ name = "edge", points = [[1.0, -9.0], [1.0, 9.0]], restitution = 1.0 }]
+joint = [{ kind = "pivot", between = ["puck"], anchors = [[0.0, 0.0], [0.0, 0.0]], max_bias = 0.0, max_force = 2.0 }]
+"""
+    scene = scene_of(text)
+    push = Impulse(time=0.1, body="puck", impulse=(5.0, 0.0))
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=1.0), **QUICK)
+    assert advice.is_still_without_actions
+    assert (advice.recommended, advice.fallback, advice.code) == (None, None, None)
+    assert [each.setting for each in advice.replays] == ["present", "tried", "tried"]
+    farthest = [each.farthest for each in advice.replays]
+    assert farthest == sorted(farthest, reverse=True)  # the finer, the closer to the finest
+    assert farthest[-1] < 0.5 * farthest[0]
+
+
+@pytest.mark.parametrize("omitted", [(), ("1 collision callback (space.on_collision)",)])
+def test_code_with_other_substeps_names_the_impulses_of_callbacks(omitted: tuple[str, ...]) -> None:
+    scene = scene_of(BULLET)
+    push = Impulse(time=0.01, body="bullet", impulse=(1.0, 0.0))
+    game = RecordedGame(omitted)
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2, game=game), zoom=50.0, **QUICK)
+    assert advice.recommended is not None and advice.code is not None
+    substeps = advice.recommended.settings.substeps
+    assert substeps > 1
+    remarks = [each for each in advice.code.remarks if "callbacks" in each]
+    assert [f"{1.0 / substeps:.3g} times as long" in each for each in remarks] == [True] * len(omitted)
+
+
+@pytest.mark.parametrize("zoom", [1.0, 50.0])
+def test_forecast_is_in_px_if_the_unit_of_length_is_the_pixel(zoom: float) -> None:
+    advice = advice_of(BULLET, zoom=zoom)
+    (text,) = {risk.message for risk in advice.risks if risk.kind == "tunnelling"}
+    assert ("20 px/s, 0.333 px per substep" in text, "20 m/s, 0.333 m per substep" in text) == (
+        zoom == 1.0,
+        zoom != 1.0,
+    )
+
+
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bullet becomes so fast that no number of substeps that is tried stops it."""
     monkeypatch.setattr(study, "MAX_DOUBLINGS", 1)
-    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.1, 0.0]")
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.5, 0.0]")
     push = Impulse(time=0.05, body="bullet", impulse=(9e3, 0.0))  # of 1 kg
     advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2), **QUICK)
     assert advice.recommended is None

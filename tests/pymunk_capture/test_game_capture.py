@@ -1,6 +1,7 @@
 """Recordings of games that use pymunk: replays end in the state of the game, bit for bit."""
 
 import contextlib
+import itertools
 import json
 import os
 import random
@@ -464,7 +465,64 @@ def test_joints_that_a_game_or_a_callback_adds_or_removes_are_named(verb: str, i
             if k == 10 and not in_callback:
                 act()
             space.step(DT)
-    assert f"joints that the game {verb} while it runs: SlideJoint" in captured.omitted
+    (remark,) = (each for each in captured.omitted if each.startswith("joints"))
+    assert remark.startswith(f"joints that the game {verb} while it runs: SlideJoint")
+    assert checked_recording(captured).game.replay.is_equal
+
+
+def test_bodies_of_a_joint_that_a_game_adds_for_a_while_are_those_of_the_game() -> None:
+    """A drag by the mouse: a joint to a body that is not in the space."""
+    space = space_with_walls()
+    bird, hand = disc(space, 0, 100), pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+    joint = pymunk.PivotJoint(hand, bird, (0, 0), (0, 0))
+    joint.max_force = 5000
+    other = disc(space, 80, 200)
+    with capture() as captured:
+        for k in range(60):
+            if k == 10:
+                hand.position = bird.position
+                space.add(joint)
+            if 10 <= k < 40:
+                hand.position += (3, 2)
+            if k == 40:
+                space.remove(joint)
+                bird.apply_impulse_at_local_point((300, 100))
+            space.step(DT)
+    assert [each.split(":")[0] for each in captured.omitted] == ["joints that the game adds while it runs"]
+    recording = checked_recording(captured)
+    assert recording.game is not None and recording.game.replay is not None
+    assert recording.game.replay.is_equal
+    (watched,) = captured.spaces
+    moved = {each.body for each in recording.actions if isinstance(each, sandbox.Move)}
+    assert moved == {watched.names[bird]} != {watched.names[other]}
+
+
+TYPES = {"static": pymunk.Body.STATIC, "dynamic": pymunk.Body.DYNAMIC, "kinematic": pymunk.Body.KINEMATIC}
+
+
+@pytest.mark.parametrize(("before", "after"), [*itertools.permutations(TYPES, 2)])
+def test_body_whose_type_a_game_changes_moves_as_in_the_game(before: str, after: str) -> None:
+    space = space_with_walls()
+    body = pymunk.Body(2, 100, body_type=TYPES[before])
+    body.position = 0, 200
+    space.add(body, pymunk.Circle(body, 10))
+    with capture() as captured:
+        for k in range(60):
+            if k == 20:
+                body.body_type = TYPES[after]
+                if after != "static":
+                    body.velocity = 10, 20
+                if after == "dynamic":
+                    body.mass, body.moment = 2, 100
+            space.step(DT)
+    position = rerun(checked_recording(captured), audit=False).position
+    (watched,) = captured.spaces
+    states = [dict(zip(each.names, each.states[:, :2], strict=True)) for each in captured.log.steps]
+    found = position[1:, captured.recording.scene.bodies.number_of[watched.names[body]]]
+    of_game = [each[watched.names[body]] for each in states]
+    # The frame after a step precedes the actions at its end, so that a body that cannot move by itself is a step late.
+    late = 1 if before == "static" else 0
+    assert found[22:59].tolist() == [each.tolist() for each in of_game[22 - late : 59 - late]]
 
 
 def test_joints_of_a_body_that_is_removed_are_not_left_out() -> None:

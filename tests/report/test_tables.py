@@ -1,6 +1,7 @@
 """Tables of runs: every number bit for bit, and complete files or none."""
 
 import csv
+import json
 import tracemalloc
 from pathlib import Path
 
@@ -110,6 +111,7 @@ def test_parquet_is_equal_to_csv(chunk: int, tmp_path: Path, monkeypatch: pytest
         rows = rows_of(tmp_path / f"{stem}.csv")
         table = parquet.read_table(tmp_path / f"{stem}.parquet")
         assert tuple(table.column_names) == columns
+        assert json.loads(table.schema.metadata[b"sandbox"])["versions"] == trajectory.info["versions"]
         for column in columns:
             values = table[column].to_pylist()
             if column in ("body", "a", "b"):

@@ -229,4 +229,4 @@ def test_loading_a_small_scene_calls_few_modules() -> None:
     finally:
         sys.setprofile(before)
     assert any(path.endswith("load.py") for path in called)
-    assert len(called) <= 12, sorted(called)
+    assert len(called) <= 13, sorted(called)

@@ -6,7 +6,6 @@ import subprocess
 import sys
 
 import pytest
-from pydantic import ValidationError
 
 from sandbox.games.artillery.scene import Artillery, Terrain
 from sandbox.games.billiards.tables import Billiards
@@ -14,6 +13,7 @@ from sandbox.games.curling.scene import CurlingMatch
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.game_tables import GAME_TABLES, PRESETS, game_table, lazy_table, table_of
 from sandbox.scene.description.play import Play
+from sandbox.scene.errors import PartError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.presets import Preset
@@ -82,7 +82,7 @@ def test_scene_accepts_tables_as_models_and_as_dicts() -> None:
     assert table_of(scene, Billiards) == Billiards(table="pool-9ft")
     assert scene == Scene(billiards=Billiards(table="pool-9ft")) != Scene()
     assert table_of(scene.model_copy(update={"billiards": None}), Billiards) is None
-    with pytest.raises(ValidationError, match=r"billiards\.tabel"):
+    with pytest.raises(PartError, match=r"billiards\.tabel"):
         Scene(billiards={"tabel": "pool-9ft"})
 
 

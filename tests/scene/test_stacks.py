@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, loads
 from tests.scene.faults import assert_faults, faults_of
@@ -89,6 +90,32 @@ def test_stack_has_the_given_rows_centred_on_its_base(columns, rows, fewer, gap,
     top_centre = rows * height + (rows - 1) * gap - 0.5 * height
     assert bodies.position[-1, 1] == pytest.approx(top_centre, rel=1e-14)  # a few roundings
     assert loads(dumps(scene)) == scene
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference", "box2d"])
+def test_fixed_stack_stays_where_it_is_when_a_ball_hits_it(engine: str) -> None:
+    wall = {"base": [3.0, 0.0], "size": [0.5, 0.2], "columns": 2, "rows": 5, "gap": 0.1, "fixed": True, "name": "brick"}
+    ball = {"name": "ball", "position": [0.0, 0.4], "radius": 0.1, "velocity": [5.0, 0.0], "restitution": 1.0}
+    scene = from_document(
+        {
+            "world": {"duration": 1.0},
+            "solver": {"dt": 0.005},
+            "stack": [wall | {"restitution": 1.0}],
+            "ball": [ball],
+        }
+    )
+    result = run(scene, engine)
+    bricks = [k for k, name in enumerate(scene.bodies.names) if name.startswith("brick")]
+    assert (result.position[:, bricks] == result.position[0, bricks]).all()
+    assert result.velocity[-1, scene.bodies.number_of["ball"], 0] == pytest.approx(-5.0, rel=0.01)  # float32 on box2d
+    assert loads(dumps(scene)) == scene
+
+
+def test_fixed_stack_has_no_velocity() -> None:
+    for key in ("velocity", "angular_velocity"):
+        value = [1.0, 0.0] if key == "velocity" else 1.0
+        (fault,) = faults_of({"stack": [PYRAMID | {"fixed": True, key: value}]})
+        assert fault.path == f"stack[0].{key}"
 
 
 def test_empty_row_and_too_many_boxes_are_faults() -> None:

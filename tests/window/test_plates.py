@@ -122,6 +122,16 @@ def test_last_shot_is_shown_in_full_beside_four_tanks(open_scene: OpenScene, mon
     assert len(panel.rows) <= 4
 
 
+def test_score_that_rules_state_again_is_shown_once(open_scene: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = open_scene("four")
+    lines = ArtilleryRules.display_lines
+    monkeypatch.setattr(ArtilleryRules, "display_lines", lambda self: [("Score", "7"), *lines(self)])
+    assert window.app_state.host is not None
+    panel = score_panel.layout_score(window.app_state.host.shown().board, window.context.gui.area, 300, 1.0)
+    labels = [label.lower() for cells, _ in panel.rows for label, _ in cells]
+    assert labels.count("score") == 1
+
+
 def test_largest_area_avoids_the_occupied_rectangles() -> None:
     free = pygame.Rect(0, 0, 100, 80)
     assert largest_area((1, 1), free, []) == free

@@ -101,8 +101,8 @@ def test_body_facts_list_speed_energy_and_contacts() -> None:
 def test_settings_text_lists_only_relevant_settings() -> None:
     assert settings_text(Settings(dt=0.01)) == "dt 10.0 ms"
     words = settings_text(Settings(dt=0.01, substeps=2, integrator="rk4", detection="swept", response="penalty"))
-    assert words == "dt 10.0 ms · 2 × 10 · rk4 · swept · penalty"
+    assert words == "dt 10.0 ms · 2 × 10 iterations · rk4 · swept · penalty"
     assert (
         settings_text(Settings(integrator="rk4", detection="discrete", response="impulse"))
-        == "dt 10.0 ms · 1 × 10 · rk4"
+        == "dt 10.0 ms · 1 × 10 iterations · rk4"
     )

@@ -49,6 +49,14 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
     return None
 
 
+def _max_bias_faults(setup: Setup, settings: Settings) -> list[str]:
+    """Return the first joint with a largest speed of correction, if the method of joints does not have it."""
+    limited = np.flatnonzero(np.isfinite(setup.joints.max_bias))
+    if settings.joints in (None, "impulses") or not len(limited):
+        return []
+    return [f"max_bias of {setup.joints.names[int(limited[0])]!r} needs joints = 'impulses', not {settings.joints!r}"]
+
+
 def _max_force_faults(setup: Setup) -> list[str]:
     """Return the first joint whose largest force is not supported: springs are forces, and grooves have two rows."""
     for kind in (JointKind.SPRING, JointKind.ROTARY_SPRING, JointKind.GROOVE):
@@ -106,6 +114,7 @@ class ReferenceEngine:
         Demand.POLYGONS,
         *JOINTS - {Demand.RATCHETS},
         Demand.MAX_FORCE,
+        Demand.MAX_BIAS,
         Demand.DAMPING,
         Demand.LIFT,
         Demand.ATTRACTION,
@@ -128,7 +137,7 @@ class ReferenceEngine:
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
         missing = unmodelled(setup, self.capabilities) + setting_faults(settings, self.name, {"persistence": 1}, ABSENT)
         missing += self._detection_faults(wanted, settings)
-        missing += _max_force_faults(setup)
+        missing += _max_force_faults(setup) + _max_bias_faults(setup, settings)
         rods = setup.joints.of(JointKind.ROD)
         if settings.joints == "rattle" and len(points := np.flatnonzero(rods.figures[:, 0] == 0.0)):
             name = rods.names[points[0]]

@@ -60,6 +60,8 @@ class JointData(NamedTuple):
     """(K, 4) m, positions of both wheels of a pulley in the world: ax, ay, bx, by"""
     max_force: FloatArray
     """(K,) N or N·m"""
+    max_bias: FloatArray
+    """(K,) m/s or rad/s, largest speed of a correction; impulses alone have it"""
 
     def take(self, which: IntArray) -> "JointData":
         """Return the joints of some rows."""
@@ -79,7 +81,7 @@ def select_joints(joints: JointArrays, *kinds: JointKind, among: IntArray | None
     if among is not None:
         which &= np.isin(np.arange(len(joints)), among)
     anchor = np.column_stack((joints.anchor_a, joints.anchor_b))
-    columns = joints.kind, joints.a, joints.b, anchor, joints.figures, joints.wheels, joints.max_force
+    columns = joints.kind, joints.a, joints.b, anchor, joints.figures, joints.wheels, joints.max_force, joints.max_bias
     found = JointData(np.arange(len(joints)), *columns).take(np.flatnonzero(which))
     if not (found.kind == GROOVE).any():
         return found
@@ -410,4 +412,5 @@ def stretch_limits(joints: JointData, max_stretch: float) -> JointData:
     own = joints.take(rows)
     figures = np.zeros((len(rows), 3))
     figures[:, 1] = (1.0 + max_stretch) * own.figures[:, 0]
-    return own._replace(kind=np.full(len(rows), SLIDE), figures=figures, max_force=np.full(len(rows), np.inf))
+    unlimited = np.full(len(rows), np.inf)
+    return own._replace(kind=np.full(len(rows), SLIDE), figures=figures, max_force=unlimited, max_bias=unlimited.copy())

@@ -1,8 +1,8 @@
 """Velocity constraints of joints, and their sequential impulses.
 
 As in Munk2D (`cpPinJoint.c`, `cpPivotJoint.c`, `cpSlideJoint.c`, `cpRotaryLimitJoint.c`, `cpGearJoint.c`,
-`cpSimpleMotor.c`): the target velocity of a row corrects the fraction 1 − bias^h of the position error within a step.
-Unlike in Munk2D, that velocity is not bounded. A groove has two rows, across it and along it, as Box2D's prismatic
+`cpSimpleMotor.c`): the target velocity of a row corrects the fraction 1 − bias^h of the position error within a step,
+and is bounded by the `max_bias` of the joint. A groove has two rows, across it and along it, as Box2D's prismatic
 joint; Munk2D clamps the impulse of a point instead.
 """
 
@@ -136,7 +136,7 @@ def prepare(
                 continue
             turned = relative_rotation(i, j, pose)
             error = _limit_error(rows, k, turned, joints.figures[k, 0], joints.figures[k, 1])
-            rows.target[k, 0] = -rate * error
+            rows.target[k, 0] = _correction(rate, error, joints.max_bias[k])
             continue
         if rows.kind[k] == JACOBIAN:
             value, jacobian = constrained_value(joints, k, pose)
@@ -148,18 +148,20 @@ def prepare(
                 # The rope may become taut within the step: as Box2D's limits, it bounds the velocity before that.
                 slack = upper_limit - value
                 rows.bound[k, 1] = 0.0
-                rows.target[k, 0] = slack / h if slack > 0.0 else rate * slack
+                rows.target[k, 0] = slack / h if slack > 0.0 else _correction(rate, -slack, joints.max_bias[k])
                 continue
             if lower_limit < upper_limit:
                 value = _limit_error(rows, k, value, lower_limit, upper_limit)
-            rows.target[k, 0] = -rate * value
+            rows.target[k, 0] = _correction(rate, value, joints.max_bias[k])
             continue
         anchors, dx, dy = anchor_separation(joints, k, pose)
         rows.anchor[k, 0], rows.anchor[k, 1], rows.anchor[k, 2], rows.anchor[k, 3] = anchors
         if rows.kind[k] == POINT:
             xx, xy, yy = effective_mass_matrix(i, j, anchors, inverse_mass, inverse_moment)
             rows.mass[k, 0], rows.mass[k, 1], rows.mass[k, 2] = xx, xy, yy
-            rows.target[k, 0], rows.target[k, 1] = -rate * dx, -rate * dy
+            speed, limit = rate * math.hypot(dx, dy), joints.max_bias[k]
+            own_rate = rate if speed <= limit else rate * limit / speed
+            rows.target[k, 0], rows.target[k, 1] = -own_rate * dx, -own_rate * dy
             continue
         length, nx, ny = length_and_direction(dx, dy)
         rows.normal[k, 0], rows.normal[k, 1] = nx, ny
@@ -169,7 +171,13 @@ def prepare(
             error = length - joints.figures[k, 0]
         else:
             error = _limit_error(rows, k, length, joints.figures[k, 0], joints.figures[k, 1])
-        rows.target[k, 0] = -rate * error
+        rows.target[k, 0] = _correction(rate, error, joints.max_bias[k])
+
+
+@bare_kernel
+def _correction(rate: float, error: float, limit: float) -> float:
+    """Return the target velocity that corrects an error, at a rate in 1/s, no faster than a limit."""
+    return min(max(-rate * error, -limit), limit)
 
 
 @bare_kernel

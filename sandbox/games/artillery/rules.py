@@ -165,6 +165,16 @@ class ArtilleryRules:
         return humans[0] if humans else max(tank.points for tank in tanks)
 
     @property
+    def player(self) -> str:
+        """Player whose turn it is."""
+        return self.shooter.player.name
+
+    @property
+    def scores(self) -> dict[str, int]:
+        """Points of each player."""
+        return {tank.player.name: tank.points for tank in self.field.tanks.every}
+
+    @property
     def game_over(self) -> str | None:
         """Winner, or that it is a draw; None while the game runs."""
         return self._over

@@ -122,6 +122,16 @@ class BilliardsRules:
         return state.scores[state.winner] if state.winner is not None else max(state.scores)
 
     @property
+    def player(self) -> str:
+        """Player who shoots next, or whose shot runs."""
+        return player_name(self.match.state.turn)
+
+    @property
+    def scores(self) -> dict[str, int]:
+        """Score of each player."""
+        return {player_name(number): score for number, score in enumerate(self.match.state.scores)}
+
+    @property
     def game_over(self) -> str | None:
         """Result of the frame, such as `player 1 wins`; None while it is in progress."""
         state = self.match.state

@@ -180,6 +180,16 @@ class Curling:
         return red if self._human_teams == 1 else max(red, yellow)
 
     @property
+    def player(self) -> str:
+        """Team that delivers next."""
+        return TEAMS[self._score.team]
+
+    @property
+    def scores(self) -> dict[str, int]:
+        """Points of each team."""
+        return dict(zip(TEAMS, self._score.points, strict=True))
+
+    @property
     def game_over(self) -> str | None:
         """Reason why the match is over; None while it runs."""
         return self._score.game_over

@@ -1,5 +1,7 @@
 """Measurements of an advice, and the advice made of them; after Ctrl-C of those that there are."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,7 +18,7 @@ from sandbox.measure.advice.result import (
     OtherEngine,
     ReplayedActions,
 )
-from sandbox.measure.advice.scoring import AdviceRequest, AdviceScore
+from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.run.bounded_run import clock_without_compilation
@@ -46,6 +48,7 @@ class AdviceMeasurements:
     knobs: list[Evaluation] = field(default_factory=list)
     others: dict[str, Evaluation] = field(default_factory=dict)
     replays: list[ReplayedActions] = field(default_factory=list)
+    is_still_without_actions: bool = False
     untried_knobs: int = 0
     within_until: dict[tuple[str, str], float] = field(default_factory=dict)
     """s, time from which on the error exceeds the tolerance, by `evaluation_key`"""
@@ -99,6 +102,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         unit=metric.unit,
         tolerance=score.tolerance,
         tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
+        position_tolerance=request.length,
         budget=request.budget,
         invariant=score.invariant,
         invariant_tolerance=score.invariant_tolerance,
@@ -107,8 +111,8 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
         duration=scene.world.duration,
         left_at=_left_at(score.context),
-        risks=tuple(measured.risks),
-        notes=tuple(measured.notes),
+        risks=_in_own_unit(measured.risks, request),
+        notes=tuple(_own_unit_text(each, request) for each in measured.notes),
         present=present,
         is_in_loop=request.is_in_loop,
         recommended=recommended,
@@ -123,6 +127,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         code=_code(request, chosen),
         recorded_actions=0 if request.recording is None else len(request.recording.actions),
         replays=tuple(measured.replays),
+        is_still_without_actions=measured.is_still_without_actions,
         tried=0 if found is None else sum(point.status != "refused" for point in found.points),
         tried_here=0
         if found is None
@@ -152,7 +157,7 @@ def _measured_setting(
         error_px=point.error * request.zoom if is_length and point.error is not None else None,
         invariant=None if score.invariant is None else point.metrics.get(score.invariant),
         missed_contacts=point.metrics.get("missed_contacts"),
-        objections=point.objections,
+        objections=tuple(_own_unit_text(each, request) for each in point.objections),
         worst=point.worst if score.metric == "max_position" else None,
         within_until=measured.within_until.get(evaluation_key(point)),
         frame_ms=None if timed is None else timed.frame_time(request.fps),
@@ -175,14 +180,43 @@ def _ratio(value: float | None, base: float | None) -> float | None:
 def _remaining_risks(request: AdviceRequest, chosen: MeasuredSetting | None) -> tuple[Risk, ...]:
     if chosen is None:
         return ()
-    return tuple(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps))
+    return _in_own_unit(formula_forecast(request.scene, chosen.asked, chosen.engine, request.fps), request)
+
+
+METRES = re.compile(r"(?<=\d )m(?=[ ,;)/]|$)")
+"""Unit of a number in a message"""
+
+
+def _own_unit_text(text: str, request: AdviceRequest) -> str:
+    """Return a message with px for m if the unit of length of the game is the pixel."""
+    return METRES.sub("px", text) if request.zoom == 1.0 else text
+
+
+def _in_own_unit(risks: Sequence[Risk], request: AdviceRequest) -> tuple[Risk, ...]:
+    return tuple(replace(each, message=_own_unit_text(each.message, request)) for each in risks)
 
 
 def _code(request: AdviceRequest, chosen: MeasuredSetting | None) -> GameCode | None:
     if chosen is None:
         return None
     is_slop_stated = request.scene.solver.slop is not None
-    return game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
+    code = game_code(chosen.engine, chosen.settings, request.fps, request.zoom, is_slop_stated)
+    return replace(code, remarks=(*code.remarks, *_callback_remarks(request, chosen)))
+
+
+def _callback_remarks(request: AdviceRequest, chosen: MeasuredSetting) -> list[str]:
+    """Return the effect of other substeps on the impulses in the callbacks of a recorded game; empty without any."""
+    game = None if request.recording is None else request.recording.game
+    if game is None or not any("space.on_collision" in each for each in game.omitted):
+        return []
+    present, now = (request.scene.solver.dt / request.scene.solver.substeps, chosen.settings.h)
+    if abs(now / present - 1.0) <= SAME_STEP:
+        return []
+    return [
+        f"collision callbacks of the game: an impulse is that of a step, which is now {now / present:.3g} times as "
+        "long. A threshold for impulses, such as arbiter.total_impulse, has to be changed by this factor, or impulses "
+        "are summed over the frame"
+    ]
 
 
 def _knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurements) -> tuple[Knob, ...]:

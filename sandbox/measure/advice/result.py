@@ -85,14 +85,22 @@ class ReplayedActions:
     """Run of a setting with the actions of a recording."""
 
     setting: str
-    """`present`, `recommended`, `fallback`, or `rejected`: within the tolerance, but not without fault with the
-    actions"""
+    """`present`, `recommended`, `fallback`; `rejected`: within the tolerance, but not without fault with the actions;
+    or `tried`, where nothing moves without them"""
     label: str
     """the setting in words"""
     status: str
     reason: str | None
     missed_contacts: int | None
     """contacts that the engine missed"""
+    finer_substeps: int | None = None
+    """substeps of a frame in the finer run with the actions, to which this one is compared; None if there was none"""
+    departs_at: float | None = None
+    """s, time from which on a body is farther than the tolerance of positions from the finer run; None if none is"""
+    departed: str | None = None
+    """that body"""
+    farthest: float | None = None
+    """m, largest distance of a body from the finer run"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +127,8 @@ class Advice:
     """largest accepted error, in the unit of the metric"""
     tolerance_px: float | None
     """the same on the screen, px; None if the metric is no length"""
+    position_tolerance: float
+    """m, largest accepted error of a position, also if errors are no positions"""
     budget: float | None
     """ms, computing time per frame that is available; None if not given"""
     invariant: str | None
@@ -169,6 +179,8 @@ class Advice:
     """actions of the player in a recording, without which errors, costs and forecast are computed"""
     replays: tuple[ReplayedActions, ...]
     """runs with these actions"""
+    is_still_without_actions: bool
+    """whether no body of a recording moves farther than the tolerance of positions without its actions"""
     tried: int
     """number of settings that were tried"""
     tried_here: int

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from sandbox.formatting import UNKNOWN, format_percent, format_plural, format_quantity
 from sandbox.measure.advice.forecast import Risk
-from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine
+from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine, ReplayedActions
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value
 from sandbox.scene.description.world import Settings
@@ -127,7 +127,7 @@ def coverage_sentence(advice: Advice) -> str | None:
             f"Not judged: positions, because {advice.metric_reason}. Judged: {advice.metric} ({advice.metric_about}), "
             f"{judged}."
         )
-    if advice.invariant is not None:
+    if advice.invariant not in (None, "joint_error", "missed_contacts"):  # these are named already
         judged = f"{advice.invariant}, {judged}"
     return (
         f"Judged: positions up to {advice.trusted_until:.3g} s of {advice.duration:.4g} s. Not judged: positions after "
@@ -157,14 +157,39 @@ def recording_sentences(advice: Advice) -> Iterator[str]:
         f"The recording has {format_plural(advice.recorded_actions, 'action')}. Errors, costs and forecast are those "
         "of its scene without them, because no truth with actions is available."
     )
+    if advice.is_still_without_actions:
+        yield (
+            f"Without the actions no body moves farther than {_length(advice, advice.position_tolerance)}: errors and "
+            "forecast are those of a scene at rest."
+        )
     for each in advice.replays:
         outcome = format_plural(each.missed_contacts or 0, "missed contact")
         if each.status != "ok" or each.missed_contacts is None:
             outcome = f"{each.status}{'' if each.reason is None else f': {each.reason}'}"
-        if each.setting == "rejected":
-            yield f"With the actions, {each.label} has: {outcome}; so it is not recommended."
+        outcome += _departure_text(advice, each)
+        if each.setting in ("rejected", "tried"):
+            end = "; so it is not recommended" if each.setting == "rejected" else ""
+            yield f"With the actions, {each.label} has: {outcome}{end}."
         else:
             yield f"With the actions, the {each.setting} setting has: {outcome}."
+
+
+def _departure_text(advice: Advice, replayed: ReplayedActions) -> str:
+    """Return from when on a replay departs from that with finer steps, and how far; empty if there was none."""
+    if replayed.finer_substeps is None or replayed.farthest is None:
+        return ""
+    tolerance, finer = _length(advice, advice.position_tolerance), format_plural(replayed.finer_substeps, "substep")
+    if replayed.departs_at is None:
+        return f"; it stays within {tolerance} of the run with {finer}"
+    return (
+        f"; from {replayed.departs_at:.3g} s on it is farther than {tolerance} from the run with {finer} "
+        f"({replayed.departed!r}), by up to {_length(advice, replayed.farthest)}"
+    )
+
+
+def _length(advice: Advice, length: float) -> str:
+    """Return a length in px."""
+    return f"{pixels_text(length * advice.zoom)} px"
 
 
 def risk_label(risk: Risk) -> str:
@@ -193,8 +218,13 @@ def no_setting_text(advice: Advice) -> str:
     """Return why there is no recommended setting."""
     if not advice.tried:
         return "no setting was tried" + (" within the time limit" if advice.out_of_time else "")
+    if advice.is_still_without_actions:
+        return "none, because without the actions nothing moves; the lines above compare runs with the actions"
     if any(each.setting == "rejected" for each in advice.replays):
-        return f"no setting tried on {advice.engine} is without a missed contact with the actions"
+        return (
+            f"every setting tried on {advice.engine} misses contacts with the actions, or departs sooner from finer "
+            "steps than the present one"
+        )
     is_within = advice.fallback is not None and advice.is_within_tolerance(advice.fallback)
     return "none without an objection" if is_within else "none"
 

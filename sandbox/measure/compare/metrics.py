@@ -13,7 +13,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.compare.ground_truth import Truth
-from sandbox.measure.metrics.clearance import clearance
+from sandbox.measure.metrics.clearance import clearance, posed_pieces
 from sandbox.measure.metrics.contacts import are_collisions, collisions, share_layer
 from sandbox.measure.metrics.invariants import ANGLE_KINDS, energy_drift, joint_error, joint_errors
 from sandbox.measure.metrics.trajectory_error import Errors, common_frames, errors
@@ -120,9 +120,14 @@ def times_of_leaving(scene: Scene, run: Trajectory, down: FloatArray) -> FloatAr
         return left
     depths = [float((np.asarray(each.points) @ down).max()) + each.thickness / 2.0 for each in scene.walls]
     depths += [float(np.asarray(each.position) @ down) + each.radius for each in scene.posts]
+    # A static body may be a whole level, far smaller than the disc about it.
+    for number in np.flatnonzero(bodies.fixed).tolist():
+        pieces = posed_pieces(bodies, number, bodies.position[number][None], bodies.angle[number][None])
+        depths += [float((corners[0] @ down).max()) + radius for corners, radius in pieces]
+    driven = bodies.immovable & ~bodies.fixed
     with np.errstate(over="ignore", invalid="ignore"):
         depth = run.position @ down
-        carrying = np.where(np.isfinite(depth), depth, -np.inf)[:, bodies.immovable] + bodies.radius[bodies.immovable]
+        carrying = np.where(np.isfinite(depth), depth, -np.inf)[:, driven] + bodies.radius[driven]
         lowest = max([*depths, float(carrying.max(initial=-np.inf))])
         is_below = depth - bodies.radius > lowest
     able = ~bodies.immovable

@@ -135,7 +135,7 @@ def _body(scene: Scene, generator: BodySource, number: int) -> tuple[str, JsonOb
     table = {key: value for key, value in table.items() if value not in (0.0, [0.0, 0.0])}
     table.setdefault("position", [0.0, 0.0])
     if isinstance(generator, Stack):
-        return "box", {**table, "size": list(generator.size)}
+        return "box", {**table, "size": list(generator.size), **({"fixed": True} if generator.fixed else {})}
     assert isinstance(generator, Grid | Scatter | Emitter)
     return "ball", {**table, "radius": generator.radius}
 

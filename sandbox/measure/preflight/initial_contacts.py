@@ -79,6 +79,36 @@ def _pair_clearance(bodies: Bodies, first: int, second: int) -> float:
     return min(float(hull_distance(a, b)[0]) - r - s for a, r in one for b, s in other)
 
 
+MIN_DESCENT = 0.7
+"""Cosine of the largest slope of a support: a steeper contact is one beside the body, which does not carry it."""
+
+
+def is_supported(scene: Scene, number: int, down: FloatArray) -> bool:
+    """Return whether a body stands on another one or on a static object at the start.
+
+    Args:
+        scene: the scene.
+        number: index of the body.
+        down: unit vector of gravity, (2,).
+    """
+    bodies, filters = scene.bodies, filter_table(scene, scene.bodies)
+    slack = CONTACT_FRACTION * float(bodies.thin[number])
+    away = np.hypot(*(bodies.position - bodies.position[number]).T) - bodies.radius - float(bodies.radius[number])
+    near = np.flatnonzero(collide_with_all(bodies) & (away <= slack))
+    near = near[(near != number) & filters.meets(np.full(len(near), number), near)]
+    bounds = bodies.position[number][None], bodies.radius[number][None]
+    below = [-1 - k for k, thing in enumerate(scene.fixed) if bounding_clearances(thing, *bounds)[0] <= slack]
+    below = [other for other in below if filters.meets_fixed(-1 - other)[number]]
+    lowered = bodies.position.copy()
+    lowered[number] += slack * down
+    positions, angles = np.stack((bodies.position, lowered)), np.stack((bodies.angle, bodies.angle))
+    for other in [*near.tolist(), *below]:
+        gap, gap_below = clearance(scene, bodies, positions, angles, (number, other)).tolist()
+        if gap <= slack and gap - gap_below >= MIN_DESCENT * slack:
+            return True
+    return False
+
+
 GRAZE_FRACTION = 1e-6
 """Overlap by rounding of bodies that are placed in contact, as a fraction of a half width."""
 

@@ -11,10 +11,11 @@ from sandbox.engines.pymunk_adapter.contact_names import confused_elements
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, PymunkEngine, is_space_default, space_attributes
 from sandbox.formatting import format_fraction
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic
+from sandbox.measure.preflight.initial_contacts import is_supported
 from sandbox.measure.preflight.likely_mistakes import likely_mistakes
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.seams import seam_notes
-from sandbox.measure.preflight.speed_bound import top_speeds
+from sandbox.measure.preflight.speed_bound import tether_reach, top_speeds
 from sandbox.measure.run.run_warnings import wasted_integrator
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import JointKind
@@ -57,25 +58,39 @@ FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")
 """Integrators whose flight under gravity has an error of g·h·t/2; None is explicit Euler."""
 
 
+MAX_STANDING = 200
+"""Largest number of bodies that are examined for a support before the note on flights is given up."""
+
+
 def _flight(scene: Scene) -> Iterator[Diagnostic]:
-    """Yield a note if a first-order integrator displaces a body by more than its half width within one flight."""
+    """Yield a note if a first-order integrator displaces a body by more than its half width within one flight.
+
+    Bodies that hang on the world, or that stand on something at the start, do not fly.
+    """
     bodies, solver, pull = scene.bodies, scene.solver, math.hypot(*scene.world.gravity)
     matrix = contact_matrix(scene)
-    moving = np.flatnonzero(matrix.touches & ~bodies.fixed & (bodies.thin > 0.0))
+    moving = np.flatnonzero(matrix.touches & ~bodies.immovable & (bodies.thin > 0.0))
     if pull == 0.0 or not len(moving) or solver.half_kick or solver.integrator not in FIRST_ORDER:
         return
     time = np.minimum(scene.world.duration, top_speeds(scene, matrix)[moving] / pull)
     error = 0.5 * pull * solver.h * time
-    k = int(np.argmax(error / bodies.thin[moving]))
-    if error[k] <= float(bodies.thin[moving[k]]):
+    down = np.asarray(scene.world.gravity) / pull
+    excess = error / bodies.thin[moving]
+    excess[np.isfinite(tether_reach(scene, down)[moving])] = 0.0
+    for k in np.argsort(-excess, kind="stable")[:MAX_STANDING].tolist():
+        number = int(moving[k])
+        if excess[k] <= 1.0:
+            return
+        if not bodies.velocity[number].any() and is_supported(scene, number, down):
+            continue
+        body, scheme = bodies.names[number], solver.integrator or "explicit_euler"
+        message = (
+            f"{scheme} displaces {body!r} by g·h·t/2, up to {error[k]:.3g} m within one flight of {time[k]:.3g} s, "
+            f"more than its half width, {bodies.thin[number]:.3g} m; solver.half_kick on pymunk, velocity_verlet on "
+            "the reference, and `exact` have no such error"
+        )
+        yield Diagnostic("flight", message, {"body": body, "error": float(error[k])})
         return
-    body, scheme = bodies.names[moving[k]], solver.integrator or "explicit_euler"
-    message = (
-        f"{scheme} displaces {body!r} by g·h·t/2, up to {error[k]:.3g} m within one flight of {time[k]:.3g} s, more "
-        f"than its half width, {bodies.thin[moving[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the "
-        "reference, and `exact` have no such error"
-    )
-    yield Diagnostic("flight", message, {"body": body, "error": float(error[k])})
 
 
 def _joint_order(scene: Scene) -> Iterator[Diagnostic]:
@@ -266,9 +281,10 @@ def _audit(scene: Scene) -> Iterator[Diagnostic]:
     count, without = int(not_round.sum()), int((not_round & (bodies.core <= 0.0)).sum())
     if not count:
         return
+    who = "the body that is not a ball" if count == 1 else f"the {count:,} bodies that are not balls"
     message = (
-        f"missed contacts are a lower bound: of the {count:,} bodies that are not balls, only passages of the largest "
-        "inscribed disc about the centre of mass, and through the axis of slender bodies, are counted"
+        f"missed contacts are a lower bound: of {who}, only passages of the largest inscribed disc about the centre of "
+        "mass, and through the axis of slender bodies, are counted"
     )
     if without:
         message += f"; {without:,} have no such disc and are not counted"

@@ -75,7 +75,7 @@ def _check(captured: GameCapture, recording: Recording, replay: Trajectory) -> R
     moving = [k for k, name in enumerate(last.names) if not _is_fixed(recording, rows[name])]
     known = [rows[last.names[k]] for k in moving]
     distance = _distances(_difference(replay, len(replay.time) - 1, last, [rows[name] for name in last.names]))[moving]
-    if not len(known) or not np.isfinite(last.states[moving, :2]).any():
+    if not len(known) or not np.isfinite(last.states[moving]).all():
         return check
     worst = int(distance.argmax())
     return replace(check, body=last.names[moving[worst]], distance=float(distance[worst]))

@@ -137,7 +137,8 @@ def stacked(stack: Stack, random: np.random.Generator) -> Layout:
     x += (random.random(stack.count) * 2.0 - 1.0) * stack.jitter
     offset = np.column_stack((x, 0.5 * stack.size[1] + row * height))
     position = np.asarray(stack.base) + (rotated(offset, stack.angle) if stack.angle else offset)
-    return uniform_layout(position, stack.velocity, stack.angle, stack.angular_velocity)
+    fixed = np.full(stack.count, stack.fixed)
+    return uniform_layout(position, stack.velocity, stack.angle, stack.angular_velocity, fixed)
 
 
 def count_of(source: BodySource) -> int:

@@ -5,13 +5,24 @@ can represent, and narrow enough that no square or cube of a value overflows.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler, StringConstraints
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    StringConstraints,
+    ValidationError,
+)
 from pydantic.fields import FieldInfo
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, core_schema
+
+from sandbox.scene.errors import Fault, PartError, explain_arguments, path_of
 
 MAX_POSITION = 1e16  # m
 MAX_SPEED = 1e12  # m/s
@@ -67,7 +78,11 @@ def is_required(field: FieldInfo) -> bool:
 class Part(BaseModel):
     """A frozen, strict piece of a scene: no unknown keys, no coercion, no infinities.
 
-    Lists are accepted for tuples, and stored as tuples.
+    In Python, lists and other ordered iterables are accepted for tuples, and stored as tuples; numpy's scalars are
+    accepted for numbers.
+
+    Raises:
+        PartError: an argument is invalid; the error has every fault that was found.
     """
 
     # Validators are built on first use: a command mostly needs only that of a whole scene.
@@ -75,23 +90,61 @@ class Part(BaseModel):
         strict=True, extra="forbid", frozen=True, allow_inf_nan=False, validate_by_name=True, defer_build=True
     )
 
+    if not TYPE_CHECKING:  # type checkers derive the arguments from the fields
+
+        def __init__(self, /, **data: Any) -> None:
+            try:  # what `BaseModel.__init__` does, without a second call, as games make many actions
+                self.__pydantic_validator__.validate_python(data, self_instance=self)
+            except ValidationError as error:
+                raise self._error_of(error) from None
+
+        __init__.__pydantic_base_init__ = True  # validators do not call it for inner parts
+
+    @classmethod
+    def _error_of(cls, error: ValidationError) -> PartError:
+        """Return the error for invalid arguments."""
+        found = explain_arguments(error.errors(include_url=False), cls.model_fields)
+        return PartError([Fault(cls.__name__, None, path_of(location, {}), text) for location, text in found])
+
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        schema = handler(source)
-        _accept_lists(schema)
+        schema: CoreSchema = _for_python(handler(source))
         return schema
 
 
-def _accept_lists(schema: Any) -> None:
-    """Let the tuples within a core schema be set from lists, in place. Their items are validated as before."""
-    if isinstance(schema, dict):
-        if schema.get("type") == "tuple":
-            schema["strict"] = False
-        for each in schema.values():
-            _accept_lists(each)
-    elif isinstance(schema, list):
-        for each in schema:
-            _accept_lists(each)
+def _for_python(schema: Any) -> Any:
+    """Return a core schema whose values can also be set from usual values of Python; reading of JSON is not changed."""
+    if isinstance(schema, list):
+        return [_for_python(each) for each in schema]
+    if not isinstance(schema, dict) or schema.get("type") == "json-or-python":  # that of an inner part
+        return schema
+    inner = schema.get("choices") if schema.get("type") == "union" else None
+    schema = {key: _for_python(value) for key, value in schema.items()}
+    if inner is not None:  # the locations of faults have the names of the types as before
+        pairs = zip(inner, schema["choices"], strict=True)
+        schema["choices"] = [(new, old["type"]) if _is_replaced(old, new) else new for old, new in pairs]
+    if schema.get("type") == "tuple":
+        lax = core_schema.no_info_before_validator_function(_ordered, {**schema, "strict": False})
+    elif schema.get("type") in ("int", "bool"):
+        lax = core_schema.no_info_before_validator_function(_plain, schema)
+    else:
+        return schema
+    return core_schema.json_or_python_schema(schema, lax)
+
+
+def _is_replaced(old: Any, new: Any) -> bool:
+    return isinstance(old, dict) and isinstance(new, dict) and old["type"] != new["type"]
+
+
+def _ordered(value: Any) -> Any:
+    """Return the values for a tuple; a text for values without an order, which no tuple is set from."""
+    return repr(value) if isinstance(value, AbstractSet | Mapping) else value
+
+
+def _plain(value: Any) -> Any:
+    """Return a scalar of numpy as the value of Python that it stands for."""
+    is_scalar = hasattr(value, "dtype") and getattr(value, "ndim", None) == 0
+    return value.item() if is_scalar else value
 
 
 def _speed_in_range(vector: tuple[float, float]) -> tuple[float, float]:

@@ -54,6 +54,8 @@ class Stack(BodySource):
     """Largest random displacement ± of each box along its row, m."""
     velocity: VelocityField = default((0.0, 0.0))
     """initial velocity, m/s"""
+    fixed: bool = False
+    """Its boxes never move, as if infinitely heavy: the bricks of a wall."""
 
     @property
     def max_rows(self) -> int:

@@ -1,12 +1,10 @@
 """`[world]`, `[solver]`, materials, pairs of materials, and kicks."""
 
-import difflib
 import math
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self, TypedDict
 
 from pydantic import Field, ValidationError, ValidatorFunctionWrapHandler, WrapValidator
-from pydantic_core import ErrorDetails
 
 from sandbox.scene.description.base import (
     Acceleration,
@@ -21,7 +19,7 @@ from sandbox.scene.description.base import (
     VelocityField,
     default,
 )
-from sandbox.scene.errors import EXPECTED, Fault, LocatedMessage, SettingsError, path_of, shown
+from sandbox.scene.errors import Fault, SettingsError, explain_arguments, path_of
 
 Drag = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -184,14 +182,16 @@ class Settings(Part):
         Raises:
             SettingsError: a name or a value is invalid.
         """
-        unknown = [name for name in changes if name not in type(self).model_fields]
-        faults: list[LocatedMessage] = [(("solver", name), _unknown(name)) for name in unknown]
-        if not faults:
-            try:
-                return type(self).model_validate({**self.model_dump(), **changes})
-            except ValidationError as error:
-                faults = [(("solver", *each["loc"]), _wording(each)) for each in error.errors(include_url=False)]
-        raise SettingsError([Fault("settings", None, path_of(location, {}), message) for location, message in faults])
+        return type(self)(**{**self.model_dump(), **changes})
+
+    @classmethod
+    def _error_of(cls, error: ValidationError) -> SettingsError:
+        details = error.errors(include_url=False)
+        found = dict(explain_arguments(details, cls.model_fields))
+        found |= {each["loc"]: _hint(name) for each in details if (name := each["loc"][0]) in World.model_fields}
+        return SettingsError(
+            [Fault("settings", None, path_of(("solver", *loc), {}), text) for loc, text in found.items()]
+        )
 
     def common(self) -> Self:
         """Return the settings with only those that every engine supports; the others get their defaults."""
@@ -242,24 +242,7 @@ class Kick(Part):
     before the bounce, as at a slingshot"""
 
 
-BOUNDS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-"""Violated bounds of a number in words"""
-
-
-def _wording(details: ErrorDetails) -> str:
-    """Return the message of an invalid setting: what it must be, and what it is."""
-    kind, context = details["type"], details.get("ctx", {})
-    bounds = [f"{words} {context[key]:g}" for key, words in BOUNDS.items() if key in context]
-    expected = EXPECTED.get(kind, details["msg"].removeprefix("Input should be ")).format(**context)
-    expected = bounds[0] if bounds else expected
-    return f"must be {expected}, is {shown(details['input'])}"
-
-
-def _unknown(name: str) -> str:
-    """Return a suggestion for a name that is no setting."""
-    if name in World.model_fields:
-        value = "2" if name == "seed" else "…"
-        return f"no setting of the solver; give it to the scene: load(…, ['world.{name}={value}'])"
-    known = list(Settings.model_fields)
-    close = difflib.get_close_matches(name.lower(), known, n=1)
-    return f"unknown key; did you mean {close[0]!r}?" if close else f"unknown key; known: {', '.join(known)}"
+def _hint(name: object) -> str:
+    """Return the way to set a value of the world, which is no setting."""
+    value = "2" if name == "seed" else "…"
+    return f"no setting of the solver; give it to the scene: load(…, ['world.{name}={value}'])"

@@ -74,7 +74,10 @@ def _body_tables(scene: Scene, key: ElementKey, element: Part) -> list[dict[str,
     """Return the tables of the bodies of a generator."""
     common = {name for name in BodySource.model_fields if name not in ("name", "angle", "angular_velocity")}
     shared = {name: value for name, value in table_values(element).items() if name in common}
-    shape = {"size": list(element.size)} if isinstance(element, Stack) else {"radius": getattr(element, "radius", 0.0)}
+    if isinstance(element, Stack):
+        shape: dict[str, Any] = {"size": list(element.size), **({"fixed": True} if element.fixed else {})}
+    else:
+        shape = {"radius": getattr(element, "radius", 0.0)}
     bodies, tables = scene.bodies, []
     for k in bodies_of(scene, key):
         values: dict[str, Any] = {"name": bodies.names[k], "position": bodies.position[k].tolist(), **shape}

@@ -9,6 +9,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import ValidationError
 
+from sandbox.game_names import game_names
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Wording, is_required
 from sandbox.scene.description.game_tables import PRESETS, has_preset
@@ -95,6 +96,9 @@ def explain(details: Any) -> LocatedMessage:
         message += _number_in_quotes(value)
     elif kind == "less_than_equal" and location[-1] == "restitution" and location[0] in ("wall", "post"):
         message += "; walls and posts add speed with kick = { speed = … }, in m/s"
+    elif location == ("play", "game") and isinstance(value, str):
+        close = difflib.get_close_matches(value, game_names(), n=1)
+        message += f"; did you mean {close[0]!r}?" if close else "; if another package has this game, install it"
     return location, message
 
 

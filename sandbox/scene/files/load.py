@@ -26,6 +26,9 @@ from sandbox.scene.validate.scene import crosscheck
 NO_TIME = 5e-324
 """s, smallest duration of a scene: replaces 0 while the scene of a session without steps is checked."""
 
+_CHECKED = "_is_checked"
+"""Entry of the dictionary of a scene that was found without faults; copies with other values do not have it"""
+
 Override = str | tuple[str, Any]
 """`"KEY=VALUE"`, or `(KEY, value)`."""
 
@@ -56,7 +59,7 @@ def load(path: str | Path, overrides: Iterable[Override] = ()) -> Scene:
 
 
 def as_scene(scene: Scene | str | Path) -> Scene:
-    """Return a scene, loaded if it is given by its name or path.
+    """Return a scene, loaded if it is given by its name or path. One that was made in Python is checked as a file is.
 
     Raises:
         SceneError: as `load`.
@@ -65,7 +68,13 @@ def as_scene(scene: Scene | str | Path) -> Scene:
     if not isinstance(scene, Scene | str | Path):
         hint = "; a recording has its scene in `.scene`" if hasattr(scene, "actions") else ""
         raise TypeError(f"a scene, a name or a path is needed, not a {type(scene).__name__}{hint}")
-    return scene if isinstance(scene, Scene) else load(scene)
+    if not isinstance(scene, Scene):
+        return load(scene)
+    if _CHECKED not in scene.__dict__ and (found := crosscheck(scene)):
+        document = to_document(scene)
+        raise SceneError([Fault("scene", None, path_of(location, document), text) for location, text in found])
+    scene.__dict__[_CHECKED] = True
+    return scene
 
 
 def loads(text: str, file: str = "<scene>", overrides: Iterable[Override] = ()) -> Scene:
@@ -197,6 +206,7 @@ def from_document(
         else:
             found = crosscheck(scene)
             if not found:
+                scene.__dict__[_CHECKED] = True
                 return scene
 
     stated_at = partial(presets.stated_location, document=document, stated=stated) if whole else None

@@ -4,13 +4,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from pydantic import ValidationError
-
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
 from sandbox.scene.description.game_tables import PRESETS, GameTable, game_table
 from sandbox.scene.description.world import Pair
-from sandbox.scene.errors import LocatedMessage, Location
+from sandbox.scene.errors import LocatedMessage, Location, PartError
 from sandbox.scene.files.document import read_model, to_document
 from sandbox.scene.files.overrides import AddressError, assign, parse_path
 
@@ -110,11 +108,11 @@ def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
     if not found:
         try:
             expanded(scene)
-        except ValidationError as error:
+        except PartError as error:
             preset = next(iter(presets_of(_stated(scene))))
-            for each in error.errors(include_url=False):
-                path = ".".join(map(str, (error.title.lower(), *each["loc"])))
-                yield (preset,), f"one of its parts is out of range: {path}: {each['msg'].lower()}"
+            for wrong in error.faults:
+                path = f"{wrong.file.lower()}.{wrong.path}"
+                yield (preset,), f"one of its parts is out of range: {path}: {wrong.message}"
 
 
 def stated_faults_of(scene: Scene) -> Iterator[LocatedMessage]:
@@ -132,7 +130,7 @@ def expanded(scene: Scene) -> Scene:
     """Return the scene with valid presets expanded into primitives; a scene without presets unchanged.
 
     Raises:
-        pydantic.ValidationError: values that are valid by themselves lead to an invalid primitive.
+        PartError: values that are valid by themselves lead to an invalid primitive.
     """
     for expand in dict.fromkeys(preset.expanded for preset in presets_of(_stated(scene)).values()):
         scene = expand(scene)

@@ -11,6 +11,7 @@ from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
 from sandbox.scene.description.fixed import Post, Wall
+from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.world import Material, Pair
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.shapes import geometry_of
@@ -176,19 +177,26 @@ def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
     for location, element in _elements(scene):
         if isinstance(element, BodySpec):
             yield from (((*location, key), message) for key, message in _check_immovable(element))
+        elif isinstance(element, Stack):
+            yield from (((*location, key), message) for key, message in _check_at_rest(element))
 
 
 def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
     """Yield the keys that a fixed or kinematic body cannot have, with the reasons."""
-    if single.fixed and (any(single.velocity) or single.angular_velocity):
-        key = "velocity" if any(single.velocity) else "angular_velocity"
-        yield key, "a fixed body cannot move; remove this key, or `fixed`"
+    yield from _check_at_rest(single)
     if single.fixed and single.kinematic:
         yield "kinematic", "cannot be combined with `fixed`; remove one of the two"
     if single.kinematic and single.fixed_rotation:
         yield "fixed_rotation", "has no effect on a kinematic body, which nothing turns; remove it"
     if single.lift and (single.fixed or single.kinematic):
         yield "lift", f"has no effect on a {'fixed' if single.fixed else 'kinematic'} body; remove it"
+
+
+def _check_at_rest(source: BodySpec | Stack) -> Iterator[tuple[str, str]]:
+    """Yield the velocity that a fixed body or stack cannot have, with the reason."""
+    if source.fixed and (any(source.velocity) or source.angular_velocity):
+        key = "velocity" if any(source.velocity) else "angular_velocity"
+        yield key, "a fixed body cannot move; remove this key, or `fixed`"
 
 
 def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:

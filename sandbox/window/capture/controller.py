@@ -12,6 +12,8 @@ from sandbox.window.playback.recorded import RecordedView
 
 FRAME_RATE = 25.0
 """pictures/s of a film"""
+MIN_FRACTION = 0.7
+"""Fraction of the pictures of a film below which its notice names the command that makes all of them."""
 MAX_WIDTH = 960
 """px, width of a film; a wider window is scaled down"""
 
@@ -31,7 +33,7 @@ class CaptureController:
     def __init__(self, folder: Path, film: str, notify: Notify) -> None:
         self._folder, self._film, self._notify = folder, film, notify
         self._recorder: FilmRecorder | None = None
-        self._seconds, self._pending_seconds = 0.0, 0.0
+        self._seconds, self._pending_seconds, self._pictures = 0.0, 0.0, 0
         self._seeking: tuple[LiveView, str] | None = None
         """session to be saved once its jump in time is complete, and its name"""
 
@@ -60,6 +62,7 @@ class CaptureController:
             self._notify(str(error), "error")
             return
         self._seconds = self._pending_seconds = 0.0
+        self._pictures = 0
 
     def update(self, picture: Callable[[], pygame.Surface], elapsed: float) -> None:
         """Add a picture to the film if it is due, and save a session whose jump in time is complete.
@@ -79,6 +82,7 @@ class CaptureController:
             return
         try:
             self._recorder.add(picture(), self._pending_seconds)
+            self._pictures += 1
         except PictureError as error:
             self._notify(str(error), "warning")
             self.stop_recording()
@@ -90,7 +94,11 @@ class CaptureController:
         if recorder is None:
             return
         try:
-            self._notify(f"recorded: {recorder.close()}", "info")
+            text = f"recorded: {recorder.close()}"
+            if self._pictures < MIN_FRACTION * self._seconds * FRAME_RATE:
+                rate = f"{self._pictures / self._seconds:.0f} pictures a second"
+                text += f", {rate}; save with Ctrl+S, and `sandbox export SESSION.json --to film{self._film}` makes all"
+            self._notify(text, "info")
         except PictureError as error:
             self._notify(str(error), "error")
 

@@ -37,6 +37,8 @@ from sandbox.window.view_bounds import field_rect, has_field
 
 GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
+TIME_STEPS = 100
+"""Number of times that the seek bar distinguishes in the duration of a scene, at least"""
 
 
 class GuiFrame(NamedTuple):
@@ -143,8 +145,11 @@ class Gui:
         show, area = app_state.view, self.area
         if show is None:
             return []
-        frame = self._frame
-        status = hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None) if frame is None else frame.status
+        keys = app_state.key_bindings.help_rows
+        if self._frame is None:
+            status = hud_status(app_state, keys, 0.0, None, self.panel.visible)
+        else:
+            status = self._frame.status
         longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
         rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
@@ -177,7 +182,7 @@ class Gui:
 
     def _hud_width(self, show: LiveView | RecordedView) -> int:
         """Return the right edge of the status plate, px."""
-        return hud_width(f"{show.engine}  ·  {settings_text(show.settings)}", self.ui_scale)
+        return hud_width(f"{show.engine}  ·  {settings_text(show.settings, not self.panel.visible)}", self.ui_scale)
 
     @property
     def covers_scene(self) -> bool:
@@ -269,7 +274,8 @@ class Gui:
         if host is not None and not self.help.open and (controls is None or controls.is_own_score):
             for note in self._high_scores.update(host):
                 app_state.messages.add(note, "warning")
-        self._frame = GuiFrame(hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording), display)
+        rows = app_state.key_bindings.help_rows
+        self._frame = GuiFrame(hud_status(app_state, rows, frame_rate, recording, self.panel.visible), display)
         return self._frame
 
     def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState, frame: GuiFrame) -> None:
@@ -316,7 +322,8 @@ class Gui:
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
                 times = show.start_time, show.frame.time, show.end_time
-                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale)
+                step = show.scene.world.duration / TIME_STEPS
+                self._timeline.draw(surface, rect, *times, show.keyframe_times, self.ui_scale, step)
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])

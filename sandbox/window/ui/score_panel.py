@@ -15,6 +15,8 @@ MIN_TOP_WIDTH = 300.0
 """px at UI scale 1, width below which the panel is placed at the bottom"""
 TEXT_SIZES = (14.0, 12.5, 11.0)
 """px at UI scale 1: the largest that gives a single row, else the smallest"""
+SCORE = "score"
+"""label of the first value"""
 MAX_LINES = 8
 """largest number of values besides the score"""
 MAX_TOP_ROWS = 3
@@ -115,7 +117,8 @@ def _rows(display: ScoreDisplay, max_width: float, size: float, gap: int) -> lis
     cells: list[ScoreCell] = []
     widths: list[int] = []
     grain = round(1.5 * size)  # widths are rounded up, so that a value of another length does not move other cells
-    for name, text in [("score", display.score), *display.lines[:MAX_LINES]]:
+    lines = [line for line in display.lines if line[0].lower() != SCORE]  # rules may state it again
+    for name, text in [(SCORE, display.score), *lines[:MAX_LINES]]:
         label = name[:1].upper() + name[1:]
         text = ellipsis(text, 1.25 * size, max_width, mono=True)
         width = max(text_size(label, 0.82 * size)[0], text_size(text, 1.25 * size, mono=True)[0])

@@ -61,11 +61,17 @@ def _size(bodies: Bodies, body_index: int) -> str:
     return f"{word} {format_si(float(bodies.radius[body_index]), 'm')}"
 
 
-def settings_text(settings: Settings) -> str:
-    """Return a one-line summary of settings, without those that the engine does not use."""
+def settings_text(settings: Settings, has_counts: bool = True) -> str:
+    """Return a one-line summary of settings, without those that the engine does not use.
+
+    Args:
+        settings: the settings.
+        has_counts: whether substeps and iterations are stated; the side panel states them too.
+    """
     words = [f"dt {format_si(settings.dt, 's')}"]
     if settings.integrator is not None:
-        words.append(f"{settings.substeps} × {settings.iterations}")
+        if has_counts:
+            words.append(f"{settings.substeps} × {settings.iterations} iterations")  # those of a step
         words.append(settings.integrator.replace("_", " "))
         if settings.detection not in (None, "discrete"):
             words.append(str(settings.detection))
@@ -75,7 +81,11 @@ def settings_text(settings: Settings) -> str:
 
 
 def hud_status(
-    app_state: AppState, scene_keys: tuple[tuple[str, str], ...], frame_rate: float, recording: str | None
+    app_state: AppState,
+    scene_keys: tuple[tuple[str, str], ...],
+    frame_rate: float,
+    recording: str | None,
+    has_panel: bool = False,
 ) -> HudStatus:
     """Return the values of the head-up display.
 
@@ -84,6 +94,7 @@ def hud_status(
         scene_keys: (keys, action) bound by the scene.
         frame_rate: frames per second.
         recording: format and length of the film being recorded, if any.
+        has_panel: whether the side panel is visible.
     """
     show, messages = app_state.view, app_state.messages.visible()
     if show is None:
@@ -96,7 +107,7 @@ def hud_status(
     return HudStatus(
         title=show.scene.title or (app_state.path.stem if app_state.path is not None else "scene"),
         engine=show.engine,
-        settings=settings_text(show.settings),
+        settings=settings_text(show.settings, not has_panel),
         step=show.step_number,
         time=show.frame.time,
         paused=app_state.paused,

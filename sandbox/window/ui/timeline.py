@@ -22,6 +22,7 @@ class Timeline:
         """whether the knob is being dragged"""
         self._pointer: tuple[int, int] | None = None
         self._span = 0.0, 0.0
+        self._step = 0.01
         self._ui_scale = 1.0
 
     def handle_event(self, event: pygame.event.Event, area: pygame.Rect) -> float | None:
@@ -54,6 +55,7 @@ class Timeline:
         end: float,
         keyframes: Sequence[float] = (),
         ui_scale: float = 1.0,
+        step: float = 0.01,
     ) -> None:
         """Draw the bar, unless the area is too small.
 
@@ -65,7 +67,9 @@ class Timeline:
             end: last simulated time, s.
             keyframes: times of the keyframes, s.
             ui_scale: 1 on a display of 1080 lines.
+            step: s, smallest difference that the labels show; there are at least 2 decimals.
         """
+        self._step = step
         start, end = (time if math.isfinite(time) else 0.0 for time in (start, end))
         self._span, self._ui_scale = (start, max(start, end)), ui_scale
         track = self._track(area)
@@ -74,8 +78,8 @@ class Timeline:
         draw_box(surface, area, 6 * ui_scale)
         size = self._size(area)
         if track.left - area.left > 2 * size:  # space for labels
-            draw_text(surface, format_time(now), (track.left - size, area.centery), size, INK, "midright", mono=True)
-            draw_text(surface, format_time(end), (track.right + size, area.centery), size, FAINT, "midleft", mono=True)
+            draw_text(surface, self._text(now), (track.left - size, area.centery), size, INK, "midright", mono=True)
+            draw_text(surface, self._text(end), (track.right + size, area.centery), size, FAINT, "midleft", mono=True)
         thickness = max(round(4 * ui_scale), 2)
         bar = pygame.Rect(track.left, area.centery - thickness // 2, track.width, thickness)
         pygame.draw.rect(surface, PANEL_RAISED, bar, border_radius=thickness)
@@ -96,7 +100,7 @@ class Timeline:
             return
         x = min(max(self._pointer[0], track.left), track.right)
         pygame.draw.line(surface, INK, (x, area.top + 3), (x, area.bottom - 4))
-        text = format_time(self._time_at(x, area))
+        text = self._text(self._time_at(x, area))
         width, height = text_size(text, size, mono=True)
         box = pygame.Rect(0, 0, width + round(size), height + round(0.5 * size))
         box.midbottom = x, area.top - round(3 * self._ui_scale)
@@ -104,13 +108,16 @@ class Timeline:
         draw_box(surface, box, 4 * self._ui_scale, opacity=240)
         draw_text(surface, text, box.center, size, INK, "center", mono=True)
 
+    def _text(self, time: float) -> str:
+        return format_time(time, self._step)
+
     def _size(self, area: pygame.Rect) -> float:
         return min(12.5 * self._ui_scale, 0.6 * area.height)
 
     def _track(self, area: pygame.Rect) -> pygame.Rect:
         """Return the rectangle of the track: between the labels if that leaves half of the bar, else the whole bar."""
         size = self._size(area)
-        label_width = text_size(format_time(self._span[1]), size, mono=True)[0] + round(2 * size)
+        label_width = text_size(self._text(self._span[1]), size, mono=True)[0] + round(2 * size)
         edge = label_width if 4 * label_width <= area.width else round(0.8 * size)
         return pygame.Rect(area.left + edge, area.top, max(area.width - 2 * edge, 0), area.height)
 

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from sandbox.engines.common.compile_clock import ANNOUNCEMENT
 from tests.engines.builders import ROOT
 
 pytestmark = pytest.mark.fail_slow(60)  # child processes and pages
 
 HERE = Path(__file__).resolve().parent
 
-ANNOUNCEMENT = "compiling some functions for the first time; later runs start at once"
 
 HASHES_SCRIPT = """
 import json

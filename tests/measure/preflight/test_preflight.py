@@ -550,6 +550,32 @@ def test_first_order_flight_is_noted_with_its_error() -> None:
     assert "flight" not in [each.kind for each in notes(exact)]
 
 
+CRATE = "[[box]]\nname = 'b'\nsize = [1, 1]\n"
+STANDING_BALL = "[[ball]]\nname = 'b'\nradius = 0.5\nposition = [0, 0.5]\n"
+WALL = "[[wall]]\npoints = [[-1, 0], [-1, 9]]\nthickness = 0.2\n"
+NAIL = "[[joint]]\nkind = 'pivot'\nbetween = ['b']\nanchors = [[0, 0], [0, 5]]\n"
+
+
+@pytest.mark.parametrize(
+    ("tables", "body"),
+    [
+        (CRATE + "position = [0, 0.5]\n", None),
+        (STANDING_BALL, None),
+        (CRATE + "position = [0, 0.6]\n", "b"),
+        (STANDING_BALL + "velocity = [0, 9]\n", "b"),
+        ("[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 1\nrows = 2\n", None),
+        (CRATE + "position = [-0.4, 5]\n" + WALL, "b"),
+        (CRATE + "position = [-0.4, 5]\n" + NAIL, None),
+    ],
+    ids=["crate", "ball", "crate above", "ball thrown", "stack", "beside a wall", "hangs"],
+)
+def test_bodies_that_stand_or_hang_do_not_fly(tables: str, body: str | None) -> None:
+    text = "[world]\ngravity = [0, -10]\n[solver]\ndt = 0.5\n[[plane]]\npoint = [0, -9]\nnormal = [0, 1]\n"
+    floor = "[[wall]]\npoints = [[-9, -0.5], [9, -0.5]]\nthickness = 1.0\n"
+    found = [each.details["body"] for each in notes(loads(text + floor + tables)) if each.kind == "flight"]
+    assert found == ([] if body is None else [body])
+
+
 def test_settings_are_noted_by_their_names_in_pymunk_with_its_defaults_where_they_differ() -> None:
     table = {"ball": [{"position": [0, 1], "radius": 0.5}], "plane": [{"point": [0, 0], "normal": [0, 1]}]}
     scene = from_document(table)

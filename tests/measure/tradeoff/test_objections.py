@@ -150,6 +150,15 @@ def test_body_that_has_left_the_level_is_not_the_measure() -> None:
         assert METRICS["max_position"].measure(displaced, context) == pytest.approx(error)
 
 
+def test_static_level_of_one_body_stops_what_is_above_it_only() -> None:
+    """The disc about two far parts of a body reaches deep below both."""
+    parts = {"box": [{"size": [2.0, 0.1], "position": [x, 0.0]} for x in (-50.0, 50.0)]}
+    scene = platform(body=[{"name": "level", "position": [0.0, 0.0], "fixed": True, **parts}])
+    truth = run(scene, "reference")
+    left = times_of_leaving(scene, truth, np.asarray([0.0, -1.0]))
+    assert left[truth.names.tolist().index("player")] < 1.6  # it falls by 1 m within a second after the edge
+
+
 @pytest.mark.parametrize(
     "more",
     [

@@ -83,6 +83,12 @@ def test_generators_taken_apart_start_as_before() -> None:
     assert {box.friction for box in after.boxes} == {0.8}
 
 
+def test_bricks_of_a_fixed_stack_stay_fixed() -> None:
+    text = "[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 2\nrows = 2\nfixed = true\n"
+    after = loads(with_changes(text, take_apart_changes(loads(text), [ElementKey("stack", 0)])))
+    assert [box.fixed for box in after.boxes] == [True] * 4
+
+
 WALLS = """
 [[wall]]
 name = "fence"  # kept

@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 
 from sandbox.window.capture import recorder as capture
+from sandbox.window.capture.controller import CaptureController
 from sandbox.window.capture.gif import MAX_ERROR, PaletteQuantiser
 from sandbox.window.capture.image_files import PictureError, fit_image, offscreen, rgb_pixels, safe_stem, screenshot
 from sandbox.window.capture.recorder import recorder_for, recorder_in, size_within
@@ -91,6 +92,19 @@ def test_missing_folder_is_an_error(tmp_path: Path) -> None:
     for suffix in (".gif", ".mp4"):
         with pytest.raises(PictureError, match="cannot be written: No such file"):
             recorder_for(tmp_path / "nowhere" / f"a{suffix}", SIZE, 30.0)
+
+
+@pytest.mark.parametrize(("elapsed", "is_named"), [(0.04, False), (0.2, True)])
+def test_notice_of_a_film_with_few_pictures_names_the_export(elapsed: float, is_named: bool, tmp_path: Path) -> None:
+    notices: list[str] = []
+    controller = CaptureController(tmp_path, ".gif", lambda text, _: notices.append(text))
+    controller.start_recording((64, 48), "film")
+    for _ in range(10):
+        controller.update(lambda: pygame.Surface((64, 48)), elapsed)
+    controller.stop_recording()
+    (notice,) = notices
+    assert notice.startswith(f"recorded: {tmp_path / 'sandbox-film'}")
+    assert ("sandbox export" in notice, "5 pictures a second" in notice) == (is_named, is_named)
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
