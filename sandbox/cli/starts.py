@@ -3,8 +3,9 @@
 import click
 
 from sandbox.cli.options import Fraction
+from sandbox.formatting import format_plural
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, MAX_SPREAD, MAX_STARTS, Starts
-from sandbox.scene.compile.scene import Scene
+from sandbox.measure.tradeoff.result import Tradeoff
 
 starts_option = click.option(
     "--starts",
@@ -24,14 +25,14 @@ spread_option = click.option(
 )
 
 
-def starts_text(scene: Scene, starts: int, spread: float) -> str:
-    """Return from which starts settings are measured, and from which the recommended ones are confirmed.
-
-    Args:
-        scene: the scene.
-        starts: number of starts; 1: only that of the scene.
-        spread: largest change of a start, as a fraction.
-    """
-    if starts < 2:
-        return "starts: that of the scene only"
-    return f"starts: that of the scene; recommended settings also from others: {Starts(scene, spread)}"
+def starts_text(found: Tradeoff) -> str:
+    """Return from which starts settings are measured, and from which the recommended ones are confirmed."""
+    others = len(found.searched_starts) - 1
+    own = "starts: that of the scene"
+    if others:
+        own += (
+            f", and {format_plural(others, 'other')} from which the settings found first failed; errors are the largest"
+        )
+    if found.starts < 2:
+        return own
+    return f"{own}; recommended settings also from others: {Starts(found.scene, found.spread)}"

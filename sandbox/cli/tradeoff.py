@@ -121,7 +121,7 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     name = f"{scene} ({found.scene.title})" if found.scene.title else scene
     print_line(f"{name}: {found.error_about}")
     print_line(_about(found))
-    print_line(starts_text(found.scene, found.starts, found.spread))
+    print_line(starts_text(found))
     if rows:
         print_table(table, keys=SETTING_COLUMNS)
         if verbose:

@@ -44,8 +44,9 @@ def test_table_has_the_pareto_front_and_the_recommended_settings(tmp_path, capfd
     assert out[0].startswith(f"{scene} (Drop): error metric: max_position ")
     assert "closed form" in out[0]
     assert re.fullmatch("[456] settings tried", out[1])
-    assert out[2].split()[:4] == ["engine", "dt", "substeps", "iterations"]
-    rows = out[3 : next(k for k, line in enumerate(out) if line.startswith("ms/s: "))]
+    assert out[2].startswith("starts: that of the scene; recommended settings also from others: positions ± ")
+    assert out[3].split()[:4] == ["engine", "dt", "substeps", "iterations"]
+    rows = out[4 : next(k for k, line in enumerate(out) if line.startswith("ms/s: "))]
     assert len([row for row in rows if row.split()[-1] == "scene" or " scene " in row]) == 1
     assert any("cheapest" in row for row in rows)
     recommendations = [line for line in out if line.startswith(("cheapest setting", "most accurate setting"))]
@@ -60,7 +61,7 @@ def test_setting_that_may_tunnel_is_not_recommended_and_said_so(tmp_path, capfd)
     chosen = "--engine pymunk --effort 0.2 --repeats 5 --metric missed_contacts --budget 100"  # the least of 5: noise
     out = output_of(capfd, "tradeoff", scene, *chosen.split())
     (answer,) = [line for line in out if line.startswith("cheapest setting with missed_contacts")]
-    assert re.search(r"ms per frame of the budget of 100 ms$", answer)
+    assert re.search(r"ms per frame of the budget of 100 ms; held in 30 of 30 fresh starts \(95 % interval 89", answer)
     (rejected,) = [line for line in out if line.startswith("within the tolerance, but not recommended: ")]
     assert re.search(r"Because: odds up to \d+ % that 'bullet' tunnels through 'wall'$", rejected)
     assert not [line for line in out if line.startswith("note: ") and "tunnel" in line]
@@ -118,7 +119,8 @@ def test_patience_is_an_alias_of_time_limit(tmp_path, capfd, monkeypatch):
 
 def test_written_file_keeps_comments_and_is_within_the_tolerance(tmp_path, capfd):
     scene = write_scene(tmp_path, COMMENTED)
-    out = output_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.01", "--write")
+    out = output_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.01", "--starts", "1", "--write")
+    assert out[2] == "starts: that of the scene"
     assert out[-1] == f"written: {scene}"
     text = Path(scene).read_text(encoding="utf-8")
     assert "[solver]  # mine" in text
@@ -211,3 +213,18 @@ def test_interrupt_during_the_ground_truth_is_one_line(tmp_path, capfd, monkeypa
     assert call(["tradeoff", write_scene(tmp_path)]) == 130
     out, err = capfd.readouterr()
     assert (out, err.splitlines()[-1]) == ("", "interrupted")
+
+
+@pytest.mark.parametrize(("text", "spread"), [("2%", 0.02), ("0.02", 0.02), (" 0.5 % ", 0.005), ("0", 0.0)])
+def test_spread_is_a_fraction_or_in_per_cent(text: str, spread: float, tmp_path: Path, capfd: Any) -> None:
+    command = ("tradeoff", write_scene(tmp_path), "--engine", "pymunk", "--points", "1", "--repeats", "1")
+    _, document, _ = json_of(capfd, *command, "--effort", "0.01", "--spread", text)
+    assert document["spread"] == pytest.approx(spread)
+    assert (document["starts"] == 1) == (spread == 0.0)
+
+
+@pytest.mark.parametrize("text", ["60%", "-1%", "much", "%", "nan"])
+def test_invalid_spread_is_refused(text: str, tmp_path: Path, capfd: Any) -> None:
+    status, out, err = lines_of(capfd, "tradeoff", write_scene(tmp_path), "--spread", text)
+    assert (status, out) == (2, [])
+    assert "--spread" in err[-1]

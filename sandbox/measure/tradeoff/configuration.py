@@ -283,7 +283,7 @@ class Evaluation:
     reason: str | None
     """reason for a status other than `ok`"""
     metrics: Mapping[str, float | None]
-    """every metric by name, in its unit; the worst over the seeds"""
+    """every metric by name, in its unit; the worst over the starts"""
     work: Mapping[str, int]
     """deterministic counters: substeps, pair tests, contact iterations, events"""
     objections: tuple[str, ...] = ()
@@ -291,9 +291,9 @@ class Evaluation:
     worst: WorstError | None = None
     """body, time and place of the largest distance from the truth; None without a truth"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
-    """s, counted cost of one run, the largest over the seeds; of a stopped run, the limit"""
+    """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))
-    """s, counted cost of the runs of all seeds that were made for this evaluation"""
+    """s, counted cost of the runs of all starts that were made for this evaluation"""
     seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, measured time of the recorded run on this machine"""
 
@@ -339,7 +339,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class _Result:
-    """Outcome of the runs of a configuration with all seeds."""
+    """Outcome of the runs of a configuration from all starts."""
 
     status: str
     reason: str | None = None
@@ -349,7 +349,7 @@ class _Result:
     seconds: float = 0.0
     work: Mapping[str, int] = field(default_factory=dict)
     fastest: FloatArray | None = None
-    """(N,) m/s, largest speed of each body over the seeds; None unless the status is `ok`"""
+    """(N,) m/s, largest speed of each body over the starts; None unless the status is `ok`"""
     worst: WorstError | None = None
 
 
@@ -363,12 +363,12 @@ def evaluate(
     deadline: float = math.inf,
     known: Trajectory | None = None,
 ) -> Evaluation:
-    """Run a configuration once in each context, each with another seed, and keep the worst value of every metric.
+    """Run a configuration once in each context, each from another start, and keep the worst value of every metric.
 
     Args:
         configuration: engine and settings.
         space: search space of the configuration.
-        contexts: contexts of the same scene with different seeds.
+        contexts: contexts of the same scene from different starts.
         metric: name of the metric of the error.
         tolerance: largest accepted error, in the unit of the metric.
         limit: counted cost that one run may have, s.

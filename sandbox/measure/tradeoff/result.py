@@ -39,7 +39,7 @@ class Confirmation:
     """Errors of a setting over perturbed starts that were not used to choose it."""
 
     held: Proportion
-    """starts in which the error was within the tolerance"""
+    """starts in which the error was within the tolerance; without trials if the effort allows none"""
     median_error: float | None
     """median over the starts, in the unit of the metric; None if half of the runs failed"""
     error_95: float | None
@@ -48,12 +48,16 @@ class Confirmation:
     @classmethod
     def of(cls, errors: Sequence[float], tolerance: float) -> Self:
         """Return the confirmation by the errors of the starts; infinite for a run that failed."""
+        if not errors:
+            return cls(Proportion(0, 0), None, None)
         median, high = np.quantile(errors, (0.5, 0.95), method="higher").tolist()
         held = Proportion(sum(error <= tolerance for error in errors), len(errors))
         return cls(held, finite(median), finite(high))
 
     def __str__(self) -> str:
         """Return in how many starts the setting held: `held in 29 of 30 fresh starts (95 % interval 83 to 99 %)`."""
+        if not self.held.trials:
+            return "not tried from other starts, because their truths and runs take more than the effort"
         low, high = (100.0 * each for each in self.held.interval)
         return f"held in {self.held.hits} of {self.held.trials} fresh starts (95 % interval {low:.0f} to {high:.0f} %)"
 
@@ -127,6 +131,9 @@ class Tradeoff(StudyAgainstTruth):
     """number of perturbed starts with which settings are confirmed, if the effort allows; 1: none"""
     spread: float
     """largest change of a start, as a fraction (`Starts`)"""
+    searched_starts: tuple[int, ...]
+    """numbers of the starts over which errors are the largest: 0, that of the scene, and those from which the settings
+    found before failed"""
     untried: int
     """number of configurations left out because of their cost"""
     effort: float

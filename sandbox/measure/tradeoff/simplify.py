@@ -83,7 +83,7 @@ def model_simplifications(contexts: Sequence[EvaluationContext], replaced: Repla
     """Return the cheaper models whose error is within the tolerance, the cheapest first.
 
     Args:
-        contexts: contexts of the scene with different seeds: a model has to satisfy the tolerance with each.
+        contexts: contexts of the scene from different starts: a model has to satisfy the tolerance from each.
         replaced: the setting that the models replace.
     """
     found = [*_closed_form(contexts, replaced)]
@@ -173,7 +173,7 @@ def _changed(scene: Scene, change: SettingChange) -> Scene | None:
 
 
 def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[ModelChange]:
-    """Yield the changes that the scene and the truths of all seeds allow."""
+    """Yield the changes that the scene and the truths of all starts allow."""
     scene = contexts[0].scene
     world, matrix = scene.world, contact_matrix(scene)
     pairs = _contact_pairs(contexts)

@@ -3,6 +3,7 @@
 import math
 from itertools import pairwise
 
+import numpy as np
 import pymunk
 import pytest
 from hypothesis import given
@@ -21,6 +22,7 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_cheapest,
     recommend_most_accurate,
 )
+from sandbox.measure.tradeoff.result import Confirmation
 from tests.measure.tradeoff.evaluations_by_hand import point_of
 from tests.runs_by_hand import DROP, scene_of
 
@@ -28,38 +30,55 @@ OBJECTIVE = Objective(METRICS["max_position"], 0.01, 0.5, 60.0)
 POINTS = [point_of(5.0, 0.02), point_of(10.0, 0.009), point_of(20.0, 0.001), point_of(40.0, 0.0001)]
 
 
-def never(_: Evaluation) -> float:
-    raise AssertionError("nothing is random, so nothing is run again")
+def never(_: Evaluation) -> bool:
+    raise AssertionError("an evaluation that is not within the tolerance is not tried from other starts")
+
+
+def always(_: Evaluation) -> bool:
+    return True
+
+
+def unconfirmed(_: Evaluation) -> None:
+    return None
 
 
 def test_cheapest_within_the_tolerance_is_recommended() -> None:
-    found = recommend_cheapest(POINTS, OBJECTIVE, (), never)
-    assert (found.point, found.fresh_seeds, found.fresh_error) == (POINTS[1], (), None)
+    found = recommend_cheapest(POINTS, OBJECTIVE, always, unconfirmed)
+    assert (found.point, found.confirmation) == (POINTS[1], None)
+    assert recommend_cheapest(POINTS[:1], OBJECTIVE, never, unconfirmed) is None
 
 
-def test_setting_that_fails_on_fresh_seeds_is_skipped() -> None:
-    rerun: list[Evaluation] = []
+def test_setting_that_fails_from_other_starts_is_skipped() -> None:
+    tried: list[Evaluation] = []
 
-    def error_on_fresh_seeds(point: Evaluation) -> float:
-        rerun.append(point)
-        return {10.0: 0.011, 20.0: 0.009}[point.cost or 0.0]
+    def holds(point: Evaluation) -> bool:
+        tried.append(point)
+        return point is POINTS[2]
 
-    found = recommend_cheapest(POINTS, OBJECTIVE, (4, 5, 6), error_on_fresh_seeds)
-    assert (found.point, found.fresh_seeds, found.fresh_error) == (POINTS[2], (4, 5, 6), 0.009)
-    assert rerun == POINTS[1:3]
-    assert "9 mm with other seeds" in found.sentence
+    confirmation = Confirmation.of([0.009] * 29 + [0.02], 0.01)
+    found = recommend_cheapest(POINTS, OBJECTIVE, holds, lambda _: confirmation)
+    assert (found.point, found.confirmation) == (POINTS[2], confirmation)
+    assert tried == POINTS[1:3]
+    assert found.sentence.endswith("held in 29 of 30 fresh starts (95 % interval 83 to 99 %)")
 
 
-@pytest.mark.parametrize("fresh", [math.inf, math.nan, 0.02])
-def test_nothing_is_recommended_if_all_fail_on_fresh_seeds(fresh: float) -> None:
-    assert recommend_cheapest(POINTS, OBJECTIVE, (1,), lambda _: fresh) is None
+def test_nothing_is_recommended_if_all_fail_from_other_starts() -> None:
+    assert recommend_cheapest(POINTS, OBJECTIVE, lambda _: False, unconfirmed) is None
+
+
+def test_confirmation_has_quantiles_and_counts_failed_runs() -> None:
+    found = Confirmation.of([*np.arange(1.0, 20.0), math.inf], 10.0)
+    assert (found.held.hits, found.held.trials) == (10, 20)
+    assert (found.median_error, found.error_95) == (11.0, None)  # a run of 20 failed: the quantile is unknown
+    assert Confirmation.of(np.arange(1.0, 101.0).tolist(), 95.0).error_95 == 96.0  # 95 of 100 are below it
+    assert Confirmation.of([], 1.0).held.trials == 0
 
 
 def test_times_within_the_noise_are_decided_by_counted_work() -> None:
     def picked(engines: str, *costs: float) -> float | None:
         numbers = zip(engines, costs, (3.0, 2.0, 1.0), strict=True)
         points = [point_of(cost, 0.0, engine, counted=counted) for engine, cost, counted in numbers]
-        found = recommend_cheapest(points, OBJECTIVE, (), never)
+        found = recommend_cheapest(points, OBJECTIVE, always, unconfirmed)
         return found.point.counted
 
     for engines in ("aaa", "abc"):
@@ -72,12 +91,12 @@ def test_times_within_the_noise_are_decided_by_counted_work() -> None:
 def test_setting_with_fewer_changes_is_preferred_at_equal_time_and_work() -> None:
     plain = point_of(10.4, 0.001, counted=10.4, substeps=2)
     points = [point_of(10.0, 0.002, counted=10.0, substeps=2, half_kick=True), plain]
-    found = recommend_cheapest(points, OBJECTIVE, (), never)
+    found = recommend_cheapest(points, OBJECTIVE, always, unconfirmed)
     assert found.point is plain
 
 
 def test_cost_measured_with_recording_is_not_compared() -> None:
-    found = recommend_cheapest([point_of(1.0, 0.0, repeats=0), point_of(9.0, 0.0)], OBJECTIVE, (), never)
+    found = recommend_cheapest([point_of(1.0, 0.0, repeats=0), point_of(9.0, 0.0)], OBJECTIVE, always, unconfirmed)
     assert found.point.cost == 9.0
 
 
@@ -117,53 +136,53 @@ def test_pymunk_lines_configure_a_space_as_the_engine_does() -> None:
 def test_point_without_finite_error_is_not_recommended() -> None:
     useless = [point_of(1.0, None), point_of(1.0, math.nan), point_of(1.0, math.inf)]
     assert not any(point.is_usable for point in useless)
-    assert recommend_cheapest(useless, OBJECTIVE, (), never) is None
-    assert recommend_most_accurate(useless, OBJECTIVE, (), never) is None
+    assert recommend_cheapest(useless, OBJECTIVE, always, unconfirmed) is None
+    assert recommend_most_accurate(useless, OBJECTIVE, unconfirmed) is None
 
 
 def test_most_accurate_within_the_budget_is_recommended() -> None:
     # 0.5 ms per frame, 60 a second: 30 ms per simulated second
-    found = recommend_most_accurate(POINTS, OBJECTIVE, (), never)
+    found = recommend_most_accurate(POINTS, OBJECTIVE, unconfirmed)
     assert found.point == POINTS[2]
-    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=0.01), (), never) is None
-    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=None), (), never) is None
+    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=0.01), unconfirmed) is None
+    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=None), unconfirmed) is None
 
 
 def test_cheapest_of_equally_accurate_points_is_recommended() -> None:
-    found = recommend_most_accurate([point_of(9.0, 0.0), point_of(3.0, 0.0)], OBJECTIVE, (), never)
+    found = recommend_most_accurate([point_of(9.0, 0.0), point_of(3.0, 0.0)], OBJECTIVE, unconfirmed)
     assert found.point.cost == 3.0
 
 
 def test_step_longer_than_a_frame_has_to_fit_into_one() -> None:
     """20 ms per second in steps of 0.1 s is 2 ms in the frame that contains the step."""
-    found = recommend_most_accurate([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], OBJECTIVE, (), never)
+    found = recommend_most_accurate([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], OBJECTIVE, unconfirmed)
     assert found.point.settings.dt == 0.01
 
 
 def test_step_longer_than_max_dt_is_not_recommended() -> None:
     points = [point_of(1.0, 0.0, dt=0.04), point_of(9.0, 0.0, dt=0.02)]
     for pick in (
-        recommend_cheapest(points, OBJECTIVE._replace(max_dt=0.02), (), never),
-        recommend_most_accurate(points, OBJECTIVE._replace(max_dt=0.02), (), never),
+        recommend_cheapest(points, OBJECTIVE._replace(max_dt=0.02), always, unconfirmed),
+        recommend_most_accurate(points, OBJECTIVE._replace(max_dt=0.02), unconfirmed),
     ):
         assert pick.point.settings.dt == 0.02
 
 
 def test_sentence_states_settings_error_and_cost() -> None:
-    found = recommend_cheapest([point_of(12.0, 0.00031, dt=0.01, substeps=4)], OBJECTIVE, (), never)
+    found = recommend_cheapest([point_of(12.0, 0.00031, dt=0.01, substeps=4)], OBJECTIVE, always, unconfirmed)
     assert found.sentence == (
         "pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms per simulated second (1.2 % of real time), "
         "0.2 ms per frame of the budget of 0.5 ms"
     )
-    coarse = recommend_cheapest([point_of(12.0, 0.0, dt=0.1)], OBJECTIVE, (), never)
+    coarse = recommend_cheapest([point_of(12.0, 0.0, dt=0.1)], OBJECTIVE, always, unconfirmed)
     assert "longer than a frame" in coarse.sentence
 
 
 def test_missed_contacts_are_stated_as_a_ratio() -> None:
     objective = Objective(METRICS["passes"], 0.5, None, 60.0)
-    found = recommend_cheapest([point_of(1.0, 0.125)], objective, (), never)
+    found = recommend_cheapest([point_of(1.0, 0.125)], objective, always, unconfirmed)
     assert "1 in 8 contacts missed" in found.sentence
-    whole = recommend_cheapest([point_of(1.0, 0.0)], objective, (), never)
+    whole = recommend_cheapest([point_of(1.0, 0.0)], objective, always, unconfirmed)
     assert "1 in" not in whole.sentence
 
 

@@ -13,7 +13,7 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
+from sandbox.measure.tradeoff.result import Confirmation, Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
@@ -77,7 +77,9 @@ def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "rejected": None,
         "nearest_to_tolerance": None,
         "nearest_to_budget": None,
-        "seeds": (0,),
+        "starts": 30,
+        "spread": 0.01,
+        "searched_starts": (0,),
         "untried": 0,
         "effort": 1.0,
         "spent": 0.5,
@@ -100,7 +102,12 @@ def tradeoff_document() -> dict[str, Any]:
         point("exact", 0.01, 0.0, 30.0),
     )
     risk = Diagnostic("tunnelling", f"substeps >= 20 prevents tunnelling of {HOSTILE}", {"safe_substeps": 20})
-    cheapest = {"pymunk": Recommendation(points[1], "cheapest of pymunk", (), None, (risk,)), "exact": None}
+    cheapest = {
+        "pymunk": Recommendation(
+            points[1], "cheapest of pymunk", Confirmation.of([0.004] * 29 + [0.02], 0.01), (risk,)
+        ),
+        "exact": None,
+    }
     scene = loads(SCENE, "hostile.toml")
     found = tradeoff_of(
         points,
@@ -108,7 +115,7 @@ def tradeoff_document() -> dict[str, Any]:
         pareto=(points[0], points[3], points[4], points[5]),
         splits=(ErrorBudget("pymunk", Settings(), 0.1, 0.01, 0.085, 0.005, 0.005, 16),),
         proposals=(Simplification("closed form", None, 0.0, 0.1, 0.05, HOSTILE),),
-        within_tolerance=Recommendation(points[4], HOSTILE, (), None),
+        within_tolerance=Recommendation(points[4], HOSTILE, None),
         cheapest_by_engine=cheapest,
         max_dt=0.005,
     )
