@@ -28,11 +28,9 @@ spread_option = click.option(
 def starts_text(found: Tradeoff) -> str:
     """Return from which starts settings are measured, and from which the recommended ones are confirmed."""
     others = len(found.searched_starts) - 1
-    own = "starts: that of the scene"
+    searched = "starts: that of the scene"
     if others:
-        own += (
-            f", and {format_plural(others, 'other')} from which the settings found first failed; errors are the largest"
-        )
+        searched += f" and {format_plural(others, 'other')}, from which settings failed; errors are the worst"
     if found.starts < 2:
-        return own
-    return f"{own}; recommended settings also from others: {Starts(found.scene, found.spread)}"
+        return searched
+    return f"{searched}; confirmed from fresh starts with {Starts(found.scene, found.spread)}"
