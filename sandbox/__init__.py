@@ -170,8 +170,12 @@ if TYPE_CHECKING:
     from sandbox.measure.tradeoff.error_budget import (
         ErrorBudget as ErrorBudget,
     )
+    from sandbox.measure.starts import (
+        Starts as Starts,
+    )
     from sandbox.measure.tradeoff.result import (
         Conclusion as Conclusion,
+        FreshStarts as FreshStarts,
         Recommendation as Recommendation,
         Tradeoff as Tradeoff,
     )
@@ -352,7 +356,8 @@ _NAMES = {
     "sandbox.measure.tradeoff": "tradeoff",
     "sandbox.measure.tradeoff.configuration": "Configuration Evaluation",
     "sandbox.measure.tradeoff.error_budget": "ErrorBudget",
-    "sandbox.measure.tradeoff.result": "Conclusion Recommendation Tradeoff",
+    "sandbox.measure.starts": "Starts",
+    "sandbox.measure.tradeoff.result": "Conclusion FreshStarts Recommendation Tradeoff",
     "sandbox.measure.tradeoff.simplify": "Simplification",
     "sandbox.notebook": "live",
     "sandbox.pymunk_capture.game_capture": "GameCapture SpaceCapture capture",

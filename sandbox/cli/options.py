@@ -50,7 +50,7 @@ class FiniteRange(click.FloatRange):
         return number
 
 
-class Fraction(FiniteRange):
+class FractionRange(FiniteRange):
     """Fraction, also in per cent: `0.01` or `1%`."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:

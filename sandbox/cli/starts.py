@@ -2,7 +2,7 @@
 
 import click
 
-from sandbox.cli.options import Fraction
+from sandbox.cli.options import FractionRange
 from sandbox.formatting import format_plural
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, MAX_SPREAD, MAX_STARTS, Starts
 from sandbox.measure.tradeoff.result import Tradeoff
@@ -17,7 +17,7 @@ starts_option = click.option(
 )
 spread_option = click.option(
     "--spread",
-    type=Fraction(min=0.0, max=MAX_SPREAD),
+    type=FractionRange(min=0.0, max=MAX_SPREAD),
     default=DEFAULT_SPREAD,
     metavar="X%",
     help="largest change of a start: of positions as a part of the smallest half width, and of velocities; "
@@ -30,7 +30,7 @@ def starts_text(found: Tradeoff) -> str:
     others = len(found.searched_starts) - 1
     searched = "starts: that of the scene"
     if others:
-        searched += f" and {format_plural(others, 'other')}, from which settings failed; errors are the worst"
+        searched += f" and {format_plural(others, 'other')} where settings failed; errors are the worst of these"
     if found.starts < 2:
         return searched
     return f"{searched}; confirmed from fresh starts with {Starts(found.scene, found.spread)}"

@@ -211,7 +211,7 @@ def test_interrupt_during_the_ground_truth_is_one_line(tmp_path, capfd, monkeypa
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.measure.tradeoff.study.find_truth", interrupted)
+    monkeypatch.setattr("sandbox.measure.tradeoff.start_trials.find_truth", interrupted)
     assert call(["tradeoff", write_scene(tmp_path)]) == 130
     out, err = capfd.readouterr()
     assert (out, err.splitlines()[-1]) == ("", "interrupted")

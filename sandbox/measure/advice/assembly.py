@@ -22,13 +22,14 @@ from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.run.bounded_run import clock_without_compilation
+from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )
-from sandbox.measure.tradeoff.result import Confirmation, Tradeoff
+from sandbox.measure.tradeoff.result import FreshStarts, Tradeoff
 from sandbox.provenance import machine, versions
 from sandbox.scene.description.world import Settings
 
@@ -73,7 +74,7 @@ def evaluation_key(point: Evaluation) -> tuple[str, str]:
     return point.engine, point.asked.model_dump_json()
 
 
-def _confirmation(request: AdviceRequest, measured: AdviceMeasurements) -> Confirmation | None:
+def _confirmation(request: AdviceRequest, measured: AdviceMeasurements) -> FreshStarts | None:
     """Return the errors of the recommended setting from fresh starts; None unless the trade-off recommends it."""
     found = None if measured.found is None else measured.found.cheapest_by_engine.get(request.engine)
     if found is None or measured.recommended is None:
@@ -117,6 +118,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         is_in_loop=request.is_in_loop,
         recommended=recommended,
         confirmation=_confirmation(request, measured),
+        starts_about=str(Starts(scene, request.spread)) if found is not None and found.starts > 1 else None,
         fallback=fallback,
         fallback_kind=measured.fallback_kind,
         remaining_risks=_remaining_risks(request, chosen),

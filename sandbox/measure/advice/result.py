@@ -8,7 +8,7 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
 from sandbox.measure.compare.metrics import WorstError
-from sandbox.measure.tradeoff.result import Confirmation
+from sandbox.measure.tradeoff.result import FreshStarts
 from sandbox.scene.description.world import Settings
 
 FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]
@@ -156,8 +156,10 @@ class Advice:
     """whether the present dt is that of a frame, so that the game steps once a frame"""
     recommended: MeasuredSetting | None
     """cheapest setting of the present engine within the tolerance"""
-    confirmation: Confirmation | None
+    confirmation: FreshStarts | None
     """its errors from fresh starts; None if no other starts confirm it"""
+    starts_about: str | None
+    """differences of the starts from which it was tried; None if only from that of the scene"""
     fallback: MeasuredSetting | None
     """another setting if the recommended one is missing or over the budget"""
     fallback_kind: FallbackKind | None

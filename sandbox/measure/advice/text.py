@@ -136,7 +136,7 @@ def coverage_sentence(advice: Advice) -> str | None:
 
 
 def truth_sentences(advice: Advice) -> Iterator[str]:
-    """Yield the truth that errors are measured against, and the bodies that do not count to the end."""
+    """Yield the truth that errors are measured against, bodies that do not count to the end, and the other starts."""
     if advice.truth is None or advice.trusted_until is None:
         yield f"No truth is known: {advice.truth_about}."
     else:
@@ -147,6 +147,8 @@ def truth_sentences(advice: Advice) -> Iterator[str]:
         yield f"{name!r} does not count after {time:.3g} s: it has fallen past everything that could stop it."
     if len(advice.left_at) > MAX_LEFT:
         yield f"The same holds for {len(advice.left_at) - MAX_LEFT} other bodies."
+    if advice.starts_about is not None:
+        yield f"The recommended setting is also tried from starts with {advice.starts_about}."
 
 
 def recording_sentences(advice: Advice) -> Iterator[str]:

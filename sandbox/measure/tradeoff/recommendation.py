@@ -6,7 +6,7 @@ from sandbox.engines.pymunk_adapter.engine import is_space_default, space_attrib
 from sandbox.formatting import format_quantity
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import Objective
-from sandbox.measure.tradeoff.result import Confirmation, Recommendation
+from sandbox.measure.tradeoff.result import FreshStarts, Recommendation
 from sandbox.scene.description.world import Settings
 
 FRAME_TOLERANCE = 1.01
@@ -22,7 +22,7 @@ weights of the counters are no more accurate than that."""
 
 Screen = Callable[[Evaluation], bool]
 """Runs a configuration from other starts, and returns whether enough of them are within the tolerance."""
-Confirm = Callable[[Evaluation], Confirmation | None]
+Confirm = Callable[[Evaluation], FreshStarts | None]
 """Runs a configuration from other starts; None if there are none."""
 
 
@@ -135,7 +135,7 @@ def _counted_cost(point: Evaluation) -> float:
     return point.counted or 0.0
 
 
-def describe(point: Evaluation, objective: Objective, confirmation: Confirmation | None) -> str:
+def describe(point: Evaluation, objective: Objective, confirmation: FreshStarts | None) -> str:
     """Describe a setting: engine and changes, error, cost per simulated second and per frame, odds from other starts.
 
     Example: `pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms per simulated second (1.2 % of real time),

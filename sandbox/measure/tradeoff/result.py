@@ -35,7 +35,7 @@ MAX_SHOWN = 4
 
 
 @dataclass(frozen=True)
-class Confirmation:
+class FreshStarts:
     """Errors of a setting over perturbed starts that were not used to choose it."""
 
     held: Proportion
@@ -70,7 +70,7 @@ class Recommendation:
     """the setting, with error and cost"""
     sentence: str
     """description of the setting, its error and its cost"""
-    confirmation: Confirmation | None
+    confirmation: FreshStarts | None
     """errors over fresh starts; None if no other starts were asked for, or the setting is not recommended"""
     warnings: tuple[Diagnostic, ...] = ()
     """problems that formulas predict for the setting (those of `sandbox check --no-trial`). The measured runs may not

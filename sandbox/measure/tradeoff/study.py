@@ -13,20 +13,18 @@ from types import MappingProxyType
 from typing import Unpack
 
 from sandbox.engines.registry import ENGINES, engine_named
-from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
-from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
+from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
 from sandbox.measure.preflight.tunnelling import largest_safe_dt
-from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
+from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
 from sandbox.measure.tradeoff.configuration import (
-    Configuration,
     Evaluation,
     SearchSpace,
-    evaluate,
     refused_evaluation,
 )
 from sandbox.measure.tradeoff.error_budget import ErrorBudget, error_budget
@@ -46,9 +44,10 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Confirmation, Recommendation, Tradeoff, front_of
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
+from sandbox.measure.tradeoff.start_trials import StartTrials, context_of
 from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
@@ -70,17 +69,8 @@ TIMING_FRACTION = 0.5
 """Fraction of the effort for separate timings."""
 MIN_REPEATS = 2
 """Repeats that are made even if the timing exceeds its part of the effort, unless fewer were asked for."""
-HELD_FRACTION = 0.95
-"""Fraction of the starts in which a recommended setting is within the tolerance."""
-STARTS_FRACTION = 0.3
-"""Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
-MIN_STARTS = 3
-"""Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
 MAX_COUNTEREXAMPLES = 2
 """Times that the search is repeated with another start from which the settings found so far fail."""
-TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
-"""Cost of a truth in that of its finest run: before it, dt is halved several times, and a second method and perturbed
-runs confirm it. That took 14 times the finest run for `chain_of_20`."""
 
 
 def tradeoff(
@@ -167,22 +157,22 @@ def tradeoff(
     on_progress(Progress("the truth"))
     drawn = Starts(scene, spread)
     truth_tolerance = _truth_tolerance(scene, metric, tolerance, zoom)
-    context = _context(scene, base, truth_tolerance, zoom, truth)
+    context = context_of(scene, base, truth_tolerance, zoom, truth)
     zoom = context.zoom  # without a given one, that of the motion, for which a truth is needed
     finer = _truth_tolerance(scene, metric, tolerance, zoom)
     if finer < truth_tolerance:
         truth_tolerance = finer
-        context = _context(scene, base, finer, zoom)
+        context = context_of(scene, base, finer, zoom)
     objective = complete_objective(context, metric, tolerance, budget, fps)
+    objective = objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps))
+    able = tuple(name for name in names if not _refusal(scene, name, base))
+    space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
+    count = starts if drawn.vary else 1
     study = _Study(
-        space=SearchSpace(
-            scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps, has_fixed_dt
-        ),
+        space=space,
         context=context,
-        objective=objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps)),
-        starts=drawn,
-        start_count=starts if drawn.vary else 1,
-        truth_tolerance=truth_tolerance,
+        objective=objective,
+        trials=StartTrials(space, context, objective, drawn, count, truth_tolerance, effort, deadline),
         effort=effort,
         deadline=deadline,
         on_progress=on_progress,
@@ -211,15 +201,6 @@ def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None, 
     return min(default_tolerance(scene), tolerance / scale)
 
 
-def _context(
-    scene: Scene, base: Settings, truth_tolerance: float, zoom: float | None, known: Truth | str | None = None
-) -> EvaluationContext:
-    """Return the context of a start of a scene; its truth may be known."""
-    result = find_truth(scene, base, truth_tolerance) if known is None else known
-    truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
-    return EvaluationContext(scene, truth, default_zoom(scene, truth) if zoom is None else zoom, doubt)
-
-
 def _refusal(scene: Scene, engine: str, base: Settings) -> str | None:
     """Return the reason why an engine cannot run a scene with any settings; None if it can."""
     if not ENGINES[engine].missing(scene, base):
@@ -241,11 +222,8 @@ class _Study:
     context: EvaluationContext
     """of the start in the scene"""
     objective: Objective
-    starts: Starts
-    start_count: int
-    """number of starts that decide on a setting; 1: only the one in the scene"""
-    truth_tolerance: float
-    """m, error that a truth may have"""
+    trials: StartTrials
+    """of settings from other starts"""
     effort: float
     deadline: float
     on_progress: ProgressCallback
@@ -255,17 +233,14 @@ class _Study:
     """whether to split the errors into their sources, and to try simpler models"""
     counterexamples: list[int] = field(default_factory=list)
     """numbers of other starts from which the search runs settings too"""
-    _contexts: dict[int, EvaluationContext] = field(default_factory=dict)
-    """contexts of other starts, by their numbers"""
-    _errors: dict[tuple[Configuration, int], float] = field(default_factory=dict)
-    """errors of configurations from other starts, by their numbers"""
 
     def run(self, runs: Mapping[str, Trajectory], repeats: int, most: int) -> Tradeoff:
         """Search, time and recommend; after Ctrl-C, with the finished evaluations and their times."""
         search, evaluations = self._search(self._reusable(runs), most)
         try:
             for _ in range(MAX_COUNTEREXAMPLES):
-                found = None if search.interrupted else self._counterexample(evaluations)
+                self.on_progress(Progress("trying settings from other starts"))
+                found = None if search.interrupted else self.trials.counterexample(evaluations)
                 if found is None:
                     break
                 self.counterexamples.append(found)
@@ -274,7 +249,7 @@ class _Study:
                 return self._result(search, evaluations, repeats)
         except KeyboardInterrupt:
             self.on_progress(Progress("interrupted"))
-        self.start_count = 1
+        self.trials.count = 1
         return self._result(search, evaluations, 0)
 
     def _search(self, known: Mapping[str, Trajectory], most: int) -> tuple[SettingsSearch, list[Evaluation]]:
@@ -296,21 +271,7 @@ class _Study:
 
     @property
     def _search_contexts(self) -> list[EvaluationContext]:
-        return [self.context, *(self._contexts[number] for number in self.counterexamples)]
-
-    def _counterexample(self, evaluations: Sequence[Evaluation]) -> int | None:
-        """Return a start from which a setting fails, if an engine has settings within the tolerance but none holds.
-
-        The search is then repeated with this start too, because it ended when all seemed well.
-        """
-        self.on_progress(Progress("trying settings from other starts"))
-        for engine in self.space.engines:
-            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.tolerance)]
-            own.sort(key=lambda each: each.counted_seconds)
-            if own and not any(map(self._holds, own)):
-                tried = {n: error for (setting, n), error in self._errors.items() if setting == own[0].configuration}
-                return next(n for n, error in tried.items() if error > self.objective.tolerance)
-        return None
+        return [self.context, *(self.trials.context_at(number) for number in self.counterexamples)]
 
     def _reusable(self, runs: Mapping[str, Trajectory]) -> dict[str, Trajectory]:
         """Return the given runs with the own settings of an engine, if they have the data that the metric needs."""
@@ -329,8 +290,8 @@ class _Study:
         self.on_progress(Progress("timing"))
         points = [*self._timed(evaluations, repeats), *self.refused]
         self.on_progress(Progress("checking the recommended setting from other starts"))
-        within_tolerance = recommend_cheapest(points, self.objective, self._holds, self._confirmation)
-        within_budget = recommend_most_accurate(points, self.objective, self._confirmation)
+        within_tolerance = recommend_cheapest(points, self.objective, self.trials.holds, self.trials.confirmation)
+        within_budget = recommend_most_accurate(points, self.objective, self.trials.confirmation)
         splits: list[ErrorBudget] = []
         proposals: list[Simplification] = []
         if repeats and self.is_explained and clock_without_compilation() < self.deadline:
@@ -339,7 +300,7 @@ class _Study:
             proposals = self._simplifications(within_tolerance)
         by_engine = {name: [p for p in points if p.engine == name] for name in self.space.engines}
         cheapest = {
-            name: recommend_cheapest(own, self.objective, self._holds, self._confirmation)
+            name: recommend_cheapest(own, self.objective, self.trials.holds, self.trials.confirmation)
             for name, own in by_engine.items()
         }
         near_tolerance = None if within_tolerance else nearest_to_tolerance(points, self.objective)
@@ -366,8 +327,8 @@ class _Study:
             rejected=cheapest_rejected(points, self.objective, within_tolerance),
             nearest_to_tolerance=self._with_warnings(near_tolerance),
             nearest_to_budget=self._with_warnings(near_budget),
-            starts=self.start_count,
-            spread=self.starts.spread,
+            starts=self.trials.count,
+            spread=self.trials.starts.spread,
             searched_starts=(0, *self.counterexamples),
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
@@ -416,53 +377,6 @@ class _Study:
                 if each.is_own or not is_dominated(each.counted_seconds, each.ranking_error, others, TIMED_MARGIN):
                     near_front.append(each)
         return near_front
-
-    def _holds(self, point: Evaluation) -> bool:
-        """Return whether a configuration is within the tolerance in 95 % of the starts that decide.
-
-        It stops at the first start that makes that impossible.
-        """
-        count = self._affordable(point)
-        failures = math.floor((1.0 - HELD_FRACTION) * count + 1e-9)
-        for number in range(1, count + 1):
-            failures -= self._error(point, number) > self.objective.tolerance
-            if failures < 0:
-                return False
-        return True
-
-    def _confirmation(self, point: Evaluation) -> Confirmation | None:
-        """Return the errors of a configuration from starts that do not decide; None without other starts."""
-        if self.start_count < 2:
-            return None
-        count = self._affordable(point)
-        errors = [self._error(point, self.start_count + number) for number in range(1, count + 1)]
-        return Confirmation.of(errors, self.objective.tolerance)
-
-    def _affordable(self, point: Evaluation) -> int:
-        """Return the number of starts from which a configuration is run, or 0: counted work decides, not the clock."""
-        if self.start_count < 2:
-            return 0
-        truth, cost = self.context.truth, point.counted_seconds
-        if truth is not None and (runs := TRUTH_RUNS[truth.kind]):
-            info = truth.trajectory.info
-            settings = Settings.model_validate(info["settings"])
-            cost += runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
-        affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.start_count
-        return min(self.start_count, affordable) if affordable >= min(MIN_STARTS, self.start_count) else 0
-
-    def _error(self, point: Evaluation, number: int) -> float:
-        """Return the error of a configuration from another start; infinite if its run fails."""
-        key = point.configuration, number
-        if key not in self._errors:
-            if number not in self._contexts:
-                start, base, zoom = self.starts.start(number), self.space.base, self.context.zoom
-                doubt = None if self.context.truth is not None else self.context.doubt or "no truth is known"
-                self._contexts[number] = _context(start, base, self.truth_tolerance, zoom, doubt)
-            limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
-            metric, tolerance = self.objective.metric.name, self.objective.tolerance
-            found = evaluate(point.configuration, self.space, [self._contexts[number]], metric, tolerance, limit)
-            self._errors[key] = found.ranking_error
-        return self._errors[key]
 
     def _error_budgets(self) -> list[ErrorBudget]:
         """Return the error budgets of the engines with a time step, with their own settings."""

@@ -22,7 +22,7 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Confirmation
+from sandbox.measure.tradeoff.result import FreshStarts
 from tests.measure.tradeoff.evaluations_by_hand import point_of
 from tests.runs_by_hand import DROP, scene_of
 
@@ -55,7 +55,7 @@ def test_setting_that_fails_from_other_starts_is_skipped() -> None:
         tried.append(point)
         return point is POINTS[2]
 
-    confirmation = Confirmation.of([0.009] * 29 + [0.02], 0.01)
+    confirmation = FreshStarts.of([0.009] * 29 + [0.02], 0.01)
     found = recommend_cheapest(POINTS, OBJECTIVE, holds, lambda _: confirmation)
     assert (found.point, found.confirmation) == (POINTS[2], confirmation)
     assert tried == POINTS[1:3]
@@ -67,11 +67,11 @@ def test_nothing_is_recommended_if_all_fail_from_other_starts() -> None:
 
 
 def test_confirmation_has_quantiles_and_counts_failed_runs() -> None:
-    found = Confirmation.of([*np.arange(1.0, 20.0), math.inf], 10.0)
+    found = FreshStarts.of([*np.arange(1.0, 20.0), math.inf], 10.0)
     assert (found.held.hits, found.held.trials) == (10, 20)
     assert (found.median_error, found.error_95) == (11.0, None)  # a run of 20 failed: the quantile is unknown
-    assert Confirmation.of(np.arange(1.0, 101.0).tolist(), 95.0).error_95 == 96.0  # 95 of 100 are below it
-    assert Confirmation.of([], 1.0).held.trials == 0
+    assert FreshStarts.of(np.arange(1.0, 101.0).tolist(), 95.0).error_95 == 96.0  # 95 of 100 are below it
+    assert FreshStarts.of([], 1.0).held.trials == 0
 
 
 def test_times_within_the_noise_are_decided_by_counted_work() -> None:

@@ -18,7 +18,7 @@ from sandbox.measure.preflight import warnings
 from sandbox.measure.seeds import with_seed
 from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff import Tradeoff, tradeoff
-from sandbox.measure.tradeoff import study as module
+from sandbox.measure.tradeoff import start_trials as trials
 from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import UnknownMetricError
@@ -243,13 +243,13 @@ def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> Non
     ],
 )  # fmt: skip
 def test_invalid_argument_is_rejected_before_any_run(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "find_truth", None)
+    monkeypatch.setattr(trials, "find_truth", None)
     with pytest.raises(ValueError, match=r"at least|positive"):
         tradeoff(scene_of(DROP), **wrong)
 
 
 def test_unknown_names_are_rejected_before_any_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "find_truth", None)
+    monkeypatch.setattr(trials, "find_truth", None)
     with pytest.raises(UnknownMetricError, match="metrics: max_position"):
         tradeoff(scene_of(DROP), metric="beauty")
     with pytest.raises(UnknownEngineError, match="engines: pymunk"):

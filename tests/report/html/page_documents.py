@@ -13,7 +13,7 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.result import Confirmation, Recommendation, Tradeoff
+from sandbox.measure.tradeoff.result import FreshStarts, Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
@@ -103,9 +103,7 @@ def tradeoff_document() -> dict[str, Any]:
     )
     risk = Diagnostic("tunnelling", f"substeps >= 20 prevents tunnelling of {HOSTILE}", {"safe_substeps": 20})
     cheapest = {
-        "pymunk": Recommendation(
-            points[1], "cheapest of pymunk", Confirmation.of([0.004] * 29 + [0.02], 0.01), (risk,)
-        ),
+        "pymunk": Recommendation(points[1], "cheapest of pymunk", FreshStarts.of([0.004] * 29 + [0.02], 0.01), (risk,)),
         "exact": None,
     }
     scene = loads(SCENE, "hostile.toml")

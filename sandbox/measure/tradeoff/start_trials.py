@@ -1,0 +1,129 @@
+"""Trials of settings from perturbed starts: whether a setting holds, and how often.
+
+The starts 1 to `count` decide on a setting, those up to 2·`count` confirm it. Each is judged against its own truth.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
+from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
+from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
+from sandbox.measure.starts import Starts
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
+from sandbox.measure.tradeoff.objective import Objective
+from sandbox.measure.tradeoff.result import FreshStarts
+from sandbox.measure.tradeoff.search import RUN_FRACTION
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+
+HELD_FRACTION = 0.95
+"""Fraction of the starts in which a recommended setting is within the tolerance."""
+STARTS_FRACTION = 0.3
+"""Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
+MIN_STARTS = 3
+"""Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
+TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
+"""Cost of a truth in that of its finest run: before it, dt is halved several times, and a second method and perturbed
+runs confirm it. That took 14 times the finest run for `chain_of_20`."""
+
+
+def context_of(
+    scene: Scene, base: Settings, truth_tolerance: float, zoom: float | None, known: Truth | str | None = None
+) -> EvaluationContext:
+    """Return the context of a start of a scene.
+
+    Args:
+        scene: scene with the start.
+        base: settings of the study.
+        truth_tolerance: m, error that the truth may have.
+        zoom: px/m; None: the motion fills a window.
+        known: its truth, or the reason why there is none, if known.
+    """
+    result = find_truth(scene, base, truth_tolerance) if known is None else known
+    truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
+    return EvaluationContext(scene, truth, default_zoom(scene, truth) if zoom is None else zoom, doubt)
+
+
+@dataclass
+class StartTrials:
+    """Errors of settings from other starts than that of the scene, computed when needed."""
+
+    space: SearchSpace
+    context: EvaluationContext
+    """of the start in the scene"""
+    objective: Objective
+    starts: Starts
+    count: int
+    """number of starts that decide on a setting, and of those that confirm it; 1: none"""
+    truth_tolerance: float
+    """m, error that a truth may have"""
+    effort: float
+    deadline: float
+    """time of `clock_without_compilation` after which no setting is tried, s"""
+    _contexts: dict[int, EvaluationContext] = field(default_factory=dict)
+    """by the numbers of the starts"""
+    _errors: dict[tuple[Configuration, int], float] = field(default_factory=dict)
+    """errors of configurations, by the numbers of the starts"""
+
+    def holds(self, point: Evaluation) -> bool:
+        """Return whether a configuration is within the tolerance in 95 % of the starts that decide.
+
+        It stops at the first start that makes that impossible.
+        """
+        count = self._affordable(point)
+        failures = math.floor((1.0 - HELD_FRACTION) * count + 1e-9)
+        for number in range(1, count + 1):
+            failures -= self._error(point, number) > self.objective.tolerance
+            if failures < 0:
+                return False
+        return True
+
+    def confirmation(self, point: Evaluation) -> FreshStarts | None:
+        """Return the errors of a configuration from starts that do not decide; None without other starts."""
+        if self.count < 2:
+            return None
+        numbers = range(self.count + 1, self.count + 1 + self._affordable(point))
+        return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.tolerance)
+
+    def counterexample(self, evaluations: Sequence[Evaluation]) -> int | None:
+        """Return a start from which a setting fails, if an engine has settings within the tolerance but none holds."""
+        for engine in self.space.engines:
+            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.tolerance)]
+            own.sort(key=lambda each: each.counted_seconds)
+            if own and not any(map(self.holds, own)):
+                tried = {n: error for (setting, n), error in self._errors.items() if setting == own[0].configuration}
+                return next(n for n, error in tried.items() if error > self.objective.tolerance)
+        return None
+
+    def context_at(self, number: int) -> EvaluationContext:
+        """Return the context of a start, by its number."""
+        if number not in self._contexts:
+            zoom, no_truth = self.context.zoom, self.context.truth is None
+            doubt = (self.context.doubt or "no truth is known") if no_truth else None
+            start = self.starts.start(number)
+            self._contexts[number] = context_of(start, self.space.base, self.truth_tolerance, zoom, doubt)
+        return self._contexts[number]
+
+    def _affordable(self, point: Evaluation) -> int:
+        """Return the number of starts from which a configuration is run, or 0: counted work decides, not the clock."""
+        if self.count < 2 or clock_without_compilation() >= self.deadline:
+            return 0
+        truth, cost = self.context.truth, point.counted_seconds
+        if truth is not None and (runs := TRUTH_RUNS[truth.kind]):
+            info = truth.trajectory.info
+            settings = Settings.model_validate(info["settings"])
+            cost += runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
+        affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.count
+        return min(self.count, affordable) if affordable >= min(MIN_STARTS, self.count) else 0
+
+    def _error(self, point: Evaluation, number: int) -> float:
+        """Return the error of a configuration from another start; infinite if its run fails."""
+        key = point.configuration, number
+        if key not in self._errors:
+            limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
+            metric, tolerance = self.objective.metric.name, self.objective.tolerance
+            found = evaluate(point.configuration, self.space, [self.context_at(number)], metric, tolerance, limit)
+            self._errors[key] = found.ranking_error
+        return self._errors[key]
