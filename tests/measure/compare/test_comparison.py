@@ -202,7 +202,7 @@ def test_given_truth_is_not_computed_again(monkeypatch: pytest.MonkeyPatch) -> N
         raise AssertionError("the truth is known")
 
     monkeypatch.setattr("sandbox.measure.compare.comparison.find_truth", fail)
-    monkeypatch.setattr("sandbox.measure.tradeoff.study.find_truth", fail)
+    monkeypatch.setattr("sandbox.measure.tradeoff.start_trials.find_truth", fail)
     compared = compare(BOUNCE, ("pymunk",), truth=known)
     assert compared.best is known
     studied = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
