@@ -66,9 +66,15 @@ class Starts:
         return self.spread * float(self.scene.bodies.thin[movable].min()) if movable.any() else 0.0
 
     @property
-    def vary(self) -> bool:
-        """Whether the starts differ from each other."""
-        return is_random(self.scene) or (self.spread > 0.0 and self.distance > 0.0)
+    def can_vary(self) -> bool:
+        """Whether the starts differ; they do not if nothing moves, or all hangs at rest between several points."""
+        if is_random(self.scene):
+            return True
+        own, other = self.scene.bodies, self.start(1).bodies
+        return any(
+            not np.array_equal(getattr(own, name), getattr(other, name))
+            for name in ("position", "velocity", "angle", "angular_velocity")
+        )
 
     def __str__(self) -> str:
         """Return the changes in words: `positions ± 0.5 mm, velocities ± 1 %, angles ± 0.5°, the phase of the step`."""
@@ -88,8 +94,13 @@ class Starts:
         """Return the scene with a start.
 
         Args:
-            number: of the start, not negative; the same number gives the same start, bit for bit.
+            number: of the start; the same number gives the same start, bit for bit.
+
+        Raises:
+            ValueError: the number is negative.
         """
+        if number < 0:
+            raise ValueError(f"number: must be at least 0, is {number}")
         if number == 0:
             return self.scene
         scene = self.scene

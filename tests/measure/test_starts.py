@@ -57,7 +57,7 @@ def test_number_0_and_a_spread_of_0_are_the_start_of_the_file() -> None:
     scene = load("bounce")
     assert Starts(scene).start(0) is scene
     assert Starts(scene, 0.0).start(5) is scene
-    assert not Starts(scene, 0.0).vary
+    assert not Starts(scene, 0.0).can_vary
     assert Starts(load("gas"), 0.0).start(5).bodies.velocity.tolist() != load("gas").bodies.velocity.tolist()
 
 
@@ -129,6 +129,16 @@ def test_odds_of_tunnelling_over_starts_are_those_of_the_phase_of_the_step() -> 
     low, high = wilson_interval(passed, count)
     # velocities differ by 1 %, and the odds with them by 0.002
     assert low - 0.002 <= 0.8 <= high + 0.002
+
+
+@pytest.mark.parametrize(("name", "varies"), [("hanging_chain", False), ("cloth", False), ("pendulum_90", True)])
+def test_a_net_at_rest_between_points_does_not_vary(name: str, varies: bool) -> None:
+    assert Starts(load(name)).can_vary == varies
+
+
+def test_negative_number_raises() -> None:
+    with pytest.raises(ValueError, match="at least 0, is -1"):
+        Starts(load("bounce")).start(-1)
 
 
 @pytest.mark.parametrize("spread", [-0.01, 0.6, float("nan")])

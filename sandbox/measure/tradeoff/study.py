@@ -167,7 +167,7 @@ def tradeoff(
     objective = objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps))
     able = tuple(name for name in names if not _refusal(scene, name, base))
     space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
-    count = starts if drawn.vary else 1
+    count = starts if drawn.can_vary else 1
     study = _Study(
         space=space,
         context=context,
