@@ -25,24 +25,22 @@ from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
 
 ENGINES = ("pymunk", "box2d", "reference")
-SCENES = tuple(
-    [
-        "bounce",
-        "circle_half_plane",
-        "bullet",
-        "incline",
-        "newtons_cradle",
-        "restitution_row",
-        "two_balls",
-        "oblique",
-        "friction_ramp",
-        "spring",
-        "heavy_on_light",
-        "elastic_ball",
-        "half_ball",
-        "throw",
-        "stun_draw_follow",
-    ]
+SCENES = (
+    "bounce",
+    "circle_half_plane",
+    "bullet",
+    "incline",
+    "newtons_cradle",
+    "restitution_row",
+    "two_balls",
+    "oblique",
+    "friction_ramp",
+    "spring",
+    "heavy_on_light",
+    "elastic_ball",
+    "half_ball",
+    "throw",
+    "stun_draw_follow",
 )
 """Scenes whose truth is trusted to the end and computed within a second, also from other starts."""
 FIRST = 1000
