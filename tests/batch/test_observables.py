@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+import sandbox
 from sandbox.batch.observables import Observable, ObservableError
 from sandbox.batch.query import open_store
 from sandbox.batch.store import Store
@@ -157,6 +158,13 @@ def test_exception_of_the_function_ends_the_command_with_its_line(
         ("f = 3", "has no function 'f'"),
         ("def f(run:\n", "x.py:1: SyntaxError"),
         ("\n\nimport no_such_module", "x.py:3: ModuleNotFoundError"),
+        (
+            "def f(run):\n    run.position[:] = 0.0\n    return 1",
+            "x.py:2: ValueError: assignment destination is read-only",
+        ),
+        ("def f(run):\n    raise SystemExit(0)", "x.py:2: SystemExit: 0"),
+        ("import sys\nsys.exit()", "x.py:2: SystemExit"),
+        ("def f(run):\n    return 'a\\udc80'", "a value is a number"),
     ],
 )
 def test_unusable_functions_are_refused(
@@ -169,6 +177,24 @@ def test_unusable_functions_are_refused(
     assert message in errors[0]
 
 
+def test_file_may_define_dataclasses_with_postponed_annotations(tmp_path: Path) -> None:
+    source = """from __future__ import annotations
+from dataclasses import dataclass
+
+@dataclass
+class Peak:
+    height: float
+
+def peak(run):
+    return Peak(run.position[:, 0, 1].max()).height
+"""
+    (tmp_path / "peaks.py").write_text(source)
+    found = sandbox.run("bounce", dt=0.01)
+    values = Observable.read(f"{tmp_path / 'peaks.py'}:peak").observe(found)["values"]
+    assert values == {"peak": found.position[:, 0, 1].max()}
+    found.position[0, 0, 1] = 0.0  # writeable again after the call
+
+
 @pytest.mark.parametrize("text", ["heights", "heights.py", "heights.py:", "heights.py:a b", "none.py:f", "heights:f"])
 def test_words_that_name_no_function_are_refused(text: str) -> None:
     with pytest.raises(ObservableError, match=r"FILE\.py:FUNCTION|cannot be read"):
@@ -179,8 +205,6 @@ def test_observable_travels_without_its_file(observe: str, tmp_path: Path) -> No
     text = pickle.dumps(Observable.read(observe.replace(":heights", ":lowest")))
     (tmp_path / "heights.py").unlink()
     copy = pickle.loads(text)
-    import sandbox
-
     found = sandbox.run("bounce", dt=0.01)
     assert copy.observe(found)["values"] == {"lowest": found.position[:, 0, 1].min()}
 
