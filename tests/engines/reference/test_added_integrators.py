@@ -1,5 +1,6 @@
 """Integrators of one's own: `sandbox.add_integrator`."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,28 @@ def test_order_and_fraction_are_measured() -> None:
     for step, order, fraction in ((midpoint, 2, 0.5), (kick_drift, 1, 1.0), (drift_kick, 1, 0.0)):
         found = INTEGRATORS[sandbox.add_integrator(step)]
         assert (found.order, found.fraction) == (order, fraction)
+
+
+def taylor(order: int) -> Any:
+    """Return the Taylor method of this order for linear equations."""
+
+    def step(f: Any, t: float, x: FloatArray, u: Any, h: float) -> FloatArray:
+        constant = f(t, np.zeros_like(x), u)
+        term = f(t, x, u) * h
+        moved = x + term
+        for k in range(2, order + 1):
+            term = (f(t, term, u) - constant) * h / k
+            moved = moved + term
+        return np.asarray(moved)
+
+    return step
+
+
+def test_orders_whose_errors_are_soon_those_of_rounding_are_measured() -> None:
+    for order in range(1, 13):
+        assert INTEGRATORS[sandbox.add_integrator(taylor(order), "taylor")].order == order
+    with pytest.raises(ValueError, match="cannot be measured"):
+        sandbox.add_integrator(taylor(20), "exact_to_rounding")
 
 
 @pytest.mark.parametrize("scene", ["spring", "bounce", "kepler"])
@@ -69,6 +92,8 @@ def test_the_function_may_be_changed_and_added_again() -> None:
         (lambda f, t, x, u, h: x, "does not converge"),
         (lambda f, t, x, u, h: x[0], "an array of shape"),
         (lambda f, t, x, u, h: None, "an array of shape"),
+        (lambda f, t, x, u, h: x + h * (1 + 0j) * f(t, x, u), "type float64"),
+        (lambda f, t, x, u, h: np.float32(x + h * f(t, x, u)), "type float64"),
         (lambda f, t, x, u, h: x / 0.0 if h else x, "finite"),
         (lambda f, t, x, u, h: np.add(x, h * f(t, x, u), out=x), "changes x"),
     ],
@@ -82,7 +107,14 @@ def test_a_faulty_function_is_refused(step: Any, problem: str) -> None:
         sandbox.run("spring", engine="reference", integrator="faulty")  # type: ignore[arg-type]  # unknown name
 
 
-@pytest.mark.parametrize("name", ["rk4", "two words", ""])
-def test_names_of_built_in_integrators_and_no_names_are_refused(name: str) -> None:
+@pytest.mark.parametrize("name", ["rk4", "two words", "", 3])
+def test_names_of_built_in_integrators_and_no_names_are_refused(name: Any) -> None:
     with pytest.raises(ValueError, match="choose another name"):
         sandbox.add_integrator(midpoint, name)
+
+
+def test_functions_without_a_name_need_one() -> None:
+    nameless: Any = partial(midpoint)
+    with pytest.raises(ValueError, match="choose another name"):
+        sandbox.add_integrator(nameless)
+    assert sandbox.add_integrator(nameless, "part") == "part"
