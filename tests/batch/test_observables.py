@@ -223,6 +223,16 @@ def test_states_at_the_end_are_columns_if_they_are_named(tmp_path: Path, capfd: 
         assert not any(column.startswith("final.") for column in runs.table(kind="numpy"))
 
 
+def test_states_have_columns_though_the_last_run_was_refused(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, DROP)
+    words = ("--set", "world.damping=0.5", "--out", str(tmp_path / "runs"), "--quiet")
+    assert call(["run", scene, "--engine", "pymunk,exact", *words]) == 1  # exact does not model damping
+    with open_store(tmp_path / "runs") as runs:
+        assert runs.arrays(columns=["status"])["status"].tolist() == ["refused", "ok"]
+        heights = runs.arrays(columns=["final.a.y"])["final.a.y"]
+        assert np.isfinite(heights).tolist() == [False, True]
+
+
 def test_damaged_details_have_no_states(tmp_path: Path) -> None:
     assert call(["run", write_scene(tmp_path, DROP), "--out", str(tmp_path / "runs"), "--quiet"]) == 0
     for text in ("{", "[1]", '{"final": 3}', '{"final": {"a\\"b": 1}}'):
