@@ -1,6 +1,7 @@
 """Advice for a game: errors against closed forms, remedies, the recommended setting run again, code, recordings."""
 
 import math
+import re
 from typing import Any
 
 import pymunk
@@ -320,6 +321,13 @@ def test_forecast_is_in_px_if_the_unit_of_length_is_the_pixel(zoom: float) -> No
         zoom == 1.0,
         zoom != 1.0,
     )
+
+
+@pytest.mark.parametrize(("zoom", "unit"), [(1.0, "px"), (50.0, "m")])
+def test_distance_of_a_refined_truth_is_in_the_unit_of_length(zoom: float, unit: str) -> None:
+    advice = advice_of(PENDULUM, "duration = 3.0 -> duration = 1.0, linear_drag = 0.5", zoom=zoom)
+    assert advice.truth == "refined"
+    assert re.search(rf"within [\d.e-]+ {unit}($|[ ,;])", advice.truth_about)
 
 
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
