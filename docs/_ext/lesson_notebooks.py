@@ -93,6 +93,7 @@ def _sources(language: str, content: str, previous: str) -> Iterator[str]:
     elif language == "toml" and written is not None:
         yield f"%%writefile {written[1]}\n{content.rstrip()}"
     elif language in ("console", "sh"):
+        content = re.sub(r" *\\\n *", " ", content)  # a command that continues in the next line
         commands = [
             line.removeprefix("$ ") for line in content.splitlines() if language == "sh" or line.startswith("$ ")
         ]
