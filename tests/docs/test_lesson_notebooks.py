@@ -51,7 +51,9 @@ def test_notebook_has_no_answers_but_checks_them(page: Path) -> None:
 
 
 def test_command_of_two_lines_is_one_cell() -> None:
-    page = "# Title\n\n```console\n$ sandbox run ball \\\n    --engine pymunk\nball\n```\n\n```sh\nsandbox \\\n  info\n```\n"
+    page = (
+        "# Title\n\n```console\n$ sandbox run ball \\\n    --engine pymunk\nball\n```\n\n```sh\nsandbox \\\n  info\n```"
+    )
     cells = [cell.source for cell in lesson_notebooks.notebook_of("ball", page).cells if cell.source.startswith("!")]
     assert cells == ["!sandbox run ball --engine pymunk", "!sandbox info"]
 
