@@ -209,6 +209,20 @@ def test_observable_travels_without_its_file(observe: str, tmp_path: Path) -> No
     assert copy.observe(found)["values"] == {"lowest": found.position[:, 0, 1].min()}
 
 
+def test_names_and_texts_with_brackets_are_printed_as_they_are(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "units.py").write_text("def f(run):\n    return {'peak [m]': 1, '[/x]': 2, ':smile:': '[/b]'}")
+    out = str(tmp_path / "runs")
+    words = ("--observe", f"{tmp_path / 'units.py'}:f", "--out", out)
+    status, lines, _ = lines_of(capfd, "run", write_scene(tmp_path, DROP), *words)
+    assert status == 0
+    assert lines[1].split()[-4:] == ["peak", "[m]", "[/x]", ":smile:"]
+    status, lines, _ = lines_of(capfd, "runs", out, "--by", "observed.:smile:")
+    assert status == 0
+    assert lines[1].split()[:2] == ["[/b]", "1"]
+
+
 def test_states_at_the_end_are_columns_if_they_are_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     scene = DROP.replace('name = "a"', 'name = "it\'s 8.5"')
     out = tmp_path / "runs"
