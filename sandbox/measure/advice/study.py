@@ -70,6 +70,8 @@ SEARCH_REPEATS = 2
 """Timings of a setting during the search; the settings of the advice are then timed again, all in turns."""
 FINER = (8, 4, 2)
 """Factors of the substeps of the run to which replays are compared: the first whose run is within the effort"""
+TRIED = (2, 4)
+"""Factors of the substeps that are compared to that run where nothing moves without the actions"""
 MAX_HASTE = 0.8
 """A setting is rejected if it departs from the finer run within less than this fraction of the time of the present
 setting. Departures that chaos has grown differ by less."""
@@ -339,7 +341,7 @@ def _replay_actions(request: AdviceRequest, score: AdviceScore, measured: Advice
         _replay(request, measured, "present", measured.present, finer if request.is_in_loop else None)
     if measured.is_still_without_actions:  # no error says anything about the game, so that nothing is recommended
         measured.recommended = measured.fallback = measured.fallback_kind = None
-        for point in _finer_settings(request, score):
+        for point in _finer_settings(request, score, finer):
             _replay(request, measured, "tried", point, finer)
         return
     for candidate in _candidates(request, score, measured):
@@ -353,13 +355,14 @@ def _replay_actions(request: AdviceRequest, score: AdviceScore, measured: Advice
         _replay(request, measured, "fallback", measured.fallback, finer)
 
 
-def _finer_settings(request: AdviceRequest, score: AdviceScore) -> Iterator[Evaluation]:
-    """Yield the present setting in a loop of frames with more substeps, up to half those of the finer run."""
+def _finer_settings(request: AdviceRequest, score: AdviceScore, finest: Trajectory | None) -> Iterator[Evaluation]:
+    """Yield the present setting in a loop of frames with more substeps, up to half those of the finest run."""
     space = SearchSpace(request.scene, request.loop, (request.engine,), request.frame, has_fixed_dt=True)
-    for factor in sorted(FINER)[:-1]:
+    for factor in TRIED:
         start = space.starts()[0]
         finer = replace(start, substeps=factor * start.substeps)
-        if not space.is_valid(finer) or clock_without_compilation() > request.deadline:
+        is_finest = finest is not None and 2 * finer.substeps > finest.info["settings"]["substeps"]
+        if is_finest or not space.is_valid(finer) or clock_without_compilation() > request.deadline:
             return
         yield evaluate(finer, space, [score.context], score.metric, score.tolerance, request.effort, request.deadline)
 
