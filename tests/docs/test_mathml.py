@@ -23,7 +23,7 @@ def formulas(path: Path) -> list[str]:
 
 
 @pytest.mark.filterwarnings("ignore:(path|open_text|read_text) is deprecated:DeprecationWarning")  # latex2mathml
-@pytest.mark.fail_slow(60)  # reduces a font of 6,000 characters, and converts a thousand formulas
+@pytest.mark.fail_slow(60)  # reduces a font, and converts all formulas
 def test_font_has_the_characters_of_all_formulas(tmp_path: Path) -> None:
     mathml.write_font(tmp_path)
     with mathml.TTFont(tmp_path / mathml.FONT) as font:
