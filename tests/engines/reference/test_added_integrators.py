@@ -1,6 +1,7 @@
 """Integrators of one's own: `sandbox.add_integrator`."""
 
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import sandbox
 from sandbox.arrays import FloatArray
 from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.scene.description.world import ADDED_INTEGRATORS
 
 pytestmark = pytest.mark.usefixtures("own_integrators")
 
@@ -71,6 +73,17 @@ def test_error_of_the_midpoint_method_in_a_scene_is_of_second_order() -> None:
     ).rows
     coarse, fine = (row.score.max_position or 0.0 for row in rows)
     assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.1)  # fitted at finite steps
+
+
+def test_file_of_a_run_is_read_where_its_integrator_has_been_added(tmp_path: Path) -> None:
+    name = sandbox.add_integrator(midpoint)
+    run = sandbox.run("spring", engine="reference", integrator=name)
+    run.save(tmp_path / "run.npz")
+    assert sandbox.Trajectory.load(tmp_path / "run.npz").info["settings"]["integrator"] == name
+    ADDED_INTEGRATORS.remove(name)
+    del INTEGRATORS[name]  # as in another process
+    with pytest.raises(ValueError, match=r"add_integrator first"):
+        sandbox.Trajectory.load(tmp_path / "run.npz")
 
 
 def test_integrate_takes_it() -> None:
