@@ -280,6 +280,25 @@ ball = [{ name = "ball", position = [-2.0, 1.2], velocity = [0.0, 0.0], radius =
     assert present.departs_at == pytest.approx((distance > 0.01).any(axis=1).argmax() / FPS, rel=1e-9)
 
 
+def test_recommended_setting_is_compared_to_finer_steps_than_its_own() -> None:
+    """Its tolerance takes more substeps than the 8 to which the present setting is compared."""
+    text = """
+world = { gravity = [0.0, -10.0], duration = 2.0 }
+solver = { dt = 0.016666666666666666 }
+plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0] }]
+ball = [{ name = "ball", position = [0.0, 2.0], radius = 0.2, restitution = 0.9 }]
+"""
+    scene = scene_of(text)
+    push = Impulse(time=0.5, body="ball", impulse=(0.01, 0.0))
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=2.0), tolerance=0.01, **QUICK)
+    assert advice.recommended is not None
+    assert advice.recommended.settings.substeps > 8
+    replays = {each.setting: each for each in advice.replays}
+    assert replays["present"].finer_substeps == 8
+    assert replays["recommended"].finer_substeps == 2 * advice.recommended.settings.substeps
+    assert replays["recommended"].departs_at is None
+
+
 PUCK = """
 world = { duration = 1.0 }
 solver = { dt = 0.016666666666666666 }
