@@ -333,7 +333,8 @@ def _read_info(archive: zipfile.ZipFile, header: _Header) -> _Stated:
         model = Info.model_validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        raise ValueError(f"{'.'.join(('info', *map(str, first['loc'])))}: {first['msg']}") from None
+        hint = "; add your own with sandbox.add_integrator first" if first["loc"][-1:] == ("integrator",) else ""
+        raise ValueError(f"{'.'.join(('info', *map(str, first['loc'])))}: {first['msg']}{hint}") from None
     document: dict[str, Any] = json.loads(text, parse_int=_integer)
     try:
         scene = from_session(document["scene"], "info.scene")

@@ -1,4 +1,4 @@
-"""Sphinx extension: each lesson as a notebook to download, made from its page.
+"""Sphinx extension: each lesson as a notebook to download, made from its page, which may be a notebook itself.
 
 The texts become text cells, Python blocks code cells, and each command of a console block a cell `!sandbox …`; outputs
 are left out, because the notebook computes them. A hidden replay (see `generated.py`) becomes two cells in which `dt`
@@ -42,6 +42,24 @@ def notebook_of(name: str, text: str) -> nbformat.NotebookNode:
     cells = [*_cells(FENCE.sub("", ANSWERS.sub("", text))), *_checks(name)]
     title = next(k for k, cell in enumerate(cells) if cell.cell_type == "markdown")
     cells[title + 1 : title + 1] = [new_markdown_cell(NEEDS), new_code_cell(SETUP)]
+    return _notebook(name, cells)
+
+
+def student_notebook(name: str, text: str) -> nbformat.NotebookNode:
+    """Return a lesson that is written as a notebook, without its answers and outputs.
+
+    Args:
+        name: name of the lesson, such as `pendulum`.
+        text: its notebook, JSON.
+    """
+    cells: list[nbformat.NotebookNode] = []
+    for cell in nbformat.reads(text, 4).cells:
+        is_text = cell.cell_type == "markdown"
+        cells.extend(_text_cell(ANSWERS.sub("", cell.source)) if is_text else [new_code_cell(cell.source)])
+    return _notebook(name, cells)
+
+
+def _notebook(name: str, cells: list[nbformat.NotebookNode]) -> nbformat.NotebookNode:
     for k, cell in enumerate(cells):
         cell.id = f"{name}-{k}"  # the same in every build
     kernel = {"display_name": "Python 3", "language": "python", "name": "python3"}
@@ -93,6 +111,7 @@ def _sources(language: str, content: str, previous: str) -> Iterator[str]:
     elif language == "toml" and written is not None:
         yield f"%%writefile {written[1]}\n{content.rstrip()}"
     elif language in ("console", "sh"):
+        content = re.sub(r" *\\\n *", " ", content)  # a command that continues in the next line
         commands = [
             line.removeprefix("$ ") for line in content.splitlines() if language == "sh" or line.startswith("$ ")
         ]
@@ -138,6 +157,8 @@ def write_notebooks(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for page in lesson_pages():
         nbformat.write(notebook_of(page.stem, page.read_text(encoding="utf-8")), folder / f"{page.stem}.ipynb")
+    for page in LESSONS.glob("*.ipynb"):
+        nbformat.write(student_notebook(page.stem, page.read_text(encoding="utf-8")), folder / page.name)
 
 
 def setup(app: Any) -> dict[str, bool]:
@@ -150,10 +171,20 @@ def setup(app: Any) -> dict[str, bool]:
 def _add_link(_: Any, page: str, source: list[str]) -> None:
     """Put a link to the notebook below the title."""
     folder, _, name = page.rpartition("/")
-    if folder == "lessons" and LESSONS / f"{name}.md" in lesson_pages():
-        title, _, rest = source[0].partition("\n")
-        link = f'<p class="notebook"><a href="{name}.ipynb" download>This lesson as a notebook</a></p>'
-        source[0] = f"{title}\n\n```{{raw}} html\n{link}\n```\n{rest}"
+    if folder != "lessons":
+        return
+    link = f'<p class="notebook"><a href="{name}.ipynb" download>This lesson as a notebook</a></p>'
+    if LESSONS / f"{name}.md" in lesson_pages():
+        source[0] = _with_link(source[0], link)
+    elif (LESSONS / f"{name}.ipynb").exists():
+        notebook = nbformat.reads(source[0], 4)
+        notebook.cells[0].source = _with_link(notebook.cells[0].source, link)
+        source[0] = nbformat.writes(notebook)
+
+
+def _with_link(text: str, link: str) -> str:
+    title, _, rest = text.partition("\n")
+    return f"{title}\n\n```{{raw}} html\n{link}\n```\n{rest}"
 
 
 def _write(app: Any, failure: Exception | None) -> None:

@@ -40,7 +40,7 @@ div.math {{ overflow-x: auto; }}
 """
 LETTERS_AND_SIGNS = (
     (0x0020, 0x024F),  # Latin
-    (0x0300, 0x03FF),  # accents, Greek
+    (0x02B0, 0x03FF),  # accents, Greek
     (0x2000, 0x22FF),  # punctuation, letter-like symbols, arrows, operators
     (0x27E8, 0x27E9),  # angle brackets
     (0x1D400, 0x1D7FF),  # mathematical letters

@@ -15,7 +15,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Self
+
+import numpy as np
 
 from sandbox.batch.stored_run import dump_json, hash_of
 from sandbox.echo import short_repr
@@ -96,10 +99,17 @@ class Observable:
         return dump_json({**stated, "observed": observed})
 
     def _values(self, run: Trajectory) -> dict[str, ObservedValue]:
+        function, arrays = _loaded(self), [each for each in vars(run).values() if isinstance(each, np.ndarray)]
+        writeable = [each for each in arrays if each.flags.writeable]
+        for each in writeable:
+            each.setflags(write=False)  # these arrays are stored after this call
         try:
-            found = _loaded(self)(run)
-        except Exception as error:
+            found = function(run)
+        except (Exception, SystemExit) as error:
             raise ObservableError(_located(self, error)) from error
+        finally:
+            for each in writeable:
+                each.setflags(write=True)
         values = found if isinstance(found, Mapping) else {self.function: found}
         if len(values) > MAX_VALUES:
             raise ObservableError(f"{self._name}: returned {len(values):,} values; {MAX_VALUES} are allowed")
@@ -119,12 +129,12 @@ class Observable:
         if isinstance(value, float):
             return value if math.isfinite(value) else None
         is_number = isinstance(value, int) and abs(value) < 2**63
-        if value is None or is_number or (isinstance(value, str) and len(value) <= MAX_TEXT):
+        if value is None or is_number or (isinstance(value, str) and len(value) <= MAX_TEXT and _is_unicode(value)):
             found: ObservedValue = value
             return found
         raise ObservableError(
             f"{self._name}: {short_repr(name)} is a {type(value).__name__}; a value is a number of up to 64 bits, a "
-            f"text of up to {MAX_TEXT:,} characters, true, false or None"
+            f"text of up to {MAX_TEXT:,} Unicode characters, true, false or None"
         )
 
     @property
@@ -155,19 +165,26 @@ def _loaded(observable: Observable) -> Callable[[Trajectory], Any]:
     folder = str(Path(observable.file).parent)
     if folder not in sys.path:
         sys.path.append(folder)
-    names: dict[str, Any] = {"__name__": Path(observable.file).stem, "__file__": observable.file}
+    module = ModuleType(f"observable_{observable.digest}")
+    module.__file__ = observable.file
+    sys.modules[module.__name__] = module  # dataclasses look their module up
     try:
-        exec(compile(observable.source, observable.file, "exec"), names)
-    except Exception as error:
+        exec(compile(observable.source, observable.file, "exec"), vars(module))
+    except (Exception, SystemExit) as error:
         raise ObservableError(_located(observable, error)) from error
-    function = names.get(observable.function)
+    function = vars(module).get(observable.function)
     if not callable(function):
         raise ObservableError(f"{observable.file}: has no function {short_repr(observable.function)}")
     found: Callable[[Trajectory], Any] = function
     return found
 
 
-def _located(observable: Observable, error: Exception) -> str:
+def _is_unicode(text: str) -> bool:
+    """Return whether a text has no lone surrogates, which the database cannot store."""
+    return not any("\ud800" <= each <= "\udfff" for each in text)
+
+
+def _located(observable: Observable, error: BaseException) -> str:
     """Return an exception of a user's file in one line, with the last line of that file that led to it."""
     line = error.lineno if isinstance(error, SyntaxError) else None
     with suppress(ValueError):

@@ -65,8 +65,8 @@ FINAL = {
 }  # fmt: skip
 """Columns of the state of a body at the end, such as `final.ball.x`, which a table has only if they are named: their
 places in its JSON"""
-LAST_DETAILS = "SELECT details FROM runs WHERE rowid IN (SELECT max(rowid) FROM runs GROUP BY scene)"
-"""Details of the last run of each scene, whose bodies have columns"""
+LAST_DETAILS = "SELECT details FROM runs WHERE rowid IN (SELECT max(rowid) FROM runs GROUP BY scene, status)"
+"""Details of the last run of each scene and status, whose bodies have columns; runs that are refused have none"""
 MAX_COLUMNS = 2_000
 """of a query of SQLite"""
 PROVENANCE = ("settings", "created", "cpu")

@@ -226,7 +226,8 @@ def _answer(runs: StoredRuns, options: _Options) -> int:
     elif options.as_csv:
         _print_csv(list(table), cell_rows(table))
     elif not options.quiet:
-        _print_list(table if columns is not None else _informative(table), count, statuses)
+        end = "first" if sort else "last"
+        _print_list(table if columns is not None else _informative(table), count, statuses, end)
         has_warnings = " AND ".join(f"({each}\n)" for each in (*options.wheres, "warnings IS NOT NULL"))
         if columns is None and (warned := sum(runs.statuses(has_warnings).values())):
             print_line(f"runs with warnings: {warned:,}; --columns id,warnings lists them", "dim")
@@ -273,8 +274,8 @@ def _informative(table: Columns) -> Columns:
     return found
 
 
-def _print_list(table: Columns, count: int, statuses: Mapping[str, int]) -> None:
-    """Print runs as a table, and how many there are."""
+def _print_list(table: Columns, count: int, statuses: Mapping[str, int], end: str) -> None:
+    """Print runs as a table, and how many there are; `end` says which are listed: the first, or the last added."""
     shown = len(next(iter(table.values()), ()))
     if shown:
         printed = new_table()
@@ -284,7 +285,7 @@ def _print_list(table: Columns, count: int, statuses: Mapping[str, int]) -> None
             printed.add_row(*(_cell(cell) for cell in row))
         print_table(printed)
     counts = ", ".join(f"{number:,} {status}" for status, number in statuses.items())
-    part = f"; the last {shown:,} are listed (--limit 0 lists all)" if shown < count else ""
+    part = f"; the {end} {shown:,} are listed (--limit 0 lists all)" if shown < count else ""
     print_line(f"{format_plural(count, 'run')}: {counts}{part}" if count else "no runs")
 
 

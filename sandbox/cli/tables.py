@@ -78,7 +78,8 @@ def new_console() -> "Console":
 
     # With a height too, rich keeps to this width on a terminal of TERM=dumb, whose size it assumes otherwise.
     height = shutil.get_terminal_size().lines
-    return Console(width=terminal_width() or WIDTH_WITHOUT_TERMINAL, height=height)
+    width = terminal_width() or WIDTH_WITHOUT_TERMINAL
+    return Console(width=width, height=height, markup=False, emoji=False)  # names and texts may have brackets
 
 
 def print_table(table: "Table", keys: int = 1) -> None:

@@ -135,7 +135,7 @@ def _explain(details: Any, known: Collection[str]) -> str:
     expected = next((f"{words} {context[key]:g}" for key, words in _BOUNDS.items() if key in context), expected)
     if 0.0 < context.get("ge", 0.0) < SMALLEST_STATED and details["input"] <= 0.0:
         expected = "more than 0"
-    return f"must be {expected}, is {shown(details['input'])}"
+    return f"must be {expected}, is {shown_input(details)}"
 
 
 def shown(value: Any) -> str:
@@ -143,6 +143,12 @@ def shown(value: Any) -> str:
     if isinstance(value, float) and value.is_integer():
         return f"{value:.15g}"
     return shorten(json.dumps(value, ensure_ascii=False, default=str))
+
+
+def shown_input(details: Any) -> str:
+    """Return the value of an error of pydantic as a message shows it; 3.0 in the place of a whole number is no 3."""
+    value = details["input"]
+    return str(float(value)) if details["type"] == "int_type" and isinstance(value, float) else shown(value)
 
 
 def path_of(location: Location, document: Any) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+import sandbox
 from sandbox.batch.observables import Observable, ObservableError
 from sandbox.batch.query import open_store
 from sandbox.batch.store import Store
@@ -157,6 +158,13 @@ def test_exception_of_the_function_ends_the_command_with_its_line(
         ("f = 3", "has no function 'f'"),
         ("def f(run:\n", "x.py:1: SyntaxError"),
         ("\n\nimport no_such_module", "x.py:3: ModuleNotFoundError"),
+        (
+            "def f(run):\n    run.position[:] = 0.0\n    return 1",
+            "x.py:2: ValueError: assignment destination is read-only",
+        ),
+        ("def f(run):\n    raise SystemExit(0)", "x.py:2: SystemExit: 0"),
+        ("import sys\nsys.exit()", "x.py:2: SystemExit"),
+        ("def f(run):\n    return 'a\\udc80'", "a value is a number"),
     ],
 )
 def test_unusable_functions_are_refused(
@@ -169,6 +177,24 @@ def test_unusable_functions_are_refused(
     assert message in errors[0]
 
 
+def test_file_may_define_dataclasses_with_postponed_annotations(tmp_path: Path) -> None:
+    source = """from __future__ import annotations
+from dataclasses import dataclass
+
+@dataclass
+class Peak:
+    height: float
+
+def peak(run):
+    return Peak(run.position[:, 0, 1].max()).height
+"""
+    (tmp_path / "peaks.py").write_text(source)
+    found = sandbox.run("bounce", dt=0.01)
+    values = Observable.read(f"{tmp_path / 'peaks.py'}:peak").observe(found)["values"]
+    assert values == {"peak": found.position[:, 0, 1].max()}
+    found.position[0, 0, 1] = 0.0  # writeable again after the call
+
+
 @pytest.mark.parametrize("text", ["heights", "heights.py", "heights.py:", "heights.py:a b", "none.py:f", "heights:f"])
 def test_words_that_name_no_function_are_refused(text: str) -> None:
     with pytest.raises(ObservableError, match=r"FILE\.py:FUNCTION|cannot be read"):
@@ -179,10 +205,22 @@ def test_observable_travels_without_its_file(observe: str, tmp_path: Path) -> No
     text = pickle.dumps(Observable.read(observe.replace(":heights", ":lowest")))
     (tmp_path / "heights.py").unlink()
     copy = pickle.loads(text)
-    import sandbox
-
     found = sandbox.run("bounce", dt=0.01)
     assert copy.observe(found)["values"] == {"lowest": found.position[:, 0, 1].min()}
+
+
+def test_names_and_texts_with_brackets_are_printed_as_they_are(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "units.py").write_text("def f(run):\n    return {'peak [m]': 1, '[/x]': 2, ':smile:': '[/b]'}")
+    out = str(tmp_path / "runs")
+    words = ("--observe", f"{tmp_path / 'units.py'}:f", "--out", out)
+    status, lines, _ = lines_of(capfd, "run", write_scene(tmp_path, DROP), *words)
+    assert status == 0
+    assert lines[1].split()[-4:] == ["peak", "[m]", "[/x]", ":smile:"]
+    status, lines, _ = lines_of(capfd, "runs", out, "--by", "observed.:smile:")
+    assert status == 0
+    assert lines[1].split()[:2] == ["[/b]", "1"]
 
 
 def test_states_at_the_end_are_columns_if_they_are_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -197,6 +235,16 @@ def test_states_at_the_end_are_columns_if_they_are_named(tmp_path: Path, capfd: 
         assert values == [*end["position"], *end["velocity"], end["angle"], end["angular_velocity"]]
         assert len(runs.table(where=f"{columns[1]} > 0", kind="numpy")["id"]) == 1
         assert not any(column.startswith("final.") for column in runs.table(kind="numpy"))
+
+
+def test_states_have_columns_though_the_last_run_was_refused(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, DROP)
+    words = ("--set", "world.damping=0.5", "--out", str(tmp_path / "runs"), "--quiet")
+    assert call(["run", scene, "--engine", "pymunk,exact", *words]) == 1  # exact does not model damping
+    with open_store(tmp_path / "runs") as runs:
+        assert runs.arrays(columns=["status"])["status"].tolist() == ["refused", "ok"]
+        heights = runs.arrays(columns=["final.a.y"])["final.a.y"]
+        assert np.isfinite(heights).tolist() == [False, True]
 
 
 def test_damaged_details_have_no_states(tmp_path: Path) -> None:

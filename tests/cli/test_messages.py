@@ -43,6 +43,7 @@ run bounce --set ball.ball.mass=0 → ball.ball.mass (set): must be greater than
 run bounce --set ball.ball.restitution=1.2 → must be between 0 and 1, is 1.2
 run bounce --set solver.dt=0 → must be greater than 0 and at most 10, is 0
 run bounce --set solver.substeps=2.5 → must be a whole number, is 2.5
+run bounce --set solver.substeps=3.0 → must be a whole number, is 3.0
 run bounce --set ball.ball.position=[1] → must be an array of 2, has 1
 run bounce --set solver.dt=0.1 --sweep solver.dt=0.1,0.2 → --sweep: solver.dt:
 run bounce --sweep solver.dt=1e-3:1e-2 → solver.dt=1e-3:1e-2:N

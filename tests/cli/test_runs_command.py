@@ -36,6 +36,9 @@ def test_list_has_the_columns_in_which_runs_differ(study: str, capfd: pytest.Cap
     assert out[-1] == "24 runs: 24 ok"
     _, out, _ = lines_of(capfd, "runs", study, "--limit", "3")
     assert (len(out), out[-1]) == (5, "24 runs: 24 ok; the last 3 are listed (--limit 0 lists all)")
+    _, out, _ = lines_of(capfd, "runs", study, "--limit", "3", "--sort", "seed", "--columns", "seed")
+    assert [line.strip() for line in out[1:4]] == ["1", "1", "1"]
+    assert out[-1] == "24 runs: 24 ok; the first 3 are listed (--limit 0 lists all)"
 
 
 def test_filters_are_joined_by_and(study: str, capfd: pytest.CaptureFixture[str]) -> None:

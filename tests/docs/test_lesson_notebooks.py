@@ -50,6 +50,26 @@ def test_notebook_has_no_answers_but_checks_them(page: Path) -> None:
             assert f"check('{name}', answer)" in text
 
 
+def test_every_lesson_is_written_without_answers_and_outputs(tmp_path: Path) -> None:
+    lesson_notebooks.write_notebooks(tmp_path)
+    lessons = {path.stem for path in lesson_notebooks.LESSONS.iterdir()} - {"index", "school-path"}
+    assert {path.stem for path in tmp_path.iterdir()} == lessons
+    for path in tmp_path.iterdir():
+        notebook = lesson_notebooks.nbformat.read(path, 4)
+        lesson_notebooks.nbformat.validate(notebook)
+        assert not any("Answers" in cell.source or cell.get("outputs") for cell in notebook.cells), path.stem
+    pendulum = (tmp_path / "pendulum.ipynb").read_text(encoding="utf-8")
+    assert "## Questions" in pendulum and "def pendulum(t, x, u)" in pendulum
+
+
+def test_command_of_two_lines_is_one_cell() -> None:
+    page = (
+        "# Title\n\n```console\n$ sandbox run ball \\\n    --engine pymunk\nball\n```\n\n```sh\nsandbox \\\n  info\n```"
+    )
+    cells = [cell.source for cell in lesson_notebooks.notebook_of("ball", page).cells if cell.source.startswith("!")]
+    assert cells == ["!sandbox run ball --engine pymunk", "!sandbox info"]
+
+
 @pytest.mark.timeout(600)  # starts a kernel, and compiles on a new machine
 @pytest.mark.parametrize(
     "page",

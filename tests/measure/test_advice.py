@@ -1,6 +1,7 @@
 """Advice for a game: errors against closed forms, remedies, the recommended setting run again, code, recordings."""
 
 import math
+import re
 from typing import Any
 
 import pymunk
@@ -279,24 +280,61 @@ ball = [{ name = "ball", position = [-2.0, 1.2], velocity = [0.0, 0.0], radius =
     assert present.departs_at == pytest.approx((distance > 0.01).any(axis=1).argmax() / FPS, rel=1e-9)
 
 
-def test_scene_at_rest_without_its_actions_gives_no_recommendation() -> None:
-    """A puck on a table seen from above: the recording compares more substeps instead."""
+def test_recommended_setting_is_compared_to_finer_steps_than_its_own() -> None:
+    """Its tolerance takes more substeps than the 8 to which the present setting is compared."""
     text = """
+world = { gravity = [0.0, -10.0], duration = 2.0 }
+solver = { dt = 0.016666666666666666 }
+plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0] }]
+ball = [{ name = "ball", position = [0.0, 2.0], radius = 0.2, restitution = 0.9 }]
+"""
+    scene = scene_of(text)
+    push = Impulse(time=0.5, body="ball", impulse=(0.01, 0.0))
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=2.0), tolerance=0.01, **QUICK)
+    assert advice.recommended is not None
+    assert advice.recommended.settings.substeps > 8
+    replays = {each.setting: each for each in advice.replays}
+    assert replays["present"].finer_substeps == 8
+    assert replays["recommended"].finer_substeps == 2 * advice.recommended.settings.substeps
+    assert replays["recommended"].departs_at is None
+
+
+PUCK = """
 world = { duration = 1.0 }
 solver = { dt = 0.016666666666666666 }
 ball = [{ name = "puck", position = [0.0, 0.0], radius = 0.2, mass = 1.0 }]
 wall = [{ name = "edge", points = [[1.0, -9.0], [1.0, 9.0]], restitution = 1.0 }]
 joint = [{ kind = "pivot", between = ["puck"], anchors = [[0.0, 0.0], [0.0, 0.0]], max_bias = 0.0, max_force = 2.0 }]
 """
-    scene = scene_of(text)
+
+
+def advice_on_a_puck() -> Advice:
+    """Return the advice on a puck on a table seen from above, which is pushed."""
+    scene = scene_of(PUCK)
     push = Impulse(time=0.1, body="puck", impulse=(5.0, 0.0))
-    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=1.0), **QUICK)
+    return advise(Recording(scene, "pymunk", scene.solver, (push,), duration=1.0), **QUICK)
+
+
+def test_scene_at_rest_without_its_actions_gives_no_recommendation() -> None:
+    """The recording compares more substeps instead."""
+    advice = advice_on_a_puck()
     assert advice.is_still_without_actions
     assert (advice.recommended, advice.fallback, advice.code) == (None, None, None)
     assert [each.setting for each in advice.replays] == ["present", "tried", "tried"]
     farthest = [each.farthest for each in advice.replays]
     assert farthest == sorted(farthest, reverse=True)  # the finer, the closer to the finest
     assert farthest[-1] < 0.5 * farthest[0]
+
+
+@pytest.mark.parametrize(("finest", "count"), [(8, 2), (4, 1), (2, 0)])
+def test_substeps_are_compared_to_at_least_twice_as_many(
+    finest: int, count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recording whose runs are expensive is compared to fewer substeps."""
+    monkeypatch.setattr(study, "FINER", (finest,))
+    present, *tried = advice_on_a_puck().replays
+    assert [each.setting for each in tried] == ["tried"] * count
+    assert {each.finer_substeps for each in (present, *tried)} == {finest}
 
 
 @pytest.mark.parametrize("omitted", [(), ("1 collision callback (space.on_collision)",)])
@@ -320,6 +358,13 @@ def test_forecast_is_in_px_if_the_unit_of_length_is_the_pixel(zoom: float) -> No
         zoom == 1.0,
         zoom != 1.0,
     )
+
+
+@pytest.mark.parametrize(("zoom", "unit"), [(1.0, "px"), (50.0, "m")])
+def test_distance_of_a_refined_truth_is_in_the_unit_of_length(zoom: float, unit: str) -> None:
+    advice = advice_of(PENDULUM, "duration = 3.0 -> duration = 1.0, linear_drag = 0.5", zoom=zoom)
+    assert advice.truth == "refined"
+    assert re.search(rf"within [\d.e-]+ {unit}($|[ ,;])", advice.truth_about)
 
 
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:

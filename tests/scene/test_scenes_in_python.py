@@ -70,6 +70,16 @@ def test_values_without_an_order_are_no_vector(positions: Any) -> None:
     assert faults_at(lambda: sandbox.Ball(position=positions, radius=0.1)) == ["position"]
 
 
+def test_a_single_part_is_no_list_of_parts() -> None:
+    single: Any = sandbox.Ball(position=(0.0, 1.0), radius=0.1)
+    assert faults_at(lambda: sandbox.Scene(balls=single)) == ["balls"]
+
+
+def test_message_on_a_float_for_a_whole_number_shows_the_float() -> None:
+    with pytest.raises(sandbox.SettingsError, match=r"must be a whole number, is 3\.0"):
+        sandbox.Settings(substeps=3.0)  # type: ignore[arg-type]  # no whole number
+
+
 def test_scalars_and_arrays_of_numpy_are_accepted() -> None:
     settings = sandbox.Settings(
         iterations=np.int64(5), substeps=np.uint8(2), half_kick=np.bool_(True), dt=np.float64(0.02)

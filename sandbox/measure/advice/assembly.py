@@ -108,7 +108,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         invariant=score.invariant,
         invariant_tolerance=score.invariant_tolerance,
         truth=truth.kind if isinstance(truth, Truth) else None,
-        truth_about=truth.about if isinstance(truth, Truth) else truth,
+        truth_about=_own_unit_text(truth.about if isinstance(truth, Truth) else truth, request),
         trusted_until=truth.trusted_until if isinstance(truth, Truth) else None,
         duration=scene.world.duration,
         left_at=_left_at(score.context),

@@ -59,6 +59,7 @@ from sandbox.measure.tradeoff.timing import TimedRun, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.trajectory import Trajectory
 
@@ -70,6 +71,8 @@ SEARCH_REPEATS = 2
 """Timings of a setting during the search; the settings of the advice are then timed again, all in turns."""
 FINER = (8, 4, 2)
 """Factors of the substeps of the run to which replays are compared: the first whose run is within the effort"""
+TRIED = (2, 4)
+"""Factors of the substeps that are compared to that run where nothing moves without the actions"""
 MAX_HASTE = 0.8
 """A setting is rejected if it departs from the finer run within less than this fraction of the time of the present
 setting. Departures that chaos has grown differ by less."""
@@ -347,7 +350,7 @@ def _replay_actions(request: AdviceRequest, score: AdviceScore, measured: Advice
         _replay(request, measured, "present", measured.present, finer if request.is_in_loop else None)
     if measured.is_still_without_actions:  # no error says anything about the game, so that nothing is recommended
         measured.recommended = measured.fallback = measured.fallback_kind = None
-        for point in _finer_settings(request, score):
+        for point in _finer_settings(request, score, finer):
             _replay(request, measured, "tried", point, finer)
         return
     for candidate in _candidates(request, score, measured):
@@ -361,13 +364,14 @@ def _replay_actions(request: AdviceRequest, score: AdviceScore, measured: Advice
         _replay(request, measured, "fallback", measured.fallback, finer)
 
 
-def _finer_settings(request: AdviceRequest, score: AdviceScore) -> Iterator[Evaluation]:
-    """Yield the present setting in a loop of frames with more substeps, up to half those of the finer run."""
+def _finer_settings(request: AdviceRequest, score: AdviceScore, finest: Trajectory | None) -> Iterator[Evaluation]:
+    """Yield the present setting in a loop of frames with more substeps, up to half those of the finest run."""
     space = SearchSpace(request.scene, request.loop, (request.engine,), request.frame, has_fixed_dt=True)
-    for factor in sorted(FINER)[:-1]:
+    for factor in TRIED:
         start = space.starts()[0]
         finer = replace(start, substeps=factor * start.substeps)
-        if not space.is_valid(finer) or clock_without_compilation() > request.deadline:
+        is_finest = finest is not None and 2 * finer.substeps > finest.info["settings"]["substeps"]
+        if is_finest or not space.is_valid(finer) or clock_without_compilation() > request.deadline:
             return
         yield evaluate(finer, space, [score.context], score.metric, score.tolerance, request.effort, request.deadline)
 
@@ -381,17 +385,34 @@ def _is_still(request: AdviceRequest, measured: AdviceMeasurements) -> bool:
 
 def _finer_replay(request: AdviceRequest, measured: AdviceMeasurements) -> Trajectory | None:
     """Return the run with the actions and finer steps; None if it costs more than the effort or the time, or fails."""
-    if ENGINES[request.engine].missing(request.scene, request.loop) or clock_without_compilation() > request.deadline:
-        return None
     per_run = measured.present.counted_seconds
     factor = next((each for each in FINER if each * per_run <= request.effort), None)
-    if factor is None:
+    return None if factor is None else _replay_with_substeps(request, factor * request.loop.substeps)
+
+
+def _finer_than(
+    request: AdviceRequest, measured: AdviceMeasurements, point: Evaluation, finer: Trajectory | None
+) -> Trajectory | None:
+    """Return a run with the actions and at most half the step of a setting: the finer run or another; None as there."""
+    if finer is None:
+        return None
+    substeps = math.ceil(2.0 * request.loop.dt / point.settings.h * (1.0 - SAME_STEP))
+    if substeps <= finer.info["settings"]["substeps"]:
+        return finer
+    if substeps / request.loop.substeps * measured.present.counted_seconds > request.effort:
+        return None
+    return _replay_with_substeps(request, substeps)
+
+
+def _replay_with_substeps(request: AdviceRequest, substeps: int) -> Trajectory | None:
+    """Return the run of the game's loop with the actions and so many substeps; None if there is none that is ok."""
+    if ENGINES[request.engine].missing(request.scene, request.loop) or clock_without_compilation() > request.deadline:
         return None
     request.on_progress(Progress("the recording with finer steps"))
-    finer = request.loop.replace(substeps=factor * request.loop.substeps)
     try:
+        finer = request.loop.replace(substeps=substeps)
         found = run(request.scene, request.engine, audit=False, actions=_actions(request), **finer.model_dump())
-    except TooLargeError:
+    except (TooLargeError, SettingsError):  # more memory, or more substeps, than there may be
         return None
     return found if found.status == "ok" else None
 
@@ -438,7 +459,7 @@ def _replay(
         return False
     missed = found.missed_contacts if found.status == "ok" else None
     replayed = ReplayedActions(name, text, found.status, found.reason, missed)
-    if finer is not None and found.status == "ok":
+    if found.status == "ok" and (finer := _finer_than(request, measured, point, finer)) is not None:
         replayed = _compared(replayed, found, finer, request.length)
     measured.replays.append(replayed)
     return found.status == "ok" and not missed and not _is_hasty(replayed, measured.replays[0])

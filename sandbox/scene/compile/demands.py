@@ -192,7 +192,7 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
 
     others = int((~bodies.round & matrix.touches & ~bodies.fixed).sum())
     why = _count(int((~bodies.round).sum()), "body is not a ball", "bodies are not balls", "all bodies are balls")
-    yield Demand.POLYGONS, matrix.solids, f"{why}, {others:,} of them can collide" if matrix.solids else why
+    yield Demand.POLYGONS, matrix.solids, f"{why}, {others:,} of them can move and collide" if matrix.solids else why
 
     can_collide = bool(matrix.touching.any())
     for demand, largest in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):

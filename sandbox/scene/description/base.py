@@ -137,7 +137,9 @@ def _is_replaced(old: Any, new: Any) -> bool:
 
 
 def _ordered(value: Any) -> Any:
-    """Return the values for a tuple; a text for values without an order, which no tuple is set from."""
+    """Return the values for a tuple; a text, which no tuple is set from, for values without an order and for a part."""
+    if isinstance(value, BaseModel):  # it is an iterable of its fields
+        return f"{type(value).__name__}(…)"
     return repr(value) if isinstance(value, AbstractSet | Mapping) else value
 
 

@@ -13,7 +13,7 @@ from sandbox.game_names import game_names
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Wording, is_required
 from sandbox.scene.description.game_tables import PRESETS, has_preset
-from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, PathKey, shown
+from sandbox.scene.errors import EXPECTED, LocatedMessage, Location, PathKey, shown, shown_input
 from sandbox.scene.files.document import TAGGED, keys_of, list_tables, model_at, read_model
 from sandbox.scene.files.expressions import evaluated
 from sandbox.scene.files.presets import expanded_document, stated_location
@@ -89,7 +89,7 @@ def explain(details: Any) -> LocatedMessage:
         expected = EXPECTED[kind].format(**context)
     else:
         expected = details["msg"].removeprefix("Input should be ")
-    message = f"must be {expected}, is {shown(value)}"
+    message = f"must be {expected}, is {shown_input(details)}"
     if kind in _RANGES and abs(value) <= _DEGREES and _is_angle(tuple(details["loc"])):
         message += f"; angles are in radians, {value:g}° is {math.radians(value):.4g}"
     elif kind in ("float_type", "int_type") and isinstance(value, str):

@@ -232,6 +232,15 @@ def test_slider_of_a_sweep_shows_one_value_at_a_time(browser: Browser, tmp_path:
     assert browser.do(shown) == "pymunk, dt 0.02,truth"
     assert browser.do("return document.querySelector('output.value').textContent") == "0.02"
     assert browser.do(solid) == 1  # its error
+    time = browser.do(TIME)
+    browser.do("document.querySelector('.swept input').focus()")
+    ActionChains(browser.driver).send_keys(Keys.ARROW_RIGHT).perform()
+    next_picture(browser)
+    assert browser.do(shown) == "pymunk, dt 0.04,truth"
+    ActionChains(browser.driver).send_keys(Keys.HOME).perform()
+    next_picture(browser)
+    assert browser.do(shown) == "pymunk, dt 0.01,truth"
+    assert browser.do(TIME) == time
     browser.do("document.querySelector('[data-action=all]').click()")
     next_picture(browser)
     assert browser.do(shown).count("pymunk") == len(steps)

@@ -145,6 +145,8 @@ class Replay {
       0: actions.fit,
     };
     if (!(event.key in keys) || on("select")) return;
+    // These keys move the slider of the swept value if it has the focus.
+    if (/^(Arrow|Home|End)/.test(event.key) && on(".swept input")) return;
     // Space activates a button or checkbox that has the focus.
     if (event.key === " " && on("button, input[type=checkbox]")) return;
     event.preventDefault();
