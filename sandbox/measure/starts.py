@@ -48,7 +48,10 @@ STRETCH_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Starts:
-    """Starts of a scene by their numbers, 0 for that in the file."""
+    """Starts of a scene by their numbers, 0 for that in the file; `run(Starts(scene).start(7))` runs one of them.
+
+    Such a scene cannot be written to a file.
+    """
 
     scene: Scene
     spread: float = DEFAULT_SPREAD

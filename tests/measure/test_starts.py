@@ -136,6 +136,14 @@ def test_a_net_at_rest_between_points_does_not_vary(name: str, varies: bool) -> 
     assert Starts(load(name)).can_vary == varies
 
 
+def test_a_perturbed_start_cannot_be_written_as_a_file() -> None:
+    scene = Starts(load("bounce")).start(1)
+    assert scene.is_perturbed
+    assert not load("bounce").is_perturbed
+    with pytest.raises(ValueError, match="cannot be written"):
+        sandbox.dumps(scene)
+
+
 def test_negative_number_raises() -> None:
     with pytest.raises(ValueError, match="at least 0, is -1"):
         Starts(load("bounce")).start(-1)

@@ -43,6 +43,11 @@ class Scene(SceneDescription, HtmlRepr):
         started._start = bodies, self.joint_arrays
         return started
 
+    @property
+    def is_perturbed(self) -> bool:
+        """Whether it has another start than that of the file."""
+        return self._start is not None
+
     @cached_property
     def bodies(self) -> "Bodies":
         """Bodies in scene order as arrays, with generators expanded."""

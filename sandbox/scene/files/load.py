@@ -276,6 +276,9 @@ def dumps(scene: Scene) -> str:
     Args:
         scene: the scene.
 
+    Raises:
+        ValueError: the scene has another start than that of a file, as those of `Starts`.
+
     Example:
         >>> print(sandbox.dumps(sandbox.Scene(balls=[sandbox.Ball(position=[0.0, 1.0], radius=0.1)])).strip())
         [[ball]]
@@ -284,6 +287,8 @@ def dumps(scene: Scene) -> str:
     """
     import tomlkit
 
+    if scene.is_perturbed:
+        raise ValueError("a perturbed start of a scene cannot be written; write the scene, and the number of the start")
     return tomlkit.dumps(to_document(scene))
 
 
