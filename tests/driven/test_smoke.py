@@ -62,7 +62,9 @@ def test_scene_runs_and_its_film_and_session_are_saved_at_the_end(drive: OpenWin
     window.wait_for(lambda: window.step_number() > begun + 10, "a few pictures")
     window.key("Escape")
     assert window.exit_status() == 0
-    assert window.stdout_lines()[-2:] == [f"session: {record}", "recorded: sandbox-room-1.gif"]
+    session_line, film_line = window.stdout_lines()[-2:]
+    assert session_line == f"session: {record}"
+    assert film_line.startswith("recorded: sandbox-room-1.gif")  # a slow machine adds the pictures a second
     with Image.open(tmp_path / "sandbox-room-1.gif") as film:
         assert film.size[0] < SIZE[0] and film.size[1] < SIZE[1]  # the scene alone, without panel and time line
         assert getattr(film, "n_frames", 1) > 1
