@@ -126,7 +126,7 @@ def test_polygon_without_contacts_is_rotated_too() -> None:
     assert abs(float(other.bodies.angle[0])) == pytest.approx(PERTURBATION / math.sqrt(0.5), rel=1e-9)
 
 
-STILL = ("benchmark/projectile", "particles/smoke", "tutorial/ball", "tutorial/fireworks")
+STILL = ("benchmark/lift", "benchmark/projectile", "particles/smoke", "tutorial/ball", "tutorial/fireworks")
 """Shipped scenes in which nothing can collide."""
 CROWDED = [each for each in each_shipped_scene() if "100k" not in each.values[0] and each.values[0] not in STILL]
 
