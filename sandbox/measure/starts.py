@@ -23,13 +23,14 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.formatting import format_quantity
 from sandbox.measure.metrics.clearance import IndexPair, close_pairs
-from sandbox.measure.metrics.perturbation import TOUCH_TOLERANCE, perturb, touching_pairs
+from sandbox.measure.metrics.perturbation import TOUCH_TOLERANCE, connected_groups, perturb, touching_pairs
 from sandbox.measure.seeds import is_random, with_seed
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
+from sandbox.scene.geometry.vectors import rotate
 from sandbox.scene.random_streams import Stream, draws
 
 DEFAULT_SPREAD = 0.01
@@ -211,22 +212,14 @@ def _limited(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
 
 def _rotated(vectors: FloatArray, angles: FloatArray) -> FloatArray:
     """Return vectors, (N, 2), rotated by angles, (N,) rad."""
-    (x, y), cos, sin = vectors.T, np.cos(angles), np.sin(angles)
-    return np.column_stack((x * cos - y * sin, x * sin + y * cos))
+    return np.column_stack(rotate(vectors[:, 0], vectors[:, 1], np.cos(angles), np.sin(angles)))
 
 
 def _joined_groups(setup: Setup) -> IntArray:
-    """Return for each body the lowest index of the bodies that joints connect it with, (N,)."""
-    label = np.arange(len(setup.bodies))
-    pairs = [(a, b) for a, b in zip(setup.joints.a.tolist(), setup.joints.b.tolist(), strict=True) if a != WORLD]
-    pairs = [pair for pair in pairs if not setup.bodies.fixed[[*pair]].any()]
-    for _ in pairs:
-        before = label.copy()
-        for a, b in pairs:
-            label[a] = label[b] = min(label[a], label[b])
-        if np.array_equal(label, before):
-            break
-    return label
+    """Return for each body the lowest index of the bodies that joints connect it with, (N,), not through fixed ones."""
+    fixed, pairs = setup.bodies.fixed, zip(setup.joints.a.tolist(), setup.joints.b.tolist(), strict=True)
+    joined = [(a, b) for a, b in pairs if a != WORLD and not (fixed[a] or fixed[b])]
+    return connected_groups(len(setup.bodies), joined)
 
 
 def _anchors(setup: Setup, group: IntArray) -> dict[int, set[tuple[float, float]]]:

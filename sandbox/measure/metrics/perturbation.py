@@ -68,7 +68,7 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
     for number, normals_of_body in normals.items():
         bound[number] |= _perpendicular(normals_of_body) is None
     connected = [edge for edge in (*joined, *(edge for edge, _ in touching)) if min(edge) >= 0 and bound[[*edge]].all()]
-    group = _groups(len(bodies), connected)
+    group = connected_groups(len(bodies), connected)
     outward: dict[int, list[FloatArray]] = {}
     for edge, normal in touching:
         labels = {int(group[number]) if number >= 0 else number for number in edge}
@@ -131,7 +131,7 @@ def _normal(setup: Setup, number: int, pair: IndexPair) -> FloatArray:
     return slope / length if length > 0.0 else np.zeros(2)
 
 
-def _groups(count: int, edges: list[IndexPair]) -> IntArray:
+def connected_groups(count: int, edges: list[IndexPair]) -> IntArray:
     """Return for each body the lowest index of the bodies that it is connected with, (count,)."""
     parent = list(range(count))
 
