@@ -17,13 +17,21 @@ such as a rope between two posts, start as in the file.
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.formatting import format_quantity
 from sandbox.measure.metrics.clearance import IndexPair, close_pairs
-from sandbox.measure.metrics.perturbation import TOUCH_TOLERANCE, connected_groups, perturb, touching_pairs
+from sandbox.measure.metrics.perturbation import (
+    TOUCH_TOLERANCE,
+    TouchingPair,
+    connected_groups,
+    perturb,
+    touching_pairs,
+)
 from sandbox.measure.seeds import is_random, with_seed
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
@@ -118,11 +126,15 @@ class Starts:
     def _movable(self, bodies: Bodies) -> BoolArray:
         return ~(bodies.fixed | is_driven(self.scene, bodies))
 
+    @cached_property
+    def _own(self) -> "_Unperturbed":
+        return _Unperturbed.of(self.scene, self.distance)
+
     def _changed(self, scene: Scene, random: np.random.Generator, number: int) -> Bodies:
         """Return the bodies of a scene in another start."""
-        setup = Setup.of(scene)
-        own, movable = setup.bodies, self._movable(setup.bodies)
-        free, group = movable & self._is_free(setup, own), _joined_groups(setup)
+        base = self._own if scene is self.scene else _Unperturbed.of(scene, self.distance)
+        own, movable = base.setup.bodies, self._movable(base.setup.bodies)
+        free, group = movable & base.free, base.group
         # Numbers for all bodies, so that those of one do not depend on the state of another.
         heading, length = 2.0 * math.pi * random.uniform(size=len(own)), np.sqrt(random.uniform(size=len(own)))
         factor, turn, rotation = random.uniform(-1.0, 1.0, (3, len(own)))
@@ -135,7 +147,7 @@ class Starts:
         shift += _limited((velocity + 0.5 * fall) * time, MAX_WIDTHS * own.thin)
         velocity[free] += fall
         rotation *= TURN_PER_SPREAD * self.spread
-        together = self._moved_together(setup, random, number, group, rotation)
+        together = self._moved_together(base, random, number, rotation)
         changed = replace(
             own,
             position=np.where(free[:, None], own.position + shift, together.position),
@@ -144,22 +156,22 @@ class Starts:
             angular_velocity=np.where(movable, own.angular_velocity * factor, own.angular_velocity),
             roll=np.where(movable[:, None], own.roll * factor[:, None], own.roll),
         )
-        return _without_faults(setup, changed, group, free)
+        return _without_faults(base, changed, free)
 
     def _moved_together(
-        self, setup: Setup, random: np.random.Generator, number: int, group: IntArray, rotation: FloatArray
+        self, base: "_Unperturbed", random: np.random.Generator, number: int, rotation: FloatArray
     ) -> Bodies:
         """Return the bodies with those that touch or are joined moved, so that they still touch and are joined.
 
         A group that hangs at one point of the world is rotated about it; one that hangs at several is not moved.
         """
-        own, amount = setup.bodies, self.distance * math.sqrt(random.uniform())
+        own, amount = base.setup.bodies, self.distance * math.sqrt(random.uniform())
         reverse = bool(random.integers(2))
-        moved = perturb(setup, amount, seed=number, reverse=reverse) if amount > 0.0 else None
+        moved = perturb(base.setup, amount, number, reverse, base.touching) if amount > 0.0 else None
         found = own if moved is None else moved.bodies
         position, angle = found.position.copy(), found.angle.copy()
-        for label, points in _anchors(setup, group).items():
-            members = np.flatnonzero(group == label)
+        for label, points in base.anchors.items():
+            members = np.flatnonzero(base.group == label)
             position[members], angle[members] = own.position[members], own.angle[members]
             if len(points) == 1:
                 (point,) = points
@@ -168,33 +180,53 @@ class Starts:
                 angle[members] += by
         return replace(own, position=position, angle=angle)
 
-    def _is_free(self, setup: Setup, bodies: Bodies) -> BoolArray:
-        """Return which bodies neither touch anything nor have a joint, (N,)."""
-        free = np.ones(len(bodies), np.bool_)
-        for pair, _ in touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * self.distance)):
+
+@dataclass(frozen=True)
+class _Unperturbed:
+    """Start of a scene that others differ from."""
+
+    setup: Setup
+    touching: list[TouchingPair]
+    """pairs that touch, or may do so after a displacement"""
+    free: BoolArray
+    """bodies that neither touch anything nor have a joint, (N,)"""
+    group: IntArray
+    """for each body, the lowest index of the bodies that joints connect it with, (N,)"""
+    anchors: dict[int, set[tuple[float, float]]]
+    """points of the world at which each group hangs, by the label of the group"""
+    overlaps: dict[IndexPair, float]
+    """depth of each overlap, m"""
+
+    @classmethod
+    def of(cls, scene: Scene, distance: float) -> Self:
+        """Derive it from a scene whose bodies are to be displaced by up to a distance, m."""
+        setup = Setup.of(scene)
+        touching, group = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * distance)), _joined_groups(setup)
+        free = np.ones(len(setup.bodies), np.bool_)
+        for pair, _ in touching:
             free[[number for number in pair if number >= 0]] = False
         for ends in (setup.joints.a, setup.joints.b):
             free[ends[ends != WORLD]] = False
-        return free
+        return cls(setup, touching, free, group, _anchors(setup, group), _overlaps(setup, setup.bodies))
 
 
-def _without_faults(setup: Setup, changed: Bodies, group: IntArray, free: BoolArray) -> Bodies:
+def _without_faults(base: _Unperturbed, changed: Bodies, free: BoolArray) -> Bodies:
     """Return the bodies moved as far as they neither overlap anything nor stretch a joint.
 
     Free bodies move in steps of about half a width, so that none passes through another one or a wall.
     """
-    own = setup.bodies
+    setup, own, group = base.setup, base.setup.bodies, base.group
     shift, turn = changed.position - own.position, changed.angle - own.angle
     widths = np.hypot(*shift[free].T) / own.thin[free]
     count = max(1, math.ceil(widths.max(initial=0.0)))
-    allowed, fraction = _overlaps(setup, own), np.zeros(len(own))
+    fraction = np.zeros(len(own))
     stopped = np.zeros(len(own), np.bool_)
     for k in range(1, count + 1):
         wanted = np.where(free, k / count, float(k == count))  # others move at once, so that they keep together
         while True:
             tried = np.where(stopped, fraction, wanted)
             placed = replace(changed, position=own.position + tried[:, None] * shift, angle=own.angle + tried * turn)
-            faulty = _overlapping(setup, placed, allowed) | _stretched(setup, placed)
+            faulty = _overlapping(setup, placed, base.overlaps) | _stretched(setup, placed)
             blocked = np.isin(group, group[sorted(faulty)]) & ~stopped & (tried > 0.0)
             if not blocked.any():
                 break

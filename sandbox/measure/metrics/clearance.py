@@ -10,12 +10,17 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.geometry.hulls import hull_distance
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.geometry.shapes import pieces_of
+from sandbox.scene.geometry.vectors import offset_from_segment
+
+CHUNK = 1_000_000
+"""Frames × segments that are processed at once."""
 
 
 def rotate_points(vectors: FloatArray, angle: FloatArray) -> FloatArray:
@@ -103,7 +108,7 @@ def clearance(
     if thing is None:
         others = list(posed_pieces(bodies, second, position[:, second], angle[:, second]))
     else:
-        others = list(_pieces_of(thing, len(position)))
+        others = list(_pieces_of(thing, centre, float(bodies.radius[first])))
     gaps = np.full(len(position), np.inf)
     for corners, radius in posed_pieces(bodies, first, centre, angle[:, first]):
         for its_corners, its_radius in others:
@@ -120,9 +125,11 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPai
     scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
     immovable = bodies.fixed | is_driven(scene, bodies)
     collides = matrix.touches | bodies.fixed
+    with_all = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
     first, second = _near_pairs(bodies, collides, reach)
-    group = bodies.group[first]
-    wanted = ~(immovable[first] & immovable[second]) & ((group != bodies.group[second]) | (group == 0))
+    filters = filter_table(scene, bodies)
+    wanted = ~(immovable[first] & immovable[second]) & filters.meets(first, second)
+    wanted &= (with_all[first] & with_all[second]) | bodies.fixed[first] | bodies.fixed[second]
     first, second = first[wanted], second[wanted]
     discs = bodies.round[first] & bodies.round[second]
     clear = _length(bodies.position[first] - bodies.position[second]) - bodies.radius[first] - bodies.radius[second]
@@ -135,7 +142,8 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPai
     movable = np.flatnonzero(~immovable & collides)
     for k, thing in enumerate(scene.fixed):
         clear = bounding_clearances(thing, bodies.position, bodies.radius)
-        candidates = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
+        able = movable[filters.meets_fixed(k)[movable] & (clear[movable] <= reach)]
+        candidates = ((number, -1 - k) for number in able.tolist())
         exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _initial_clearance(setup, p)) for p in candidates)
         found += [(pair, own) for pair, own in exact if own <= reach]
     return found
@@ -186,23 +194,29 @@ def _disc_clearance(
         return _length(centre - other) - radius - its_radius
     if isinstance(thing, Post):
         return _length(centre - np.asarray(thing.position)) - radius - thing.radius
-    nearest = np.full(len(centre), np.inf)
-    for tail, tip in pairwise(_line(thing)):
-        nearest = np.fmin(nearest, _from_segment(centre, np.asarray(tail), np.asarray(tip)))
-    return nearest - radius - 0.5 * thing.thickness
+    rows = max(1, CHUNK // len(thing.points))
+    parts = [_from_segments(thing, centre[k : k + rows]).min(axis=0) for k in range(0, len(centre), rows)]
+    return np.concatenate((np.empty(0), *parts)) - radius - 0.5 * thing.thickness
 
 
 def _line(wall: Wall) -> list[tuple[float, float]]:
     return [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
 
 
-def _pieces_of(thing: Wall | Post, frames: int) -> Iterator[tuple[FloatArray, float]]:
-    """Yield the corners, (T, 1 or 2, 2) m, and the radius of each piece of a static object."""
+def _pieces_of(thing: Wall | Post, centre: FloatArray, radius: float) -> Iterator[tuple[FloatArray, float]]:
+    """Yield the corners, (T, 1 or 2, 2) m, and the radius of each piece of a static object near a body.
+
+    Of a wall, these are the segments that can be nearest to the body in some frame, with its centre, (T, 2) m, and its
+    bounding radius, m: the distance of a segment from the centre differs from that from the body by at most the radius.
+    """
+    frames = len(centre)
     if isinstance(thing, Post):
         yield np.broadcast_to(np.asarray(thing.position), (frames, 1, 2)), thing.radius
         return
-    for ends in pairwise(_line(thing)):
-        yield np.broadcast_to(np.asarray(ends), (frames, 2, 2)), 0.5 * thing.thickness
+    away, ends = _from_segments(thing, centre), list(pairwise(_line(thing)))
+    can_be_nearest = ~(away - 2.0 * radius > away.min(axis=0)).all(axis=1)  # nan: a body that is diverging
+    for number in np.flatnonzero(can_be_nearest).tolist():
+        yield np.broadcast_to(np.asarray(ends[number]), (frames, 2, 2)), 0.5 * thing.thickness
 
 
 def _lower_to_distance(gaps: FloatArray, first: FloatArray, second: FloatArray, radii: float) -> None:
@@ -220,8 +234,9 @@ def _length(vector: FloatArray) -> FloatArray:
         return np.asarray(np.hypot(vector[:, 0], vector[:, 1]))
 
 
-def _from_segment(centre: FloatArray, tail: FloatArray, tip: FloatArray) -> FloatArray:
-    along = tip - tail
-    squared = float(along @ along)
-    fraction = ((centre - tail) @ along / squared).clip(0.0, 1.0) if squared > 0.0 else np.zeros(len(centre))
-    return _length(centre - tail - fraction[:, None] * along)
+def _from_segments(wall: Wall, centre: FloatArray) -> FloatArray:
+    """Return the distance of each of S segments of a wall from centres (T, 2), (S, T) m."""
+    line = np.asarray(_line(wall))
+    with np.errstate(over="ignore", invalid="ignore"):
+        away = offset_from_segment(centre, line[:-1, None], np.diff(line, axis=0)[:, None])
+        return np.asarray(np.hypot(away[..., 0], away[..., 1]))

@@ -21,6 +21,8 @@ ULPS = 4.0
 """A coordinate so large that 1e-12 m is below its rounding is changed by this many units in the last place."""
 TOUCH_TOLERANCE = 1e-9
 """m: clearances and overlaps up to this count as contact; larger ones do not change by a displacement of 1e-12 m."""
+TouchingPair = tuple[IndexPair, FloatArray]
+"""Pair in contact with the indices of `Contacts`, and a normal of the contact, (2,)."""
 MIN_STRETCH = 0.1
 """Smallest random factor of the distances in a group of touching discs, of which the mean is 1; above 0, so that no
 contact closes.
@@ -29,7 +31,13 @@ PARALLEL_SINE = 1e-6
 """Sine of the angle up to which two contact normals count as parallel: their numerical derivative has seven digits."""
 
 
-def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, reverse: bool = False) -> Setup | None:
+def perturb(
+    start: Scene | Setup,
+    amount: float = PERTURBATION,
+    seed: int = 0,
+    reverse: bool = False,
+    touching: list[TouchingPair] | None = None,
+) -> Setup | None:
     """Return the scene with a displacement of every body that can collide or is attracted.
 
     The direction of each displacement follows from the state of the body and the seed, not from its index, so that an
@@ -46,6 +54,7 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
         seed: seed of the directions.
         reverse: take the opposite directions. Of a scene and its reverse, one has impacts that are simultaneous in the
             original in one order and the other in the opposite order.
+        touching: `touching_pairs` up to the tolerance or twice the amount, whichever is more, if they are known.
 
     Returns:
         The perturbed setup; None if there is no such body, so that no difference can grow.
@@ -56,7 +65,7 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
     able = ~immovable & (~matrix.free | bool(scene.attractions))
     if not able.any():
         return None
-    touching = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * amount))
+    touching = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * amount)) if touching is None else touching
     joints = setup.joints.of(*CONSTRAINT_KINDS)
     joined = [edge for edge in zip(joints.a.tolist(), joints.b.tolist(), strict=True) if edge[0] >= 0]
     normals: dict[int, list[FloatArray]] = {}
@@ -102,7 +111,7 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0, r
     return replace(setup, bodies=replace(bodies, position=position, velocity=velocity, angle=angle))
 
 
-def touching_pairs(start: Scene | Setup, touch: float = TOUCH_TOLERANCE) -> list[tuple[IndexPair, FloatArray]]:
+def touching_pairs(start: Scene | Setup, touch: float = TOUCH_TOLERANCE) -> list[TouchingPair]:
     """Return the pairs in contact at the start of a scene, and a normal of each, (2,).
 
     Args:
