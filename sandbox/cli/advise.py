@@ -28,7 +28,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, report_remarks
-from sandbox.cli.starts import spread_option, starts_option
+from sandbox.cli.starts import RECOMMEND, spread_option, starts_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
@@ -180,7 +180,7 @@ class _Options(OutputOptions):
     help="pixels per metre; default: 50, or as --pixels for the recording of a game whose bodies look like pixels",
 )
 @click.option("--pixels", is_flag=True, help="the unit of length is the pixel, as --zoom 1")
-@starts_option
+@starts_option(RECOMMEND)
 @spread_option
 @click.option(
     "--effort",

@@ -9,6 +9,7 @@ import click
 from sandbox.cli.common import exit_with_errors, expand_folders, print_faults
 from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.recordings import read_scene, report_remarks
+from sandbox.cli.starts import spread_option, starts_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import print_descriptions, print_item
 from sandbox.echo import MAX_MESSAGE, shorten
@@ -26,6 +27,7 @@ from sandbox.measure.preflight import (
     run_preflight,
     unknown_speeds,
 )
+from sandbox.measure.starts import Starts
 from sandbox.scene.compile.demands import JOINT_LIMITS, JOINTS, Item, bill
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
@@ -75,7 +77,7 @@ class CheckDocument:
     """s, largest dt without tunnelling; None if any dt is safe, or it is unknown"""
     safe_dt_known: bool = False
     trial: TrialCoverage | None = None
-    """the trial run; None if there was none"""
+    """the trial runs; None if there were none"""
     warnings: Sequence[Diagnostic] = ()
     notes: Sequence[Diagnostic] = ()
     game: GameSummary | None = field(default=None, metadata=in_json(optional=True))
@@ -100,7 +102,9 @@ class _Answers:
 @click.argument("scenes", nargs=-1, required=True)
 @set_option("set a value of the scene first")
 @click.option("--engine", metavar="NAME", help="print the warnings for this engine only, and use it for the trial run")
-@click.option("--no-trial", is_flag=True, help="predict by formulas only, without the short trial run")
+@click.option("--no-trial", is_flag=True, help="predict by formulas only, without the short trial runs")
+@starts_option("count the problems in trial runs from N perturbed starts")
+@spread_option
 @json_option
 @quiet_option("print faults and warnings only")
 @click.option(
@@ -112,6 +116,8 @@ def check_command(
     overrides: tuple[str, ...],
     engine: str | None,
     no_trial: bool,
+    starts: int,
+    spread: float,
     as_json: bool,
     quiet: bool,
     expand: bool,
@@ -119,9 +125,9 @@ def check_command(
 ) -> int:
     """Validate scenes and predict numerical problems: required physics, engines that can run the scene, warnings.
 
-    Warnings come from formulas and from a trial run of at most 10,000 substeps on --engine (default: pymunk). SCENES
-    are files, folders of files, names of shipped scenes, or recorded sessions (.json), whose scenes are checked without
-    their actions. Exit status 1: no engine can run a scene, or it fails.
+    Warnings come from formulas and from trial runs of at most 10,000 substeps on --engine (default: pymunk), from
+    perturbed starts. SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json), whose
+    scenes are checked without their actions. Exit status 1: no engine can run a scene, or it fails.
     """
     if expand:
         if len(scenes) > 1 or as_json:
@@ -135,7 +141,7 @@ def check_command(
     answers, names = _Answers(), expand_folders(scenes)
     for name in names:
         try:
-            scene, document = _check(name, overrides, engine, 0.0 if no_trial else 1.0)
+            scene, document = _check(name, overrides, engine, 0 if no_trial else starts, spread)
         except KeyboardInterrupt:
             answers.status = 130
             click.echo(f"interrupted: {len(answers.documents):,} of {len(names):,} scenes were checked", err=True)
@@ -160,14 +166,17 @@ def check_command(
     return answers.status
 
 
-def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: float) -> tuple[Scene, CheckDocument]:
+def _check(
+    name: str, overrides: tuple[str, ...], engine: str | None, starts: int, spread: float
+) -> tuple[Scene, CheckDocument]:
     """Return a scene and its document.
 
     Args:
         name: the scene as the user named it.
         overrides: values to set first.
-        engine: engine of the warnings and the trial run; None for the default.
-        cover: fraction of the longest allowed trial run; 0 for none.
+        engine: engine of the warnings and the trial runs; None for the default.
+        starts: largest number of trial runs; 0 for none.
+        spread: largest change of a start, as a fraction.
 
     Raises:
         SceneError: the scene has faults.
@@ -177,7 +186,7 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
     items = bill(scene)
     missing = {each.name: each.missing(scene, scene.solver) for each in ENGINES.values()}
     safe = largest_safe_dt(scene, engine=engine)
-    answer = run_preflight(scene, engine=engine, cover=cover)
+    answer = run_preflight(scene, engine=engine, cover=float(starts > 0), starts=starts, spread=spread)
     return scene, CheckDocument(
         scene=name,
         title=scene.title,
@@ -226,6 +235,8 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool, verbose: bool) ->
             click.echo(f"{name}: warning: {warning.message}")
         return
     click.echo(f"{name}: {scene.title}" if scene.title else name)
+    if document.trial is not None:
+        print_item(_trial_text(scene, document.trial))
     for warning in document.warnings:
         print_item(f"warning: {warning.message}")
     on, off = click.style("on ", fg="green", bold=True), click.style("off", dim=True)
@@ -237,14 +248,19 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool, verbose: bool) ->
     for engine, support in document.engines.items():
         print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
     print_item(_step_text(scene, document))
-    if (trial := document.trial) is not None and not trial.whole:
-        covered = f"{trial.duration:.3g} s of {scene.world.duration:g} s"
-        print_item(f"the trial run on {trial.engine} covered {covered}")
     if document.game is not None:
         keys = (f"{each.name} ({' or '.join(each.keys)})" for each in document.game.controls)
         print_item(f"game {document.game.name}: {', '.join(keys)}")
     for note in document.notes:
         print_item(f"note: {note.message}")
+
+
+def _trial_text(scene: Scene, trial: TrialCoverage) -> str:
+    """Return the engine of the trial runs, how much of the scene they cover, and their starts."""
+    covered = "" if trial.whole else f", for {trial.duration:.3g} s of {scene.world.duration:g} s"
+    if trial.starts == 1:
+        return f"one trial run on {trial.engine}{covered}"
+    return f"trial runs on {trial.engine}{covered}, from {trial.starts:,} starts: {Starts(scene, trial.spread)}"
 
 
 def _step_text(scene: Scene, document: CheckDocument) -> str:

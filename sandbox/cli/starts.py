@@ -1,5 +1,8 @@
 """Options of commands that measure from perturbed starts, and the line that states them."""
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import click
 
 from sandbox.cli.options import FractionRange
@@ -7,14 +10,19 @@ from sandbox.formatting import format_plural
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, MAX_SPREAD, MAX_STARTS, Starts
 from sandbox.measure.tradeoff.result import Tradeoff
 
-starts_option = click.option(
-    "--starts",
-    type=click.IntRange(1, MAX_STARTS),
-    default=DEFAULT_STARTS,
-    metavar="N",
-    help="recommend a setting that is within the tolerance in 95 % of N perturbed starts, and confirm it with N more; "
-    f"fewer where the effort allows no more; 1: only the start of the scene; default: {DEFAULT_STARTS}",
-)
+Decorated = TypeVar("Decorated", bound=Callable[..., Any])
+
+
+def starts_option(use: str) -> Callable[[Decorated], Decorated]:
+    """Return the option `--starts`; `use` says in its help what is done from N perturbed starts."""
+    text = f"{use}; fewer where the effort allows no more; 1: only the start of the scene; default: {DEFAULT_STARTS}"
+    kind = click.IntRange(1, MAX_STARTS)
+    return click.option("--starts", type=kind, default=DEFAULT_STARTS, metavar="N", help=text)
+
+
+RECOMMEND = "recommend a setting that is within the tolerance in 95 % of N perturbed starts, and confirm it with N more"
+"""Use of starts by trade-offs and advice"""
+
 spread_option = click.option(
     "--spread",
     type=FractionRange(min=0.0, max=MAX_SPREAD),

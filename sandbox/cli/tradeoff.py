@@ -32,7 +32,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
-from sandbox.cli.starts import spread_option, starts_option, starts_text
+from sandbox.cli.starts import RECOMMEND, spread_option, starts_option, starts_text
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -296,7 +296,7 @@ class _Options(OutputOptions):
     metavar="N",
     help="frames per second that --budget refers to; default: 60",
 )
-@starts_option
+@starts_option(RECOMMEND)
 @spread_option
 @click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels per metre, for the metrics in pixels")
 @click.option(

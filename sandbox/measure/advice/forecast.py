@@ -30,9 +30,9 @@ class Risk:
     element: str | None
     """name of the body, joint or static object; None if the whole scene is concerned"""
     odds: float | None
-    """upper bound of the odds, 0 to 1; 1 if the trial run has shown it; None if the formula gives none"""
+    """odds, 0 to 1: the fraction of the trial runs that show it, or an upper bound; None if the formula gives none"""
     is_observed: bool
-    """whether the trial run has shown it"""
+    """whether a trial run has shown it"""
     message: str
     """description with a remedy"""
     safe_substeps: int | None
@@ -42,11 +42,12 @@ class Risk:
     @property
     def rank(self) -> float:
         """Severity for sorting: observed problems first, then by their odds."""
-        return 2.0 if self.is_observed else UNKNOWN_ODDS if self.odds is None else self.odds
+        odds = UNKNOWN_ODDS if self.odds is None else self.odds
+        return 1.0 + odds if self.is_observed else odds
 
 
 def forecast(scene: Scene, settings: Settings, engine: str, fps: float) -> list[Risk]:
-    """Return the problems of a setting by formulas and by a trial run, the most severe first.
+    """Return the problems of a setting by formulas and by trial runs, the most severe first.
 
     Args:
         scene: the scene.
@@ -54,8 +55,7 @@ def forecast(scene: Scene, settings: Settings, engine: str, fps: float) -> list[
         engine: name of the engine.
         fps: frames per second, for the substeps that avoid a problem.
     """
-    formulas = {each.message for each in warnings(scene, settings, engine)}
-    return _ordered(run_preflight(scene, settings, engine).warnings, settings, engine, fps, formulas)
+    return _ordered(run_preflight(scene, settings, engine).warnings, settings, engine, fps)
 
 
 def formula_forecast(scene: Scene, settings: Settings, engine: str, fps: float) -> list[Risk]:
@@ -63,8 +63,7 @@ def formula_forecast(scene: Scene, settings: Settings, engine: str, fps: float) 
 
     The measured run of the setting need not show them: a body can tunnel at a slightly different speed.
     """
-    found = warnings(scene, settings, engine)
-    return _ordered(found, settings, engine, fps, {each.message for each in found})
+    return _ordered(warnings(scene, settings, engine), settings, engine, fps)
 
 
 def game_notes(scene: Scene, engine: str, zoom: float) -> list[str]:
@@ -79,16 +78,13 @@ def game_notes(scene: Scene, engine: str, zoom: float) -> list[str]:
     return [each.message for each in notes(scene, engine) if each.kind in kinds]
 
 
-def _ordered(
-    found: Iterable[Diagnostic], settings: Settings, engine: str, fps: float, formulas: set[str]
-) -> list[Risk]:
-    return sorted((_risk(each, settings, engine, fps, formulas) for each in found), key=lambda risk: -risk.rank)
+def _ordered(found: Iterable[Diagnostic], settings: Settings, engine: str, fps: float) -> list[Risk]:
+    return sorted((_risk(each, settings, engine, fps) for each in found), key=lambda risk: -risk.rank)
 
 
-def _risk(found: Diagnostic, settings: Settings, engine: str, fps: float, formulas: set[str]) -> Risk:
+def _risk(found: Diagnostic, settings: Settings, engine: str, fps: float) -> Risk:
     details = found.details
-    is_observed = "seen_at" in details or found.message not in formulas
-    odds = 1.0 if is_observed else details.get("odds")
+    odds = found.seen.starts.probability if found.seen and found.is_observed else details.get("odds")
     # Some engines detect contacts once a step, so that substeps do not prevent tunnelling.
     has_effect = found.kind not in DETECTION_KINDS or intervals(settings.replace(substeps=2), engine) == 2
     element = next((str(details[key]) for key in ELEMENT_KEYS if key in details), None)
@@ -96,7 +92,7 @@ def _risk(found: Diagnostic, settings: Settings, engine: str, fps: float, formul
         kind=found.kind,
         element=element,
         odds=None if odds is None else min(float(odds), 1.0),
-        is_observed=is_observed,
+        is_observed=found.is_observed,
         message=found.message,
         safe_substeps=_safe_substeps(details.get("safe_dt"), settings, fps) if has_effect else None,
     )

@@ -90,6 +90,9 @@ class _Passages:
 
     def find(self, can_collide: CanCollide) -> _Encounters:
         """Return the passages."""
+        self._slender = np.asarray([body for body in self._slender.tolist() if self._has_other(body, can_collide)], int)
+        if not len(self._slender):
+            return _Encounters()
         found = [_Encounters()]
         pending, count = list[_Encounters](), 0
         for when in range(len(self._run.time) - 1):
@@ -102,6 +105,11 @@ class _Passages:
                 found.append(both.some(self._passes(both)))
                 pending, count = [], 0
         return _Encounters(*map(np.concatenate, zip(*found, strict=True)))
+
+    def _has_other(self, body: int, can_collide: CanCollide) -> bool:
+        """Return whether a slender body can collide with any other body."""
+        others = np.delete(np.arange(len(self._bodies)), body)
+        return bool(can_collide(np.minimum(others, body), np.maximum(others, body)).any())
 
     def _near(self, when: int) -> _Encounters:
         """Return the encounters of an interval in which the other body may pass the axis from a clear start."""

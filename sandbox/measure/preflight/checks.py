@@ -176,19 +176,20 @@ def _tunnelling(context: PreflightContext) -> Iterator[Diagnostic]:
             ball += ", struck by others,"
         message = (
             f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {displacement:.3g} m per {interval}, and "
-            f"tunnel through it undetected: odds up to {100 * odds:.3g} %; dt <= {floor_3_digits(safe)} s is safe"
+            f"tunnel through it undetected: odds up to {100 * odds:.3g} %"
         )
         details: Details = {
             "ball": passage.ball,
             "thing": passage.thing,
             "others": things,
+            "other_bodies": passage.others,
             "speed": passage.speed,
             "odds": odds,
             "safe_dt": safe,
         }
         if passage.struck:
             details["struck"] = True
-        yield Diagnostic("tunnelling", message, details)
+        yield Diagnostic("tunnelling", message, details, f"dt <= {floor_3_digits(safe)} s is safe")
 
 
 def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
@@ -203,17 +204,17 @@ def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
     bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
     filters = filter_table(scene, bodies)
     movers = matrix.touches & ~bodies.immovable & (bodies.thin > 0.0)
-    found: dict[tuple[str, float], tuple[str, float, int]] = {}
+    found: dict[tuple[str, float, int], tuple[str, float, int]] = {}
     for index, (plane, name) in enumerate(zip(scene.planes, scene.fixed_names, strict=False)):
         able = np.flatnonzero(movers & filters.meets_fixed(index))
         if not len(able):
             continue
         speed = speeds.toward(plane)[able]
         k = int(np.argmax(speed / bodies.thin[able]))
-        key = bodies.names[able[k]], float(speed[k])
+        key = bodies.names[able[k]], float(speed[k]), len(able) - 1
         first, half, count = found.get(key, (name, float(bodies.thin[able[k]]), -1))
         found[key] = first, half, count + 1
-    for (body, top), (name, half, others) in found.items():
+    for (body, top, slower), (name, half, others) in found.items():
         depth = top * settings.h
         if depth <= half * (1.0 + ROUNDING):
             continue
@@ -221,10 +222,12 @@ def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
         more = f" and {others:,} other{'s' if others > 1 else ''} like it" if others else ""
         message = (
             f"{body!r} can hit {name!r}{more} at up to {top:.4g} m/s and penetrate by {depth:.3g} m before the contact "
-            f"is detected; dt <= {floor_3_digits(safe)} s keeps that below its half width, {half:.3g} m"
+            "is detected"
         )
-        details: Details = {"ball": body, "thing": name, "speed": top, "depth": depth, "safe_dt": safe}
-        yield Diagnostic("depth", message, details)
+        remedy = f"dt <= {floor_3_digits(safe)} s keeps that below its half width, {half:.3g} m"
+        details: Details = {"ball": body, "thing": name, "others": others, "other_bodies": slower}
+        details |= {"speed": top, "depth": depth, "safe_dt": safe}
+        yield Diagnostic("depth", message, details, remedy)
 
 
 def group_alike(found: Iterable[TunnellingRisk]) -> list[tuple[TunnellingRisk, int]]:
@@ -241,11 +244,9 @@ def _iterations(settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnosti
     if matrix.mutual and settings.iterations < MIN_ITERATIONS and matrix.restitution > 0:
         kind = "balls" if matrix.ball_ball else "bodies"
         noun = "iteration" if settings.iterations == 1 else "iterations"
-        message = (
-            f"{settings.iterations} {noun} with bouncing {kind}: groups can gain energy; "
-            f"use iterations >= {MIN_ITERATIONS}"
-        )
-        yield Diagnostic("iterations", message, {"iterations": settings.iterations})
+        message = f"{settings.iterations} {noun} with bouncing {kind}: groups can gain energy"
+        details: Details = {"has": settings.iterations, "iterations": MIN_ITERATIONS}
+        yield Diagnostic("iterations", message, details, f"use iterations >= {MIN_ITERATIONS}")
 
 
 def _rounding(context: PreflightContext) -> Iterator[Diagnostic]:

@@ -84,15 +84,15 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
             first, second = bodies.names[int(some.a[k])], bodies.names[int(some.b[k])]
             message = (
                 f"the joint {some.names[k]!r} connects {first!r} and {second!r}, one of which is {ratio:.3g} times as "
-                f"heavy; {budget} it would come apart; {remedy}"
+                f"heavy; {budget} it would come apart"
             )
-            yield Diagnostic("mass_ratio", message, {**details, "joint": some.names[k], "ratio": ratio})
+            yield Diagnostic("mass_ratio", message, {**details, "joint": some.names[k], "ratio": ratio}, remedy)
         else:
             name = f"the joint {some.names[0]!r} is heavily loaded"
             if len(some) > 1:
                 name = f"{len(some):,} joints, {some.names[0]!r} among them, are connected"
-            message = f"{name}; {budget} {'it' if len(some) == 1 else 'they'} would come apart; {remedy}"
-            yield Diagnostic("chain", message, details)
+            message = f"{name}; {budget} {'it' if len(some) == 1 else 'they'} would come apart"
+            yield Diagnostic("chain", message, details, remedy)
 
 
 def _safe_substep(needed: float, settings: Settings, bias: float) -> float:
@@ -205,10 +205,11 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         message = (
             f"a chain with {joints.names[0]!r} hangs {depth:,} joints deep; {settings.joints} with "
             f"{settings.iterations} iterations every {settings.h:.3g} s stretches it by {fraction:.2g} of a joint's "
-            f"length; solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
+            "length"
         )
+        remedy = f"solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
         details: Details = {"joints": depth, "joint": joints.names[0], "share": fraction, "safe_dt": dt}
-        yield Diagnostic("chain", message, details)
+        yield Diagnostic("chain", message, details, remedy)
 
 
 MAX_START_ERROR = 0.01

@@ -69,9 +69,9 @@ def stack_warnings(scene: Scene, settings: Settings, close: InitialContacts) -> 
         remedy, details = _remedy(load, TOWER, settings)
         message = (
             f"{count} bodies are stacked, {name!r} at the bottom; with {_available_text(settings)} the tower would "
-            f"lean or fall; {remedy}"
+            "lean or fall"
         )
-        yield Diagnostic("stack", message, details | {"body": name, "bodies": count})
+        yield Diagnostic("stack", message, details | {"body": name, "bodies": count}, remedy)
 
 
 def _crushed_bodies(
@@ -91,9 +91,10 @@ def _crushed_bodies(
         remedy, details = _remedy(load, CRUSHED, settings)
         message = (
             f"{heavy!r} stands on {light!r} and is {ratio[k]:.3g} times as heavy; with {_available_text(settings)} it "
-            f"would sink into it; {remedy}"
+            "would sink into it"
         )
-        yield Diagnostic("mass_ratio", message, details | {"body": heavy, "other": light, "ratio": float(ratio[k])})
+        details |= {"body": heavy, "other": light, "ratio": float(ratio[k])}
+        yield Diagnostic("mass_ratio", message, details, remedy)
 
 
 def _resting(scene: Scene, close: InitialContacts) -> tuple[IntArray, IntArray]:

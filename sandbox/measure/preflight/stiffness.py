@@ -134,11 +134,9 @@ def spring_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
             continue
         safe = WARNING_FRACTION * limit / mode.omega * settings.substeps
         verdict = "is unstable" if z >= limit * (1.0 - ROUNDING) else "is almost unstable"
-        message = (
-            f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {verdict} (limit {limit:.3g}); "
-            f"dt <= {floor_3_digits(safe)} s is stable"
-        )
-        yield Diagnostic("spring", message, {**details, "limit": limit, "safe_dt": safe})
+        message = f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {verdict} (limit {limit:.3g})"
+        remedy = f"dt <= {floor_3_digits(safe)} s is stable"
+        yield Diagnostic("spring", message, {**details, "limit": limit, "safe_dt": safe}, remedy)
 
 
 def damper_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
@@ -163,10 +161,10 @@ def damper_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         safe = settings.dt * limit / damped
         message = (
             f"the damping of {mode.group} is too strong for the step on reference: c·h/m = {damped:.3g} is "
-            f"unstable (limit {limit:.3g}); use dt <= {floor_3_digits(safe)} s or the engine pymunk"
+            f"unstable (limit {limit:.3g})"
         )
         details: Details = {"joint": mode.joint, "damping_h": damped, "limit": limit, "safe_dt": safe}
-        yield Diagnostic("spring", message, details)
+        yield Diagnostic("spring", message, details, f"use dt <= {floor_3_digits(safe)} s or the engine pymunk")
 
 
 MAX_SPEED_CHANGE = 0.1
@@ -376,11 +374,11 @@ def orbit_warnings(scene: Scene, settings: Settings, contacts: ContactMatrix) ->
         safe = settings.dt * SAFE_TURN / float(turn[k])
         message = (
             f"{name!r} turns the velocity of {bodies.names[k]!r} by {min(float(turn[k]), MAX_TURN):.3g} rad in one "
-            f"substep at its closest distance, {nearest[k]:.3g} m, so energy is not conserved; "
-            + (f"dt <= {floor_3_digits(safe)} s is safe" if safe > 0.0 else "add softening")
+            f"substep at its closest distance, {nearest[k]:.3g} m, so energy is not conserved"
         )
+        remedy = f"dt <= {floor_3_digits(safe)} s is safe" if safe > 0.0 else "add softening"
         details: Details = {"body": bodies.names[k], "turn": min(float(turn[k]), MAX_TURN), "safe_dt": safe}
-        yield Diagnostic("orbit", message, details)
+        yield Diagnostic("orbit", message, details, remedy)
 
 
 MAX_TURN = 1e12

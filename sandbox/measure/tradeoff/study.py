@@ -431,7 +431,7 @@ def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diag
         return found
     remedy = f"; at dt = {settings.dt:.4g} s, substeps >= {needed} {effect}"
     return [
-        replace(each, message=each.message + remedy, details={**each.details, "safe_substeps": needed})
+        replace(each, remedy=each.remedy + remedy, details={**each.details, "safe_substeps": needed})
         if each.kind == "tunnelling"
         else each
         for each in found

@@ -15,10 +15,10 @@ import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.clearance import bounding_clearances
+from sandbox.measure.preflight.assessment import run_preflight
 from sandbox.measure.preflight.checks import FAILED, MIN_ITERATIONS
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
 from sandbox.measure.preflight.joint_chains import MAX_STRETCH
-from sandbox.measure.preflight.trial_run import run_preflight
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
 from sandbox.scene.compile.demands import Demand, demands
 from sandbox.scene.compile.scene import Scene

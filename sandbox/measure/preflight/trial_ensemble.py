@@ -1,0 +1,181 @@
+"""Ensemble of trial runs: the first part of a scene from several perturbed starts.
+
+Formulas bound speeds, but cannot predict the phase of the step in which a ball reaches a wall, the ball that a crowd
+ejects, or how a tower settles. A single run shows one phase. The fraction of perturbed starts in which a problem occurs
+estimates its odds, with Wilson's interval. Counted work bounds the number of starts, so that it does not depend on the
+machine.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sandbox.arrays import BoolArray
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.preflight.diagnostic import Diagnostic, Occurrence
+from sandbox.measure.preflight.trial_run import TrialRun, run_trial, trial_duration
+from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY, collide_with_all
+from sandbox.measure.proportion import Proportion
+from sandbox.measure.run.bounded_run import counted_cost
+from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+
+STARTS_EFFORT = 0.7
+"""s, counted work of the trial runs from other starts than that of the file."""
+PREPARATION, PREPARATION_OF_BODY = 4e-3, 3e-5
+"""s, counted for the preparation of a run from a start, and for each body of it."""
+
+MAX_SPEED_UP = 2.0
+"""Factor by which impacts may make bodies faster in the rest of a scene than in its first part."""
+
+NAMING_KINDS = frozenset({"tunnelling", "depth"})
+"""Kinds for which a trial run names each body at risk with its own speed, and the formulas only bounds."""
+INDISTINGUISHABLE = {"mass_ratio": "stack", "energy": "iterations", "orbit": "iterations"}
+"""Kinds that a trial run cannot distinguish: it shows that a stack falls, or that energy grows."""
+
+
+@dataclass(frozen=True)
+class TrialEnsemble:
+    """Trial runs of a scene from its first starts, number 0 being that of the file."""
+
+    scene: Scene
+    settings: Settings
+    """settings of the runs as asked for"""
+    engine: str
+    """name of the engine"""
+    starts: Starts
+    duration: float
+    """s, of each run"""
+    findings: tuple[tuple[Diagnostic, ...], ...]
+    """problems that occurred, by start"""
+    top_speed: float
+    """largest speed of any body, m/s"""
+    unseen: tuple[BoolArray, BoolArray]
+    """bodies whose passages through other bodies, and through static objects, the audit does not see, (N,) each"""
+    run_cost: float
+    """s, counted work of the run from the start of the file"""
+
+    @property
+    def whole(self) -> bool:
+        """Whether the runs cover the whole duration of the scene."""
+        return self.duration == self.scene.world.duration
+
+    @property
+    def has_diverged(self) -> bool:
+        """Whether a run diverged, which hides other problems."""
+        return any(each.kind == "diverged" for found in self.findings for each in found)
+
+    @property
+    def preparation(self) -> float:
+        """Work counted for the preparation of a run, s."""
+        return preparation_of(self.scene)
+
+    def occurrence(self, starts: Iterable[int], event: str = "occurs") -> Occurrence:
+        """Return the frequency of a problem that occurs in some of the starts, by their numbers."""
+        count = Proportion(len(set(starts)), len(self.findings))
+        return Occurrence(self.engine, None if self.whole else self.duration, count, event)
+
+    def starts_with(self, problem: Diagnostic) -> list[int]:
+        """Return the starts in which the problem of a diagnostic occurs, of any body, or in which the run diverges."""
+        return [k for k, found in enumerate(self.findings) if is_among(problem, found, self.scene)]
+
+    def may_pass(self, predicted: Diagnostic) -> bool:
+        """Return whether a body may tunnel in the rest of the scene, as far as its first part shows.
+
+        Formulas overestimate the effect of impacts by far: such a speed counts only if bodies reached it to within a
+        factor of `MAX_SPEED_UP`.
+        """
+        if not predicted.details.get("struck"):
+            return True
+        reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
+        return MAX_SPEED_UP * self.top_speed * self.settings.h > reach
+
+    def is_blind_to(self, predicted: Diagnostic) -> bool:
+        """Return whether the audit does not see all passages of the bodies that may tunnel."""
+        if predicted.kind != "tunnelling":
+            return False
+        bodies, thing = self.scene.bodies, predicted.details["thing"]
+        is_static = thing in self.scene.fixed_names
+        if predicted.details.get("other_bodies") or thing in (ANOTHER, ANOTHER_BODY):
+            concerned = collide_with_all(bodies) | (is_static & ~bodies.fixed)
+        else:
+            concerned = np.asarray(bodies.names) == predicted.details["ball"]
+        return bool((self.unseen[is_static] & concerned).any())
+
+
+def run_trials(
+    scene: Scene,
+    settings: Settings,
+    engine: str,
+    starts: int = DEFAULT_STARTS,
+    spread: float = DEFAULT_SPREAD,
+    cover: float = 1.0,
+) -> TrialEnsemble | None:
+    """Run a scene, or its first part, from up to a number of starts, as far as `STARTS_EFFORT` allows.
+
+    Args:
+        scene: the scene.
+        settings: settings of the runs.
+        engine: name of the engine.
+        starts: number of starts, that of the file among them.
+        spread: largest change of a start, as a fraction.
+        cover: fraction of the scene that a run may cover at most.
+
+    Returns:
+        The runs; None if the engine refuses the scene, or the part would be too short.
+    """
+    if ENGINES[engine].missing(scene, settings) or (duration := trial_duration(scene, settings, cover)) is None:
+        return None
+    first = run_trial(scene, scene, settings, engine, duration)
+    if first is None:
+        return None
+    cost, drawn = cost_of(first), Starts(scene, spread)
+    others = min(starts - 1, int(STARTS_EFFORT / (cost + preparation_of(scene))))
+    others = others if others and drawn.can_vary else 0
+    findings, top_speed, unseen = [tuple(first.findings())], first.top_speed, first.unseen
+    for number in range(1, others + 1):
+        trial = run_trial(scene, drawn.start(number), settings, engine, duration)
+        if trial is None:
+            break
+        findings.append(tuple(trial.findings()))
+        top_speed = max(top_speed, trial.top_speed)
+        unseen = unseen[0] | trial.unseen[0], unseen[1] | trial.unseen[1]
+    return TrialEnsemble(scene, settings, engine, drawn, duration, tuple(findings), top_speed, unseen, cost)
+
+
+def preparation_of(scene: Scene) -> float:
+    """Return the work counted for the preparation of a run from a start, s."""
+    return PREPARATION + PREPARATION_OF_BODY * len(scene.bodies)
+
+
+def cost_of(trial: TrialRun) -> float:
+    """Return the counted work of a trial run, s."""
+    info = trial.run.info
+    return counted_cost(trial.scene, trial.engine, trial.settings, info["steps"], info["work"])
+
+
+def is_among(problem: Diagnostic, found: Sequence[Diagnostic], scene: Scene) -> bool:
+    """Return whether the problem of a diagnostic is among those of a run, of any body, or the run diverges."""
+    thing, family = obstacle_of(problem, scene), family_of(problem)
+    return any(
+        each.kind == "diverged" or (family_of(each) == family and obstacle_of(each, scene) == thing) for each in found
+    )
+
+
+def family_of(found: Diagnostic) -> str:
+    """Return the kind of a diagnostic, or that of all which a trial run cannot tell from it."""
+    if "joint" in found.details and found.kind == "mass_ratio":
+        return "chain"
+    return INDISTINGUISHABLE.get(found.kind, found.kind)
+
+
+def obstacle_of(found: Diagnostic, scene: Scene) -> str | None:
+    """Return the obstacle of a body at risk as the formulas name it; None for kinds without one."""
+    if found.kind not in NAMING_KINDS:
+        return None
+    thing = str(found.details["thing"])
+    if thing in scene.bodies.names and not scene.bodies.fixed[scene.bodies.names.index(thing)]:
+        return ANOTHER if scene.bodies.round[~scene.bodies.fixed].all() else ANOTHER_BODY
+    return thing
