@@ -1,29 +1,42 @@
-"""Calibration of forecasts: warnings of `sandbox check` compared with the events of the run, on random scenes.
+"""Calibration of forecasts: warnings of `sandbox check` compared with runs from other starts, on random scenes.
 
     python -m tools.calibration.forecast [--half fit|held-out] [--kinds NAME,…] [--seeds N] [--from SEED]
-                                         [--engines A,B] [--json]
+                                         [--engines A,B] [--fresh N] [--workers N] [--json FILE] [--plot FILE]
 
-Every scene of `random_scenes.py` is forecast first, by the formulas alone and with a trial run, and then run in full on
-each engine. Rules of this file, independent of the forecasts, decide which troubles occurred. Precision is the fraction
-of warnings that came true, recall the fraction of troubles that were forecast; both count (scene, engine, trouble). The
-forecasts were fitted on one half, every second kind with even seeds; `held-out` is the other kinds with odd seeds. The
-results are reproducible: nothing depends on the clock.
+Every scene of `random_scenes.py` is forecast on each engine in three ways: as `check --engine` does it; as for a scene
+twice as long as its trial runs, which then cover half of it; and by formulas alone. Then it is run in full from fresh
+starts, whose numbers the forecasts do not use, and rules of this file, independent of the forecasts, decide in how many
+of them each trouble occurs. A case is a scene, an engine and a trouble that is possible there.
+
+- Recall: of the cases with the trouble in at least half of the starts, the fraction with a warning.
+- Precision: of the cases with a warning, the fraction with the trouble in the file or in at least one of the starts.
+- Stated odds: the fraction of the trial runs that show it; the upper bound of a formula where none does; 0 without a
+  warning. Brier score: mean square of the difference to what happened in a start.
+
+The forecasts were fitted on one half, every second kind with even seeds; `held-out` is the other kinds with odd seeds,
+to which the kinds with features that no forecast was fitted to belong. The results are reproducible: nothing depends on
+the clock.
 """
 
 import argparse
 import json
 import sys
-from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.energy import energies
-from sandbox.measure.preflight import run_preflight, warnings
+from sandbox.measure.preflight import Diagnostic, run_preflight, warnings
+from sandbox.measure.proportion import Proportion
 from sandbox.measure.run.runner import run
+from sandbox.measure.starts import Starts
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import JointKind
 from sandbox.scene.compile.scene import Scene
@@ -50,91 +63,127 @@ TROUBLES = {
 JOINT_OFF, MOVED, ENERGY_GAIN = 0.1, 0.5, 0.1
 """Thresholds of trouble, as fractions of a joint's length, of a stacked body's width, and of the energy at stake."""
 
-Key = tuple[str, int, str, str]
-"""kind of scene, seed, engine, trouble"""
+FIRST_FRESH = 1_000
+"""Number of the first fresh start: those of forecasts are smaller."""
+MAX_EXACT_FRESH = 3
+"""Fresh starts on `exact`, whose failures take long and hardly depend on the start."""
+
+WAYS = ("check", "long scene", "formulas")
+"""Ways to forecast; the second with trial runs of half the scene"""
+
+BINS = (0.0, 1e-9, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
+"""Bounds of the bins of stated odds; the first has those of 0."""
+RESAMPLES = 2_000
+"""Resamples of the cases of a bin, for the interval of its frequency."""
 
 
 @dataclass(frozen=True)
-class Observation:
-    """One kind of trouble in one run."""
+class Case:
+    """One kind of trouble of one scene on one engine."""
 
     kind: str
     seed: int
     engine: str
     trouble: str
-    formulas: bool
-    """whether the formulas alone forecast it"""
-    foretold: bool
-    """whether the formulas and the trial run forecast it"""
-    happened: bool
-    half_foretold: bool
-    """whether the formulas and a trial run of at most half the scene forecast it"""
-    elsewhere: bool | None
-    """on the reference: whether formulas and a trial run on pymunk, as without `--engine`, forecast it; else None"""
+    odds: Mapping[str, float | None]
+    """stated odds by way of forecasting; None: no warning; -1: a warning without odds"""
+    hits: int
+    """fresh starts in which it occurs"""
+    starts: int
+    """number of fresh starts"""
+    in_file: bool
+    """whether it occurs from the start of the file"""
     covered: bool
-    """whether the trial run covered the whole scene"""
+    """whether the trial runs covered the whole scene"""
+
+    @property
+    def frequency(self) -> float:
+        """Fraction of the fresh starts in which it occurs."""
+        return self.hits / self.starts
+
+    def is_warned(self, way: str) -> bool:
+        """Return whether there is a warning."""
+        return self.odds[way] is not None
+
+    @property
+    def happened(self) -> bool:
+        """Whether it occurs from any start."""
+        return self.in_file or self.hits > 0
+
+
+NEW_KINDS = 8
+"""Kinds at the end of the list, all held out: their features were added after the forecasts were fitted."""
 
 
 def halves() -> dict[str, tuple[tuple[str, ...], int]]:
     """Return the kinds and the parity of the seeds of each half."""
-    names = sorted(KINDS)
-    return {"fit": (tuple(names[::2]), 0), "held-out": (tuple(names[1::2]), 1)}
+    names, new = sorted([*KINDS][:-NEW_KINDS]), [*KINDS][-NEW_KINDS:]
+    return {"fit": (tuple(names[::2]), 0), "held-out": (tuple(sorted([*names[1::2], *new])), 1)}
 
 
-def observe(kind: str, seed: int, engines: Iterable[str]) -> Iterator[Observation]:
-    """Forecast a scene, run it, and yield forecasts and occurrences on each engine that models it."""
+def cases_of(kind: str, seed: int, engines: Iterable[str], fresh: int) -> list[Case]:
+    """Forecast a scene, run it from fresh starts, and return its cases on each engine that models it."""
     scene = from_document(document(kind, seed))
-    default_preflight = run_preflight(scene)
-    default_troubles = troubles(scene, (each.kind for each in default_preflight.warnings))
+    found = []
     for engine in engines:
         if ENGINES[engine].missing(scene, scene.solver):
             continue
-        preflight = run_preflight(scene, engine=engine)
-        by_formulas = troubles(scene, (each.kind for each in warnings(scene, engine=engine)))
-        forecast = troubles(scene, (each.kind for each in preflight.warnings))
-        half = troubles(scene, (each.kind for each in run_preflight(scene, engine=engine, cover=0.5).warnings))
-        occurred = judge(scene, run(scene, engine), engine)
-        for trouble in sorted(occurred):
-            elsewhere = (
-                trouble in default_troubles if engine == "reference" and default_preflight.tried is not None else None
-            )
-            row = (
-                trouble in by_formulas,
-                trouble in forecast,
-                occurred[trouble],
-                trouble in half,
-                elsewhere,
-                preflight.covered,
-            )
-            yield Observation(kind, seed, engine, trouble, *row)
-
-
-def troubles(scene: Scene, kinds: Iterable[str]) -> set[str]:
-    """Return the troubles that warnings of these kinds forecast for a scene."""
-    found = {TROUBLES[kind] for kind in kinds if kind in TROUBLES}
-    if "joint or stack" in found:
-        found = found - {"joint or stack"} | {"joint" if len(scene.joint_arrays) else "stack"}
+        checked = run_preflight(scene, engine=engine)
+        forecasts = {
+            "check": odds_of(scene, checked.warnings),
+            "long scene": odds_of(scene, run_preflight(scene, engine=engine, cover=0.5).warnings),
+            "formulas": odds_of(scene, warnings(scene, engine=engine)),
+        }
+        in_file = judge(scene, run(scene, engine), engine)
+        drawn, count = Starts(scene), min(fresh, MAX_EXACT_FRESH) if engine == "exact" else fresh
+        starts = [drawn.start(FIRST_FRESH + k) for k in range(count)]
+        occurred = [judge(scene, run(start, engine), engine) for start in starts]
+        for trouble in sorted(in_file):
+            odds = {way: forecast.get(trouble) for way, forecast in forecasts.items()}
+            hits = sum(each[trouble] for each in occurred)
+            found.append(Case(kind, seed, engine, trouble, odds, hits, len(starts), in_file[trouble], checked.covered))
     return found
 
 
+def odds_of(scene: Scene, found: Iterable[Diagnostic]) -> dict[str, float]:
+    """Return the stated odds of each trouble that warnings forecast; −1 if none of its warnings states any."""
+    stated: dict[str, float] = {}
+    for each in found:
+        if (trouble := trouble_of(scene, each.kind)) is None:
+            continue
+        odds = each.seen.starts.probability if each.seen and each.is_observed else float(each.details.get("odds", -1.0))
+        stated[trouble] = max(stated.get(trouble, -1.0), odds)
+    return stated
+
+
+def trouble_of(scene: Scene, kind: str) -> str | None:
+    """Return the trouble that a kind of warning forecasts for a scene; None for other warnings."""
+    trouble = TROUBLES.get(kind)
+    if trouble == "joint or stack":
+        return "joint" if len(scene.joint_arrays) else "stack"
+    return trouble
+
+
 def judge(scene: Scene, done: Trajectory, engine: str) -> dict[str, bool]:
-    """Return for each trouble that is possible in a run whether it occurred."""
+    """Return for each trouble that is possible in a run of a scene, from any start, whether it occurred."""
     if engine == "exact":
         return {"events": done.status == "failed"}
     completed = done.status == "ok" and bool(np.isfinite(done.position).all())
     found = {"energy": not completed or energy_gain(scene, done) > ENERGY_GAIN}
     if contact_matrix(scene).touches.any():
         found["tunnelling"] = len(done.missed_time) > 0
-    if scene.planes and completed:
-        found["depth"] = is_behind_plane(scene, done)
-    if done.info["joint_error"] is not None:
-        found["joint"] = not done.info["joint_error"] <= JOINT_OFF
+    if scene.planes:
+        found["depth"] = completed and is_behind_plane(scene, done)
+    if len(scene.joint_arrays):
+        error = done.info["joint_error"]
+        found["joint"] = not completed or (error is not None and not error <= JOINT_OFF)
     starts_at_rest = not scene.bodies.velocity.any() and not scene.bodies.fixed.any()
     if (scene.stacks or len(scene.boxes) > 1) and starts_at_rest and not (scene.balls or scene.thrusts or scene.joints):
         displacement = np.hypot(*np.moveaxis(done.position - done.position[0], 2, 0)).max(axis=0)
         found["stack"] = not completed or bool((displacement > MOVED * 2.0 * scene.bodies.thin).any())
-    if found.get("joint") or found.get("stack"):
-        del found["energy"]  # broken joints and falling stacks gain energy too: one trouble, counted once
+    # Broken joints and falling stacks gain energy too, which counts as one trouble.
+    if "joint" in found or "stack" in found:
+        del found["energy"]
     return found
 
 
@@ -142,9 +191,11 @@ def energy_gain(scene: Scene, done: Trajectory) -> float:
     """Return the gain of energy, as a fraction of the initial kinetic energy and the range of the potential energy.
 
     The reference is at least the energy that lifts every body by its own width, for bodies at rest. The result is 0 if
-    thrusts, motors or wind do work.
+    thrusts, motors, moving surfaces, kinematic bodies or wind do work.
     """
-    if scene.thrusts or any(scene.world.wind) or len(scene.joint_arrays.of(JointKind.MOTOR)):
+    motors = len(scene.joint_arrays.of(JointKind.MOTOR))
+    belts = any(each.surface_speed for each in scene.fixed)
+    if scene.thrusts or any(scene.world.wind) or motors or belts or scene.bodies.kinematic.any():
         return 0.0
     kinetic, potential, total = energies(done, scene)
     bodies = scene.bodies
@@ -164,46 +215,131 @@ def is_behind_plane(scene: Scene, done: Trajectory) -> bool:
     return False
 
 
-def confusion(rows: Iterable[Observation], of: str = "foretold") -> Counter[tuple[bool, bool]]:
-    """Count by (foretold, happened)."""
-    return Counter((bool(getattr(row, of)), row.happened) for row in rows)
+def recall(cases: Iterable[Case], way: str) -> Proportion:
+    """Return how many of the cases with the trouble in at least half of the starts have a warning."""
+    frequent = [each.is_warned(way) for each in cases if each.frequency >= 0.5]
+    return Proportion(sum(frequent), len(frequent))
 
 
-def shares(count: Counter[tuple[bool, bool]]) -> dict[str, Any]:
-    """Return a confusion table with precision and recall; None for a ratio without cases."""
-    hits, alarms, missed = count[True, True], count[True, False], count[False, True]
-    return {
-        "true_positives": hits,
-        "false_positives": alarms,
-        "false_negatives": missed,
-        "true_negatives": count[False, False],
-        "precision": hits / (hits + alarms) if hits + alarms else None,
-        "recall": hits / (hits + missed) if hits + missed else None,
-    }
+def precision(cases: Iterable[Case], way: str) -> Proportion:
+    """Return how many of the cases with a warning have the trouble in the file or in any fresh start."""
+    warned = [each.happened for each in cases if each.is_warned(way)]
+    return Proportion(sum(warned), len(warned))
 
 
-def summary(rows: list[Observation]) -> dict[str, Any]:
-    """Return all confusion tables: over all, and by trouble, kind of scene and engine."""
-    subsets = {
-        "all": rows,
-        "trial run covers all": [row for row in rows if row.covered],
-        "trial run covers a part": [row for row in rows if not row.covered],
-    }
-    return {
-        "foretold": {name: shares(confusion(subset)) for name, subset in subsets.items()},
-        "trial run on another engine": {
-            "all": shares(confusion((row for row in rows if row.elsewhere is not None), "elsewhere"))
-        },
-        "trial run of half": {name: shares(confusion(subset, "half_foretold")) for name, subset in subsets.items()},
-        "by formulas alone": {name: shares(confusion(subset, "formulas")) for name, subset in subsets.items()},
-        **{
-            f"by {key}": {
-                name: shares(confusion(row for row in rows if getattr(row, key) == name))
-                for name in sorted({getattr(row, key) for row in rows})
-            }
-            for key in ("trouble", "kind", "engine")
-        },
-    }
+@dataclass(frozen=True)
+class OddsBin:
+    """Cases whose stated odds are in one interval."""
+
+    cases: int
+    stated: float
+    """mean of the stated odds"""
+    frequency: float
+    """fraction of the fresh starts with the trouble, mean over the cases"""
+    low: float
+    """lower end of the 95 % interval of the frequency, from resampled cases"""
+    high: float
+    """upper end"""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the stated odds lie within the interval of the frequency."""
+        return self.low <= self.stated <= self.high
+
+
+def reliability(cases: Iterable[Case], way: str) -> list[OddsBin]:
+    """Return the bins of the stated odds, without empty ones; warnings without odds are left out.
+
+    The interval is that of the mean frequency over resampled cases, widened to Wilson's interval of one trial for each
+    case: cases that all agree, as all with odds of 1, would give an interval without width.
+    """
+    stated, happened = odds_and_frequencies(cases, way)
+    random = np.random.default_rng(0)
+    found = []
+    for low, high in pairwise(BINS):
+        inside = (stated >= low) & (stated < high)
+        if not inside.any():
+            continue
+        some = happened[inside]
+        means = random.choice(some, (RESAMPLES, len(some))).mean(axis=1)
+        bounds = np.quantile(means, (0.025, 0.975))
+        wilson = Proportion(round(float(some.sum())), len(some)).interval
+        ends = min(float(bounds[0]), wilson[0]), max(float(bounds[1]), wilson[1])
+        found.append(OddsBin(len(some), float(stated[inside].mean()), float(some.mean()), *ends))
+    return found
+
+
+def odds_and_frequencies(cases: Iterable[Case], way: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stated odds of cases, 0 without a warning, and the frequencies; without warnings that state none."""
+    pairs = [(each.odds[way] or 0.0, each.frequency) for each in cases if each.odds[way] != -1.0]
+    table = np.asarray(pairs, np.float64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def brier_score(cases: Iterable[Case], way: str) -> float:
+    """Return the mean over cases and starts of (stated odds − outcome)², with 1 for the trouble and 0 without it."""
+    stated, frequency = odds_and_frequencies(cases, way)
+    return float(((stated - frequency) ** 2 + frequency * (1.0 - frequency)).mean())
+
+
+def subsets(cases: Sequence[Case]) -> Iterator[tuple[str, list[Case]]]:
+    """Yield all cases, and those of each engine, trouble and group of kinds."""
+    yield "all", [*cases]
+    for key in ("engine", "trouble"):
+        for name in sorted({getattr(each, key) for each in cases}):
+            yield f"{key} {name}", [each for each in cases if getattr(each, key) == name]
+    new = {*[*KINDS][-NEW_KINDS:]}
+    if recent := [each for each in cases if each.kind in new]:
+        yield "kinds with later features", recent
+
+
+def summary(cases: Sequence[Case]) -> dict[str, Any]:
+    """Return the scores of each way to forecast, over all cases and by subsets."""
+    found: dict[str, Any] = {}
+    for way in WAYS:
+        scores = {
+            name: {"recall": recall(some, way), "precision": precision(some, way)} for name, some in subsets(cases)
+        }
+        found[way] = {"scores": scores, "bins": reliability(cases, way), "brier": brier_score(cases, way)}
+    return found
+
+
+def plot(found: Mapping[str, Any], path: Path) -> None:
+    """Draw the reliability diagram of the first two ways to forecast."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2, 4.2), layout="constrained")
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
+    axes.annotate("stated odds are right", (0.42, 0.45), rotation=37, color="0.45", fontsize=9)
+    for way, colour, shift in (("check", "#2b6cb0", -0.006), ("long scene", "#c05621", 0.006)):
+        bins = found[way]["bins"]
+        x = [each.stated + shift for each in bins]
+        y = [each.frequency for each in bins]
+        reach = [[each.frequency - each.low for each in bins], [each.high - each.frequency for each in bins]]
+        axes.errorbar(x, y, reach, fmt="o", color=colour, capsize=3, label=way)
+        for at, each in zip(x, bins, strict=True):
+            side = -1 if way == "check" else 1
+            axes.annotate(f"{each.cases}", (at, each.frequency), (side * 7, 4), textcoords="offset points",
+                          ha="right" if side < 0 else "left", fontsize=8, color=colour)  # fmt: skip
+    axes.set(xlabel="stated odds", ylabel="frequency in fresh starts", xlim=(-0.08, 1.08), ylim=(-0.04, 1.04))
+    axes.legend(loc="upper left", frameon=False)
+    figure.savefig(path, dpi=110)
+
+
+def print_summary(found: Mapping[str, Any]) -> None:
+    """Print the scores and the bins."""
+    for way, each in found.items():
+        print(f"\n{way}: Brier score {each['brier']:.3f}")
+        for name, scores in each["scores"].items():
+            counts = (f"{scores[key].hits:>4} of {scores[key].trials:<4} {scores[key]!s:<42}" for key in scores)
+            print(f"  {name:<28}{''.join(counts)}")
+        for each_bin in each["bins"]:
+            mark = "" if each_bin.holds else "  outside"
+            print(
+                f"  stated {100 * each_bin.stated:5.1f} %: {100 * each_bin.frequency:5.1f} % "
+                f"({100 * each_bin.low:.1f} to {100 * each_bin.high:.1f} %) of {each_bin.cases} cases{mark}"
+            )
 
 
 def main() -> int:
@@ -214,9 +350,12 @@ def main() -> int:
     )
     parser.add_argument("--seeds", type=int, default=4, metavar="N", help="scenes of each kind")
     parser.add_argument("--from", type=int, default=0, dest="first", metavar="SEED", help="the first seed, rounded up")
-    parser.add_argument("--engines", default="pymunk,reference,exact", metavar="NAME[,NAME]")
+    parser.add_argument("--engines", default="pymunk,box2d,reference,exact", metavar="NAME[,NAME]")
     parser.add_argument("--half", choices=("fit", "held-out"), default="held-out")
-    parser.add_argument("--json", action="store_true", dest="as_json")
+    parser.add_argument("--fresh", type=int, default=20, metavar="N", help="fresh starts of each scene")
+    parser.add_argument("--workers", type=int, default=1, metavar="N", help="processes")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all cases")
+    parser.add_argument("--plot", type=Path, metavar="FILE", help="draw the reliability diagram")
     arguments = parser.parse_args()
     names, parity = halves()[arguments.half]
     names = tuple(arguments.kinds.split(",")) if arguments.kinds else names
@@ -224,28 +363,27 @@ def main() -> int:
     if unknown:
         parser.error(f"no kind {', '.join(unknown)}")
     first = arguments.first + (parity - arguments.first) % 2
-    rows: list[Observation] = []
-    for name in names:
-        for seed in range(first, first + 2 * arguments.seeds, 2):
-            rows += observe(name, seed, arguments.engines.split(","))
+    scenes = [(name, seed) for name in names for seed in range(first, first + 2 * arguments.seeds, 2)]
+    forecast = partial(cases_of, engines=arguments.engines.split(","), fresh=arguments.fresh)
+    cases: list[Case] = []
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        for (name, seed), found in zip(scenes, pool.map(forecast, *zip(*scenes, strict=True)), strict=True):
+            cases += found
             print(f"\r\033[K{name} {seed}", end="", file=sys.stderr, flush=True)
     print("\r\033[K", end="", file=sys.stderr)
-    found = summary(rows)
-    wrong = [row for row in rows if row.foretold != row.happened]
-    if arguments.as_json:
-        print(json.dumps({"half": arguments.half, **found, "wrong": [vars(row) for row in wrong]}, indent=1))
-        return 0
-    for title, tables in found.items():
-        print(f"\n{title:<28}{'came':>6}{'did not':>9}{'unforeseen':>12}{'silent':>8}{'precision':>11}{'recall':>8}")
-        for name, each in tables.items():
-            counts = [each[key] for key in ("true_positives", "false_positives", "false_negatives", "true_negatives")]
-            ratios = ("–" if each[key] is None else f"{each[key]:.1%}" for key in ("precision", "recall"))
-            print(
-                f"{name:<28}{counts[0]:>6}{counts[1]:>9}{counts[2]:>12}{counts[3]:>8}" + "{:>11}{:>8}".format(*ratios)
-            )
-    for row in wrong:
-        label = "unforeseen" if row.happened else "false alarm"
-        print(f"{label}: {row.trouble} in {row.kind}, seed {row.seed}, on {row.engine}", file=sys.stderr)
+    scores = summary(cases)
+    print_summary(scores)
+    for each in cases:
+        if each.frequency >= 0.5 and not each.is_warned("check"):
+            print(f"unforeseen: {each.trouble} in {each.kind}, seed {each.seed}, on {each.engine}", file=sys.stderr)
+        if each.is_warned("check") and not each.happened:
+            print(f"false alarm: {each.trouble} in {each.kind}, seed {each.seed}, on {each.engine}", file=sys.stderr)
+    if arguments.json:
+        arguments.json.write_text(
+            json.dumps({"half": arguments.half, "cases": [asdict(each) for each in cases]}, indent=1)
+        )
+    if arguments.plot:
+        plot(scores, arguments.plot)
     return 0
 
 

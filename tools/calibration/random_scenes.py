@@ -1,4 +1,4 @@
-"""Random scenes of 43 kinds for the calibration of forecasts: common set-ups with random sizes and speeds.
+"""Random scenes of 51 kinds for the calibration of forecasts: common set-ups with random sizes and speeds.
 
 A kind is a function of a random generator that returns a scene document; its name seeds the generator. The scenes are
 independent of the matrix of `sandbox extremes`. Some are longer than a trial run of `sandbox check`.
@@ -539,3 +539,77 @@ def box_on_ramp(random: Random) -> Document:
     position = [math.sin(tilt) * size / 2, math.cos(tilt) * size / 2]
     crate = {"position": position, "size": [size, size], "angle": -tilt, "friction": 1.0}
     return {"world": world(2.5), "plane": [slope], "box": [crate]}
+
+
+# Features that no forecast was fitted to
+
+
+@kind
+def kinematic_paddle(random: Random) -> Document:
+    length, spin = log(random, 0.5, 2), log(random, 1, 40)
+    paddle = {"name": "paddle", "position": [0, 0], "size": [length, log(random, 0.03, 0.2)], "kinematic": True}
+    loose = [ball(x, 2.0 + abs(x), log(random, 0.05, 0.2), restitution=0.5) for x in (-0.4, 0.3)]
+    return {"world": world(2.0), "box": [{**paddle, "angular_velocity": spin}], "ball": loose}
+
+
+@kind
+def kinematic_platform(random: Random) -> Document:
+    speed = log(random, 0.5, 20) * float(random.choice([-1, 1]))
+    platform = {"name": "platform", "position": [-speed, 1], "size": [3, log(random, 0.02, 0.2)], "kinematic": True}
+    crates = [{"position": [0.3 * k, 2.0 + 0.5 * k], "size": [0.25, 0.25], **bodies(random)} for k in range(2)]
+    return {"world": world(2.0), "box": [{**platform, "velocity": [speed, 0]}, *crates], "plane": [ground()]}
+
+
+@kind
+def sleeping_tower(random: Random) -> Document:
+    scene = tower(random)
+    return {**scene, "solver": {**scene.get("solver", {}), "dt": steps(random), "sleeping": True}}
+
+
+@kind
+def sleepers_struck(random: Random) -> Document:
+    crates = [{"name": f"crate {k}", "position": [0, 0.25 + 0.5 * k], "size": [0.5, 0.5]} for k in range(3)]
+    shot = ball(-8.0, 0.6, log(random, 0.05, 0.2), velocity=[log(random, 5, 60), 2.0], mass=log(random, 0.1, 5))
+    solver = {"dt": steps(random), "sleeping": True}
+    return {"world": world(3.0), "plane": [ground()], "box": crates, "ball": [shot], "solver": solver}
+
+
+@kind
+def categories_of_bullets(random: Random) -> Document:
+    wall = upright(0.6, log(random, 0.005, 0.1), categories=["wall"], mask=["heavy"])
+    balls = [
+        ball(-1, y, log(random, 0.03, 0.1), velocity=[log(random, 5, 100), 0], categories=[name], mask=["wall"])
+        for y, name in ((-1, "heavy"), (0, "light"), (1, "heavy"))
+    ]
+    return {"world": {"duration": 1.0}, "wall": [wall], "ball": balls}
+
+
+@kind
+def limited_door(random: Random) -> Document:
+    door = {"name": "door", "position": [0.5, 0], "size": [1.0, 0.08], "mass": 2.0}
+    pivot = {"kind": "pivot", "between": ["door"], "at": [0, 0]}
+    limit = {"kind": "rotary_limit", "between": ["door"], "least": -0.8, "most": 0.8}
+    shot = ball(0.8, 3.0, log(random, 0.05, 0.2), velocity=[0, -log(random, 3, 60)], mass=log(random, 0.2, 20))
+    return {"world": {"duration": 1.5}, "box": [door], "joint": [pivot, limit], "ball": [shot]}
+
+
+@kind
+def sliding_limit(random: Random) -> Document:
+    bob = ball(0.0, -0.5, 0.1, name="bob", mass=log(random, 0.2, 20), velocity=[log(random, 1, 20), 0])
+    string = {"kind": "slide", "between": ["bob"], "anchors": [[0, 0], [0, 0]], "least": 0.0, "most": 1.0}
+    return {"world": world(3.0), "ball": [bob], "joint": [string]}
+
+
+@kind
+def conveyor(random: Random) -> Document:
+    belt = {"name": "belt", "points": [[-3, 0], [3, 0]], "thickness": log(random, 0.02, 0.2), "friction": 0.8}
+    crates = [
+        {"position": [0.7 * k - 1, 0.5 + log(random, 0.05, 3)], "size": [0.3, 0.3], "friction": 0.8} for k in (0, 1)
+    ]
+    floor = {"point": [0, -1], "normal": [0, 1]}
+    return {
+        "world": world(2.5),
+        "wall": [{**belt, "surface_speed": log(random, 0.2, 10)}],
+        "box": crates,
+        "plane": [floor],
+    }

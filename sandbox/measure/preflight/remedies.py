@@ -65,7 +65,7 @@ class RemedyTrials:
                 yield "substeps", settings.substeps * 2**doubling
 
     def _starts_with(self, found: Diagnostic, settings: Settings) -> Proportion:
-        """Return in how many starts a problem occurs with settings, up to the first; without trials if none is allowed."""
+        """Return in how many starts a problem occurs with settings, up to the first; of 0 if no run is affordable."""
         ensemble = self.ensemble
         shown = ensemble.starts_with(found)
         order = [*shown, *(k for k in range(len(ensemble.findings)) if k not in shown)]

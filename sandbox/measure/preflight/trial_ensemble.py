@@ -22,7 +22,7 @@ from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
-STARTS_EFFORT = 0.7
+STARTS_EFFORT = 1.0
 """s, counted work of the trial runs from other starts than that of the file."""
 PREPARATION, PREPARATION_OF_BODY = 4e-3, 3e-5
 """s, counted for the preparation of a run from a start, and for each body of it."""
