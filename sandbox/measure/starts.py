@@ -7,7 +7,7 @@ its steps begin. `Starts` draws starts by their numbers. Number 0 is the start i
   width of a body in the scene,
 - each velocity changed by up to `spread` of its value, and that of a free body turned by up to `spread` rad,
 - free bodies turned by up to half a degree for a spread of 1 %, and moved on by a part of a step of free motion,
-  so that the steps fall elsewhere in the motion,
+  so that the steps fall elsewhere in the motion; these parts divide the step evenly, however many starts there are,
 - groups that hang at one point of the world turned about it by up to half a degree,
 - another seed, if the scene has random bodies.
 
@@ -49,6 +49,9 @@ TURN_PER_SPREAD = 0.87
 """rad: a spread of 1 % turns free bodies by up to half a degree"""
 SEED_COUNT = 2**63
 """Seeds wrap around to 0."""
+GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Difference of the phases of successive starts, in steps: the phases of any number of starts divide the step evenly,
+so that they estimate odds better than random ones."""
 MAX_WIDTHS = 16.0
 """Largest free motion before the start, in half widths of the body; more takes long to check for what is in its way"""
 STRETCH_TOLERANCE = 1e-9
@@ -65,6 +68,9 @@ class Starts:
     scene: Scene
     spread: float = DEFAULT_SPREAD
     """largest change, as a fraction; 0: all starts are that of the file, but for the seed"""
+    step: float | None = None
+    """s, a part of which free bodies are moved on; default: the dt of the scene. It should be the longest dt of the
+    runs, so that each phase of their steps occurs"""
 
     def __post_init__(self) -> None:
         """Raise ValueError if the spread is not from 0 to `MAX_SPREAD`."""
@@ -138,7 +144,7 @@ class Starts:
         # Numbers for all bodies, so that those of one do not depend on the state of another.
         heading, length = 2.0 * math.pi * random.uniform(size=len(own)), np.sqrt(random.uniform(size=len(own)))
         factor, turn, rotation = random.uniform(-1.0, 1.0, (3, len(own)))
-        time = random.uniform() * scene.solver.dt
+        time = number * GOLDEN_RATIO % 1.0 * (scene.solver.dt if self.step is None else self.step)
         factor = 1.0 + self.spread * factor[group]  # one for joined bodies, so that they keep moving together
         velocity = own.velocity * factor[:, None]
         velocity[free] = _rotated(velocity, self.spread * turn)[free]
@@ -237,7 +243,7 @@ def _without_faults(base: _Unperturbed, changed: Bodies, free: BoolArray) -> Bod
 
 def _limited(vectors: FloatArray, lengths: FloatArray) -> FloatArray:
     """Return vectors, (N, 2), shortened to lengths, (N,)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         factor = np.fmin(1.0, lengths / np.hypot(*vectors.T))
     return np.asarray(vectors * factor[:, None])
 

@@ -72,9 +72,16 @@ def test_warning_has_kind_message_and_odds(capfd: pytest.CaptureFixture[str]) ->
     (warning,) = document["warnings"]
     assert warning["kind"] == "tunnelling"
     assert warning["odds"] == pytest.approx(0.8, abs=1e-12)  # 1 − 0.02/(100·0.001), to rounding
-    assert warning["message"].endswith("odds up to 80 %; dt <= 0.0002 s is safe")
+    assert "undetected: odds up to 80 %; occurs in " in warning["message"]
+    assert (warning["seen"]["engine"], warning["seen"]["until"]) == ("pymunk", None)
+    assert warning["seen"]["starts"]["probability"] == pytest.approx(
+        0.8, abs=2 / 30
+    )  # the phases divide the step evenly
+    (remedy,) = warning["remedies"]
+    assert (remedy["name"], remedy["starts"]["hits"]) == ("dt", 0)
+    assert f"with solver.dt = {remedy['value']:g} in none of 30 starts" in warning["message"]
     assert document["safe_dt"] == pytest.approx(0.0002, rel=1e-12)  # rounding of a quotient
-    _, document, _ = json_of(capfd, "check", "bullet", "--set", "solver.dt=0.0002")
+    _, document, _ = json_of(capfd, "check", "bullet", "--set", "solver.dt=0.0001")
     assert document["warnings"] == []
 
 
@@ -91,7 +98,7 @@ def test_demands_and_engines_are_printed_one_per_line(tmp_path: Path, capfd: pyt
     status, out, err = lines_of(capfd, "check", scene, "-v")
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
     # all kinds of joints are one line if the scene has none
-    engines_begin = 1 + len(Demand) - len(JOINTS | JOINT_LIMITS) + 1
+    engines_begin = 2 + len(Demand) - len(JOINTS | JOINT_LIMITS) + 1
     marks = {line.split()[1]: line.split()[0] for line in out[1:engines_begin]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
     assert out[engines_begin : engines_begin + len(ENGINES)] == [
@@ -123,9 +130,9 @@ def test_trial_run_names_the_balls_that_pass_through(tmp_path: Path, capfd: pyte
     text = '[world]\nduration = 1.0\n[[wall]]\nname = "w"\npoints = [[1, -9], [1, 9]]\nthickness = 0.02\n'
     for k, (name, speed) in enumerate((("slow", 9.0), ("middle", 25.0), ("fast", 60.0))):
         text += f'[[ball]]\nname = "{name}"\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n'
-    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text))
-    assert document["trial"] == {"engine": "pymunk", "duration": 1.0, "whole": True}
-    passed = [(w["ball"], w["thing"]) for w in document["warnings"] if "seen_at" in w]
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text), "--starts", "1")
+    assert document["trial"] == {"engine": "pymunk", "duration": 1.0, "whole": True, "starts": 1, "spread": 0.01}
+    passed = [(w["ball"], w["thing"]) for w in document["warnings"] if w.get("seen", {}).get("starts", {}).get("hits")]
     result = run(load(write_scene(tmp_path, text)))
     assert passed == [(result.names[a], "w") for a, _ in result.missed_pair.tolist()]
     assert len(passed) > 0

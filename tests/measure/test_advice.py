@@ -91,7 +91,8 @@ def test_remedy_of_a_ball_that_tunnels_removes_it() -> None:
     assert advice.present.missed_contacts == 1
     assert not advice.is_within_tolerance(advice.present)
     first = advice.risks[0]
-    assert (first.kind, first.element, first.is_observed, first.odds) == ("tunnelling", "bullet", True, 1.0)
+    assert (first.kind, first.element, first.is_observed) == ("tunnelling", "bullet", True)
+    assert first.odds == pytest.approx(1.0 - 0.055 * FPS / 20.0, abs=2 / 30)  # 30 starts with evenly divided phases
     assert first.safe_substeps == math.ceil(20.0 / FPS / (0.05 + 0.005))  # v·h ≤ r + half the thickness
     chosen = advice.recommended
     again = sandbox.run(scene_of(BULLET), "pymunk", **chosen.asked.model_dump())

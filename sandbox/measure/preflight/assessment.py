@@ -46,6 +46,10 @@ FORMULA_KINDS = REFUTABLE | {"entry", "lift", "kick_threshold"}
 """Kinds of diagnostics that predict, from formulas, what may happen; the others state what is so at the start."""
 
 
+MIN_ODDS = 0.05
+"""Smallest odds of a formula that make a warning; one with smaller odds is a note, unless a trial run shows it."""
+
+
 class TrialCoverage(NamedTuple):
     """Engine, duration and number of trial runs."""
 
@@ -147,7 +151,9 @@ def _merge(
             refuted.append(judged)
         else:
             kept.append(replace(by_formula, seen=occurrence))
-    return [*kept, *at_risk.rest(), *others.rest()], [_note(each) for each in refuted]
+    rare = [each for each in kept if not each.is_observed and float(each.details.get("odds", 1.0)) < MIN_ODDS]
+    found = [*(each for each in kept if each not in rare), *at_risk.rest(), *others.rest()]
+    return found, [*map(_note, refuted), *rare]
 
 
 class _Families:

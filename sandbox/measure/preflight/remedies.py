@@ -35,42 +35,50 @@ class RemedyTrials:
     def with_tried(self, found: Diagnostic) -> Diagnostic:
         """Return a diagnostic of a problem that occurs, with the remedies that were tried, up to one that holds."""
         tried: list[TriedRemedy] = []
-        for name, value in self._candidates(found):
-            try:
-                settings = self.ensemble.settings.replace(**{name: value})
-            except SettingsError:  # more than a setting may have
-                continue
+        for settings, name in self._candidates(found):
             count = self._starts_with(found, settings)
-            if not count.trials:  # the effort is used up
-                break
-            tried.append(TriedRemedy(name, value, count))
+            if not count.trials:
+                continue
+            tried.append(TriedRemedy(name, getattr(settings, name), count))
             if tried[-1].holds:
                 break
         return replace(found, tried=tuple(tried)) if tried else found
 
-    def _candidates(self, found: Diagnostic) -> Iterator[tuple[str, float]]:
-        """Yield names and values of settings: those of the formulas, and ever shorter substeps."""
-        settings, details = self.ensemble.settings, found.details
-        for name in ("iterations", "substeps"):
-            if name in details and int(details[name]) > getattr(settings, name):
-                yield name, int(details[name])
+    def _candidates(self, found: Diagnostic) -> Iterator[tuple[Settings, str]]:
+        """Yield settings with one change and the name of it: those of formulas, cheapest first, then shorter steps."""
+        own, details = self.ensemble.settings, found.details
+        predicted = [self._changed(name, int(details[name])) for name in ("substeps", "iterations") if name in details]
         safe_dt = float(details.get("safe_dt", 0.0)) / (1.0 + MARGIN * self.ensemble.starts.spread)
-        if 0.0 < safe_dt < settings.dt:
-            yield "dt", float(floor_3_digits(safe_dt))
-        by_step = found.kind in NAMING_KINDS and self.ensemble.engine in ONE_DETECTION_PER_STEP
-        for doubling in range(1, MAX_DOUBLINGS + 1):
-            if by_step:
-                yield "dt", float(floor_3_digits(settings.dt / 2**doubling))
-            else:
-                yield "substeps", settings.substeps * 2**doubling
+        predicted += [self._changed("dt", float(floor_3_digits(safe_dt)))] if 0.0 < safe_dt < own.dt else []
+        yield from sorted((each for each in predicted if each), key=lambda each: self._factor(each[0]))
+        by_dt = found.kind in NAMING_KINDS and self.ensemble.engine in ONE_DETECTION_PER_STEP
+        for power in range(1, MAX_DOUBLINGS + 1):
+            shorter = float(floor_3_digits(own.dt / 2**power))
+            changed = self._changed("dt", shorter) if by_dt else self._changed("substeps", own.substeps * 2**power)
+            if changed:
+                yield changed
+
+    def _changed(self, name: str, value: float) -> tuple[Settings, str] | None:
+        """Return settings with one change, and its name; None if the value is no change, or not allowed."""
+        own = self.ensemble.settings
+        if getattr(own, name) == value or (name != "dt" and value < getattr(own, name)):
+            return None
+        try:
+            return own.replace(**{name: value}), name
+        except SettingsError:
+            return None
+
+    def _factor(self, settings: Settings) -> float:
+        """Return an upper bound of the work with settings relative to that of the ensemble."""
+        own = self.ensemble.settings
+        return max(1.0, settings.iterations / own.iterations * own.h / settings.h)
 
     def _starts_with(self, found: Diagnostic, settings: Settings) -> Proportion:
         """Return in how many starts a problem occurs with settings, up to the first; of 0 if no run is affordable."""
         ensemble = self.ensemble
         shown = ensemble.starts_with(found)
         order = [*shown, *(k for k in range(len(ensemble.findings)) if k not in shown)]
-        factor = settings.iterations / ensemble.settings.iterations * ensemble.settings.h / settings.h
-        cost, tried, hits = ensemble.run_cost * max(1.0, factor) + ensemble.preparation, 0, 0
+        cost, tried, hits = ensemble.run_cost * self._factor(settings) + ensemble.preparation, 0, 0
         for number in order:
             if cost > self.left or hits:
                 break
