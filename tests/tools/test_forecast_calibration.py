@@ -1,4 +1,4 @@
-"""Calibration of forecasts: random scenes are valid and reproducible; scores from known cases and on the held-out half."""
+"""Calibration of forecasts: valid and reproducible scenes; scores of known cases and of the held-out half."""
 
 import numpy as np
 import pytest

@@ -44,7 +44,7 @@ MAX_STACK_DISPLACEMENT = 0.5
 """A stack has fallen if one of its bodies has moved by a larger fraction of its width."""
 
 
-class Stack(NamedTuple):
+class StackedBodies(NamedTuple):
     """Bodies that rest on each other at the start of a scene."""
 
     bodies: IntArray
@@ -53,7 +53,7 @@ class Stack(NamedTuple):
 
 
 @derived_once
-def _stack_of(setup: Setup) -> Stack | None:
+def _stack_of(setup: Setup) -> StackedBodies | None:
     """Return the bodies of a scene that should stay where they are; None if there are none, or something drives it."""
     scene, bodies = setup.scene, setup.scene.bodies
     if not any(scene.world.gravity) or bodies.round.all() or (bodies.velocity[~bodies.fixed] != 0.0).any():
@@ -67,7 +67,7 @@ def _stack_of(setup: Setup) -> Stack | None:
         return None
     both = ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
     mass_a, mass_b = bodies.mass[close.first[both]], bodies.mass[close.second[both]]
-    return Stack(stacked, float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0)))
+    return StackedBodies(stacked, float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0)))
 
 
 @dataclass(frozen=True)
