@@ -33,6 +33,7 @@ import numpy as np
 
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.energy import energies
+from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
 from sandbox.measure.preflight import Diagnostic, run_preflight, warnings
 from sandbox.measure.proportion import Proportion
 from sandbox.measure.run.runner import run
@@ -54,7 +55,7 @@ TROUBLES = {
     "spring": "energy",
     "energy": "energy",
     "iterations": "energy",
-    "diverged": "energy",
+    "diverged": "divergence",
     "orbit": "energy",
     "event_rate": "events",
 }
@@ -151,8 +152,7 @@ def odds_of(scene: Scene, found: Iterable[Diagnostic]) -> dict[str, float]:
     for each in found:
         if (trouble := trouble_of(scene, each.kind)) is None:
             continue
-        odds = each.seen.starts.probability if each.seen and each.is_observed else float(each.details.get("odds", -1.0))
-        stated[trouble] = max(stated.get(trouble, -1.0), odds)
+        stated[trouble] = max(stated.get(trouble, -1.0), -1.0 if each.odds is None else each.odds)
     return stated
 
 
@@ -169,18 +169,20 @@ def judge(scene: Scene, done: Trajectory, engine: str) -> dict[str, bool]:
     if engine == "exact":
         return {"events": done.status == "failed"}
     completed = done.status == "ok" and bool(np.isfinite(done.position).all())
-    found = {"energy": not completed or energy_gain(scene, done) > ENERGY_GAIN}
+    found = {"divergence": not completed, "energy": completed and energy_gain(scene, done) > ENERGY_GAIN}
     if contact_matrix(scene).touches.any():
         found["tunnelling"] = len(done.missed_time) > 0
     if scene.planes:
         found["depth"] = completed and is_behind_plane(scene, done)
-    if len(scene.joint_arrays):
+    if len(scene.joint_arrays.of(*CONSTRAINT_KINDS)):
         error = done.info["joint_error"]
-        found["joint"] = not completed or (error is not None and not error <= JOINT_OFF)
+        found["joint"] = completed and error is not None and not error <= JOINT_OFF
     starts_at_rest = not scene.bodies.velocity.any() and not scene.bodies.fixed.any()
-    if (scene.stacks or len(scene.boxes) > 1) and starts_at_rest and not (scene.balls or scene.thrusts or scene.joints):
+    is_carried = any(each.surface_speed for each in scene.fixed)
+    others = scene.balls or scene.thrusts or scene.joints or is_carried
+    if (scene.stacks or len(scene.boxes) > 1) and starts_at_rest and not others:
         displacement = np.hypot(*np.moveaxis(done.position - done.position[0], 2, 0)).max(axis=0)
-        found["stack"] = not completed or bool((displacement > MOVED * 2.0 * scene.bodies.thin).any())
+        found["stack"] = completed and bool((displacement > MOVED * 2.0 * scene.bodies.thin).any())
     # Broken joints and falling stacks gain energy too, which counts as one trouble.
     if "joint" in found or "stack" in found:
         del found["energy"]

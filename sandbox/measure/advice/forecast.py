@@ -84,14 +84,13 @@ def _ordered(found: Iterable[Diagnostic], settings: Settings, engine: str, fps: 
 
 def _risk(found: Diagnostic, settings: Settings, engine: str, fps: float) -> Risk:
     details = found.details
-    odds = found.seen.starts.probability if found.seen and found.is_observed else details.get("odds")
     # Some engines detect contacts once a step, so that substeps do not prevent tunnelling.
     has_effect = found.kind not in DETECTION_KINDS or intervals(settings.replace(substeps=2), engine) == 2
     element = next((str(details[key]) for key in ELEMENT_KEYS if key in details), None)
     return Risk(
         kind=found.kind,
         element=element,
-        odds=None if odds is None else min(float(odds), 1.0),
+        odds=found.odds,
         is_observed=found.is_observed,
         message=found.message,
         safe_substeps=_safe_substeps(details.get("safe_dt"), settings, fps) if has_effect else None,

@@ -47,7 +47,7 @@ FORMULA_KINDS = REFUTABLE | {"entry", "lift", "kick_threshold"}
 
 
 MIN_ODDS = 0.05
-"""Smallest odds of a formula that make a warning; one with smaller odds is a note, unless a trial run shows it."""
+"""Smallest odds that make a warning; a problem with smaller ones is a note, unless the start of the file shows it."""
 
 
 class TrialCoverage(NamedTuple):
@@ -69,7 +69,7 @@ class PreflightResult(NamedTuple):
 
     warnings: list[Diagnostic]
     refuted: list[Diagnostic]
-    """notes: diagnostics of the formulas that trial runs of the whole scene did not show"""
+    """notes: diagnostics of the formulas that trial runs of the whole scene did not show, and rare problems"""
     tried: TrialCoverage | None
     """the trial runs; None if there were none"""
 
@@ -151,9 +151,15 @@ def _merge(
             refuted.append(judged)
         else:
             kept.append(replace(by_formula, seen=occurrence))
-    rare = [each for each in kept if not each.is_observed and float(each.details.get("odds", 1.0)) < MIN_ODDS]
-    found = [*(each for each in kept if each not in rare), *at_risk.rest(), *others.rest()]
-    return found, [*map(_note, refuted), *rare]
+    found = [*kept, *at_risk.rest(), *others.rest()]
+    rare = [each for each in found if is_rare(each)]
+    return [each for each in found if each not in rare], [*map(_note, refuted), *rare]
+
+
+def is_rare(found: Diagnostic) -> bool:
+    """Return whether the odds of a problem are below `MIN_ODDS`, and the start of the file does not show it."""
+    in_file = found.seen is not None and found.seen.in_file
+    return found.odds is not None and found.odds < MIN_ODDS and not in_file
 
 
 class _Families:

@@ -26,6 +26,8 @@ class Occurrence:
     """s, duration of the trial runs; None: that of the scene"""
     starts: Proportion
     """starts in which it occurs"""
+    in_file: bool
+    """whether it occurs from the start of the file"""
     event: str = "occurs"
     """what occurs, as a clause, such as `energy rises by a fraction 0.3 of the exchanged energy`"""
 
@@ -89,6 +91,14 @@ class Diagnostic:
     def is_observed(self) -> bool:
         """Whether a trial run showed it."""
         return self.seen is not None and self.seen.starts.hits > 0
+
+    @property
+    def odds(self) -> float | None:
+        """Odds that the problem occurs: the fraction of the trial runs that show it, or an upper bound by a formula."""
+        if self.seen is not None and self.is_observed:
+            return self.seen.starts.probability
+        odds = self.details.get("odds")
+        return None if odds is None else float(odds)
 
     def _clauses(self) -> Iterator[str]:
         yield self.problem

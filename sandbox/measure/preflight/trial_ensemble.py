@@ -74,8 +74,9 @@ class TrialEnsemble:
 
     def occurrence(self, starts: Iterable[int], event: str = "occurs") -> Occurrence:
         """Return the frequency of a problem that occurs in some of the starts, by their numbers."""
-        count = Proportion(len(set(starts)), len(self.findings))
-        return Occurrence(self.engine, None if self.whole else self.duration, count, event)
+        numbers = set(starts)
+        count = Proportion(len(numbers), len(self.findings))
+        return Occurrence(self.engine, None if self.whole else self.duration, count, 0 in numbers, event)
 
     def starts_with(self, problem: Diagnostic) -> list[int]:
         """Return the starts in which the problem of a diagnostic occurs, of any body, or in which the run diverges."""
