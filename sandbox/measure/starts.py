@@ -16,12 +16,14 @@ such as a rope between two posts, start as in the file.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
 import numpy as np
 
+from sandbox.action import Action
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.formatting import format_quantity
 from sandbox.measure.metrics.clearance import IndexPair, close_pairs
@@ -128,6 +130,21 @@ class Starts:
             return scene
         random = draws(Stream.STARTS, self.scene.world.seed, number)
         return scene.started_from(self._changed(scene, random, number))
+
+    def actions(self, actions: Sequence[Action], number: int) -> tuple[Action, ...]:
+        """Return the actions of a player who acts up to a frame later, by a time of its own for each moment.
+
+        Args:
+            actions: those for start 0, in the order of their times.
+            number: of the start; 0 changes nothing.
+        """
+        if number == 0 or not actions or not self.spread:
+            return tuple(actions)
+        random = draws(Stream.REACTIONS, self.scene.world.seed, number)
+        moments, moment = np.unique([each.time for each in actions], return_inverse=True)
+        step = self.scene.solver.dt if self.step is None else self.step
+        later = np.maximum.accumulate(moments + step * random.uniform(size=len(moments)))
+        return tuple(each.at(time) for each, time in zip(actions, later[moment].tolist(), strict=True))
 
     def _movable(self, bodies: Bodies) -> BoolArray:
         return ~(bodies.fixed | is_driven(self.scene, bodies))

@@ -55,6 +55,8 @@ class Stream(Enum):
     """variations of the starts of an ensemble, by the varied quantity"""
     STARTS = 0x73746172
     """perturbed starts of a scene, by their numbers"""
+    REACTIONS = 0x72656163
+    """times of a player's actions in perturbed starts, by their numbers"""
     KEYS = 0x706C6179
     """keys of a random player"""
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sandbox
+from sandbox.action import Impulse
 from sandbox.engines.registry import able, start
 from sandbox.measure.metrics.clearance import close_pairs
 from sandbox.measure.proportion import wilson_interval
@@ -83,6 +84,40 @@ def test_free_bodies_move_within_the_spread_and_a_step_of_free_motion() -> None:
     assert 0.9 * (reach - starts.distance) < along.max() < reach
     assert np.abs(np.array(angles)).max() == pytest.approx(0.02 * 0.87, rel=0.02)  # 400 draws reach the bound
     assert np.ptp(speeds) / 5.0 == pytest.approx(2 * 0.02, rel=0.5)  # and the fall of up to a step
+
+
+@pytest.mark.parametrize(("step", "count"), [(None, 30), (0.04, 30), (0.04, 50)])
+def test_phases_of_successive_starts_divide_the_step_evenly(step: float | None, count: int) -> None:
+    """Multiples of the golden ratio leave no gap over 1.9 times the mean one (three-distance theorem)."""
+    scene = loads(
+        toml("world", gravity=[0.0, -10.0], duration=1.0)
+        + toml("solver", dt=0.01)
+        + toml("ball", name="a", position=[0.0, 5.0], radius=1.0)
+    )
+    starts, length = Starts(scene, 1e-6, step), 0.01 if step is None else step
+    gained = [-starts.start(number).bodies.velocity[0, 1] / 10.0 for number in range(count)]
+    edges = np.sort([*gained, length])
+    assert np.diff(edges).max() < 1.9 * length / count
+    assert edges[0] == 0.0
+    assert edges[-2] < length
+
+
+def test_actions_come_up_to_a_frame_later_in_the_same_order() -> None:
+    scene = load("bounce")
+    times = [0.0, 0.0, 0.5, 0.502, 0.9]
+    actions = [Impulse(time=time, body="ball", impulse=(float(k), 0.0)) for k, time in enumerate(times)]
+    starts = Starts(scene, step=0.02)
+    assert starts.actions(actions, 0) == tuple(actions)
+    assert starts.actions(actions, 7) == starts.actions(actions, 7) != starts.actions(actions, 8)
+    delays = []
+    for number in range(1, 200):
+        changed = starts.actions(actions, number)
+        assert [each.impulse for each in changed] == [each.impulse for each in actions]
+        moved = [each.time for each in changed]
+        assert moved == sorted(moved)
+        assert moved[0] == moved[1]  # what comes at once stays together
+        delays.append(moved[4] - times[4])
+    assert (min(delays), max(delays)) == (pytest.approx(0.0, abs=0.001), pytest.approx(0.02, abs=0.001))  # 199 draws
 
 
 def test_a_fast_body_does_not_start_behind_a_wall() -> None:
