@@ -19,6 +19,9 @@ from sandbox.scene.files.document import check_text
 SLACK = 2.0
 """Multiple of the tolerance by which a boundary may differ: the old and the new one each have this tolerance."""
 
+STORED_KEYS = ("tolerance", "starts", "spread", "timeout", "memory", "versions", "machine")
+"""Keys of the document that are stored with the boundaries."""
+
 MAX_BYTES = 64 * 2**20
 
 StoredBoundaries = Sequence[Mapping[str, Any]]
@@ -64,7 +67,7 @@ def store(result: Extremes, path: str | Path, others: StoredBoundaries = ()) -> 
         others: further boundaries, of other axes.
     """
     whole_document = result.document()
-    kept = {key: whole_document[key] for key in ("tolerance", "timeout", "memory", "versions", "machine")}
+    kept = {key: whole_document[key] for key in STORED_KEYS}
     limits = [*map(dict, others), *whole_document["limits"]]
     order = list(AXES)
     document = {**kept, "limits": sorted(limits, key=lambda limit: order.index(limit["axis"]))}

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale, Scenario
+from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale
 from sandbox.measure.extremes.outcome import Outcome, PairSample, Sample, Task
 from sandbox.measure.extremes.survival import RunStart, StartSampling, Survival, survival, survival_bounds
 from sandbox.measure.proportion import Proportion
@@ -101,7 +101,8 @@ def run_axis(
     survivals: dict[float, Survival] = {}
 
     def run_start(level: float) -> RunStart:
-        return _run_start(axis.case, {axis.parameter: level}, setup, overrides, submit, sampling)
+        task = Task(axis.case.name, {axis.parameter: level}, setup.engine, dict(setup.changes), overrides)
+        return lambda number: submit(replace(task, start=number, spread=sampling.spread))
 
     def keep(level: float, found: Survival) -> Sample:
         survivals[level] = found
@@ -156,37 +157,14 @@ def _survived_at(level: float | None, samples: Mapping[float, Sample]) -> Propor
 
 
 def run_pair(
-    pair: AxisPair,
-    setup: EngineSetup,
-    overrides: tuple[str, ...],
-    submit: Submit,
-    on_sample: OnSample,
-    sampling: StartSampling | None = None,
+    pair: AxisPair, setup: EngineSetup, overrides: tuple[str, ...], submit: Submit, on_sample: OnSample
 ) -> None:
-    """Run every combination of a pair's levels on an engine configuration, from starts as in `run_axis`."""
-    sampling = sampling or StartSampling(1)
+    """Run every combination of a pair's levels on an engine configuration, from the start of the scene only."""
     for both in pair.levels:
         parameters = {pair.first.parameter: both[0], pair.second.parameter: both[1]}
-        found = survival(_run_start(pair.case, parameters, setup, overrides, submit, sampling), sampling)
-        names, settings = (pair.first.parameter, pair.second.parameter), dict(setup.changes)
-        on_sample(
-            PairSample(pair.name, both, setup.engine, settings, setup.name, found.outcome(), found.survived, axes=names)
-        )
-
-
-def _run_start(
-    scenario: Scenario,
-    parameters: dict[str, float],
-    setup: EngineSetup,
-    overrides: tuple[str, ...],
-    submit: Submit,
-    sampling: StartSampling,
-) -> RunStart:
-    def run_start(number: int) -> Outcome:
-        changes = dict(setup.changes)
-        return submit(Task(scenario.name, parameters, setup.engine, changes, overrides, number, sampling.spread))
-
-    return run_start
+        outcome = submit(Task(pair.case.name, parameters, setup.engine, dict(setup.changes), overrides))
+        names = pair.first.parameter, pair.second.parameter
+        on_sample(PairSample(pair.name, both, setup.engine, dict(setup.changes), setup.name, outcome, axes=names))
 
 
 def find_boundary(

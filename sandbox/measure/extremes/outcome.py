@@ -90,7 +90,7 @@ class Sample:
     """name of the engine configuration"""
     outcome: Outcome = field(metadata=in_json(inline=True))
     survived: Proportion | None = None
-    """starts in which no rule was broken; None if the engine refused the level"""
+    """starts in which no rule was broken; None if the engine refused the level, and for pairs, which are run once"""
 
     @property
     def verdict(self) -> Verdict:

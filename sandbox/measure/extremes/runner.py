@@ -92,7 +92,7 @@ class ExtremesPlan:
     quick: bool = False
     """few levels, and no bisection between them"""
     starts: int = LEVEL_STARTS
-    """number of perturbed starts of a level; fewer where they cost much; 1: the start of the scene only"""
+    """number of perturbed starts of a level of an axis; fewer where runs cost much; 1: the start of the scene only"""
     spread: float = DEFAULT_SPREAD
     """largest change of a start, as in `Starts`"""
     seconds: float = field(default=SAMPLE_SECONDS, metadata=in_json(key="timeout"))
@@ -236,7 +236,7 @@ def _axis_job(plan: ExtremesPlan, axis: Axis, setup: EngineSetup) -> SampleJob:
 
 def _pair_job(plan: ExtremesPlan, pair: AxisPair, setup: EngineSetup) -> SampleJob:
     def job(submit: Submit, on_sample: OnSample) -> Boundary | None:
-        run_pair(pair, setup, plan.overrides, submit, on_sample, plan.sampling)
+        run_pair(pair, setup, plan.overrides, submit, on_sample)
         return None
 
     return job
