@@ -187,7 +187,7 @@ def _reached(limit: Boundary) -> str:
 
 def _bounds(limit: Boundary) -> str:
     """Return the levels between which survival falls below 95 %, unless they are the two at the boundary."""
-    if limit.bounds == (limit.limit, limit.first_failure):
+    if limit.bounds in (None, (limit.limit, limit.first_failure)):
         return ""
     low, high = (format_optional(level, ".4g") for level in limit.bounds)
     return f" ({low} to {high})"

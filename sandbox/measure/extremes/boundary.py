@@ -56,9 +56,10 @@ class Boundary:
     refused: bool = False
     """whether the engine refused every level"""
     unit: str = ""
-    bounds: tuple[float | None, float | None] = (None, None)
+    bounds: tuple[float | None, float | None] | None = None
     """levels between which survival falls below 95 %, see `survival_bounds`: the hardest up to which every start
-    survived, and the easiest beyond the limit at which the interval of the fraction lies below 95 %"""
+    survived, and the easiest beyond the limit at which the interval of the fraction lies below 95 %; None if the engine
+    refused every level"""
     limit_survived: Proportion | None = None
     """starts that survived at the limit; None without a limit"""
     failure_survived: Proportion | None = None
@@ -134,6 +135,7 @@ def run_axis(
         if bracket.first_failure is not None:
             failure = samples[bracket.first_failure].outcome
             reason, rule = failure.reason, failure.rule
+    survived = {level: each.survived for level, each in samples.items()}
     return Boundary(
         axis=axis.name,
         engine=setup.engine,
@@ -146,14 +148,10 @@ def run_axis(
         monotone=bracket.monotone,
         refused=not known,
         unit=axis.unit,
-        bounds=survival_bounds({level: each.survived for level, each in samples.items()}, bracket.limit, levels),
-        limit_survived=_survived_at(bracket.limit, samples),
-        failure_survived=_survived_at(bracket.first_failure, samples),
+        bounds=survival_bounds(survived, bracket.limit, levels) if known else None,
+        limit_survived=None if bracket.limit is None else survived[bracket.limit],
+        failure_survived=None if bracket.first_failure is None else survived[bracket.first_failure],
     )
-
-
-def _survived_at(level: float | None, samples: Mapping[float, Sample]) -> Proportion | None:
-    return None if level is None else samples[level].survived
 
 
 def run_pair(
