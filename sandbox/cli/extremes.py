@@ -175,14 +175,15 @@ def _reached(limit: Boundary) -> str:
     if limit.refused:
         return f"refused: {limit.reason}"
     reached, failed = format_optional(limit.limit, ".4g"), format_optional(limit.first_failure, ".4g")
-    if limit.limit_at_equal_cost is not None and limit.cost_ratio != 1.0:
-        reached += f" ({limit.limit_at_equal_cost:.4g} at equal cost)"
+    equal = limit.limit_at_equal_cost
+    at_equal_cost = "" if equal is None or limit.cost_ratio == 1.0 else f", {equal:.4g} at equal cost"
     if limit.first_failure is None:
-        return f"all levels pass, up to {reached}"
+        return f"all levels pass, up to {reached}{at_equal_cost}"
     if limit.limit is None:
         return f"no level passes: {limit.rule}: {limit.reason}"
     beyond = "" if limit.monotone else " (levels beyond pass and fail in turn)"
-    return f"up to {reached}{_bounds(limit)}, fails at {failed}{beyond}: {limit.rule}: {limit.reason}"
+    limits = f"up to {reached}{_bounds(limit)}{at_equal_cost}, fails at {failed}{beyond}"
+    return f"{limits}: {limit.rule}: {limit.reason}"
 
 
 def _bounds(limit: Boundary) -> str:

@@ -14,7 +14,7 @@ MEANINGS: dict[Verdict, str] = {
     "exact": "within 1e-6 of the known solution",
     "degraded": "inaccurate, but no rule is broken",
     "refused": "refused before the run, with a reason",
-    "failed": "a rule is broken, or the error is too large to be useful, in more than 5 % of the starts",
+    "failed": "in more than 5 % of the starts a rule is broken, or the error is useless",
 }
 PASSED = ("exact", "degraded")
 
