@@ -63,8 +63,7 @@ class Starts:
 
     def __post_init__(self) -> None:
         """Raise ValueError if the spread is not from 0 to `MAX_SPREAD`."""
-        if not 0.0 <= self.spread <= MAX_SPREAD:
-            raise ValueError(f"spread: must be from 0 to {MAX_SPREAD:g}, such as 0.01 for 1 %; is {self.spread:g}")
+        check_spread(self.spread)
 
     @property
     def distance(self) -> float:
@@ -180,6 +179,12 @@ class Starts:
         for ends in (setup.joints.a, setup.joints.b):
             free[ends[ends != WORLD]] = False
         return free
+
+
+def check_spread(spread: float) -> None:
+    """Raise ValueError if a spread is not from 0 to `MAX_SPREAD`."""
+    if not 0.0 <= spread <= MAX_SPREAD:
+        raise ValueError(f"spread: must be from 0 to {MAX_SPREAD:g}, such as 0.01 for 1 %; is {spread:g}")
 
 
 def allowed_failures(count: int) -> int:

@@ -102,9 +102,17 @@ class ExtremesPlan:
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """number of worker processes"""
 
+    def __post_init__(self) -> None:
+        """Raise ValueError if the starts are not possible."""
+        _ = self.sampling
+
     @property
     def sampling(self) -> StartSampling:
-        """From which starts a level is run."""
+        """From which starts a level is run.
+
+        Raises:
+            ValueError: their number is not positive, or the spread is not from 0 to `MAX_SPREAD`.
+        """
         return StartSampling(self.starts, self.spread)
 
     def levels(self, axis: Axis) -> tuple[float, ...]:

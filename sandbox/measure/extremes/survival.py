@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from sandbox.measure.extremes.outcome import PASSED, Outcome
 from sandbox.measure.proportion import Proportion
-from sandbox.measure.starts import DEFAULT_SPREAD, HELD_FRACTION, allowed_failures
+from sandbox.measure.starts import DEFAULT_SPREAD, HELD_FRACTION, allowed_failures, check_spread
 
 LEVEL_STARTS = 20
 """Default number of starts of a level, the fewest of which one may fail."""
@@ -30,6 +30,12 @@ class StartSampling:
     """number of perturbed starts; 1: the start of the scene only"""
     spread: float = DEFAULT_SPREAD
     """largest change of a start, as in `Starts`"""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if the count is not positive or the spread not from 0 to `MAX_SPREAD`."""
+        if self.count < 1:
+            raise ValueError(f"starts: must be at least 1, is {self.count}")
+        check_spread(self.spread)
 
     def numbers(self, first: Outcome) -> range:
         """Return the numbers of the starts that are trials, by the outcome of the start of the scene."""

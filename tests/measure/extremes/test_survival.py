@@ -179,6 +179,14 @@ def test_level_whose_runs_cost_much_has_fewer_starts(cost: float, slow: bool, tr
     assert found.survived == Proportion(trials, trials)
 
 
+@pytest.mark.parametrize(
+    ("starts", "spread", "words"), [(0, 0.01, "starts: "), (20, 0.6, "spread: "), (20, -0.1, "is -")]
+)
+def test_impossible_starts_of_a_plan_raise(starts: int, spread: float, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        ExtremesPlan(starts=starts, spread=spread)
+
+
 ALL, MOST, FEW, TWO = Proportion(20, 20), Proportion(19, 20), Proportion(10, 20), Proportion(0, 2)
 
 
