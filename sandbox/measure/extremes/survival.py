@@ -94,15 +94,16 @@ class Survival:
         found = replace(self.first, seconds=seconds, slow=any(each.slow for each in failures))
         if self.first.rule == "repeat":
             return found
-        text = (
-            f"{len(failures)} of {len(self.trials)} starts failed, the first: {failures[0].reason}" if failures else ""
-        )
+        text = ""
+        if failures:
+            text = f"{len(failures)} of {len(self.trials)} starts failed, the first: {failures[0].reason}"
         if self.is_failed:
             return replace(found, verdict="failed", reason=text, rule=failures[0].rule, error=failures[0].error)
         survivors = [each for each in (self.first, *self.trials) if each.verdict in PASSED]
         worst = max(survivors, key=lambda each: -1.0 if each.error is None else each.error)
-        verdict = "degraded" if failures or self.first.verdict == "failed" else worst.verdict
-        reason = "; ".join(filter(None, (worst.reason, text)))
+        own = f"the start of the scene failed: {self.first.reason}" if self.first.verdict == "failed" else ""
+        verdict = "degraded" if text or own else worst.verdict
+        reason = "; ".join(filter(None, (worst.reason, text, own)))
         return replace(found, verdict=verdict, reason=reason, rule=None, error=worst.error)
 
 
