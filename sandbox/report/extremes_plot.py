@@ -22,6 +22,7 @@ INKS: dict[Verdict, str] = {"exact": "white", "degraded": "#222222", "refused": 
 NOT_RUN = "#ffffff"
 PARTLY_SURVIVED = "#f6d2b4"
 """Colour that a failed level approaches as more of its starts survive."""
+TITLE = "Limits of each engine and setting, with the counted cost relative to pymunk; *: levels pass and fail in turn"
 ROW_HEIGHT = 0.24
 """Height of a row, inches."""
 
@@ -39,18 +40,21 @@ def plot_extremes(result: Extremes, folder: str | Path) -> tuple[Path, ...]:
 
 
 def draw_axes(result: Extremes) -> Figure:
-    """Return a panel for each axis, in two columns; each row is a setup, with its cost and boundary at the end."""
+    """Return a panel for each axis, in two columns; each row is a setup, with its cost and boundary at the end.
+
+    A star marks boundaries beyond which levels pass, or before which they fail.
+    """
     axes = [axis for axis in result.plan.axes if any(cell.axis == axis.name for cell in result.cells)]
     left, right = _halved(axes, [len(result.plan.setups(axis)) + 4.2 for axis in axes])
     height = max(_height(result, side) for side in (left, right)) + 0.9
     figure = Figure(figsize=(17.0, height), facecolor="white")
-    figure.suptitle("Limits of each engine and setting", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
+    figure.suptitle(TITLE, x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
     for k, side in enumerate((left, right)):
         top = 1.0 - 0.85 / height
         for axis in side:
             rows = len(result.plan.setups(axis))
             panel_height = rows * ROW_HEIGHT / height
-            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.28, panel_height))
+            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.26, panel_height))
             _draw_axis(panel, result, axis)
             top -= (rows * ROW_HEIGHT + 1.0) / height
     _legend(figure, 1.0 - 0.42 / height)
@@ -128,19 +132,19 @@ def _bound(limit: Boundary) -> str:
         return f"{_cost(limit)}no failure"
     if limit.limit is None:
         return f"{_cost(limit)}all fail"
-    rough = "" if limit.monotone else " (not monotone)"
+    star = "" if limit.monotone else " *"
     between = ""
     if limit.bounds not in (None, (limit.limit, limit.first_failure)):
-        between = " ({}–{})".format(*("…" if level is None else _rounded(level, 3) for level in limit.bounds))
-    return f"{_cost(limit)}to {_rounded(limit.limit, 4)}{between}{rough}: {limit.rule}"
+        between = " ({}–{})".format(*("…" if level is None else _rounded(level) for level in limit.bounds))
+    return f"{_cost(limit)}to {_rounded(limit.limit)}{between}{star}: {limit.rule}"
 
 
 def _cost(limit: Boundary) -> str:
-    return "" if limit.cost_ratio is None else f"×{limit.cost_ratio:.3g}   "
+    return "" if limit.cost_ratio is None else f"×{limit.cost_ratio:.3g}  "
 
 
-def _rounded(level: float, digits: int) -> str:
-    return level_text(float(f"{level:.{digits}g}"))
+def _rounded(level: float) -> str:
+    return level_text(float(f"{level:.3g}"))
 
 
 def _single(cell: Sample) -> float:
@@ -166,7 +170,8 @@ def _draw_cells(panel: Axes, cells: dict[tuple[int, int], Sample], rows: int, co
         mark, ink, colours[row][column] = MARKS[cell.verdict], INKS[cell.verdict], to_rgb(COLOURS[cell.verdict])
         tenths = survived_tenths(cell)
         if tenths is not None and cell.survived is not None:
-            mark, ink, fraction = str(tenths), INKS["degraded"], cell.survived.probability
+            mark, fraction = str(tenths), cell.survived.probability
+            ink = INKS["failed" if fraction < 0.3 else "degraded"]
             pair = zip(to_rgb(COLOURS["failed"]), to_rgb(PARTLY_SURVIVED), strict=True)
             red, green, blue = ((1.0 - fraction) * a + fraction * b for a, b in pair)
             colours[row][column] = red, green, blue

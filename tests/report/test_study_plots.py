@@ -67,7 +67,7 @@ def test_boundary_has_its_bounds_and_cost_beside() -> None:
     result = synthetic_extremes()
     limit = replace(result.limits[0], bounds=(0.25, 0.9), cost_ratio=2.5)
     (panel,) = draw_axes(replace(result, limits=(limit,))).axes
-    assert "×2.5   to 0.5 (0.25–0.9): energy" in [text.get_text() for text in panel.texts]
+    assert "×2.5  to 0.5 (0.25–0.9): energy" in [text.get_text() for text in panel.texts]
 
 
 def test_pairs_have_a_matrix_per_setup() -> None:
