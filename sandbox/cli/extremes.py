@@ -30,6 +30,7 @@ from sandbox.cli.options import (
     workers_option,
 )
 from sandbox.cli.progress import ProgressBar, progress_bars
+from sandbox.cli.starts import spread_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_console, new_table, print_line, print_table
 from sandbox.echo import short_repr
@@ -40,9 +41,11 @@ from sandbox.measure.extremes.baseline import BoundaryChange, StoredError, chang
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.experiment import Axis, check_overrides
 from sandbox.measure.extremes.isolation import WorkerError
-from sandbox.measure.extremes.outcome import VERDICTS
-from sandbox.measure.extremes.runner import SAMPLE_SECONDS, WORKER_MEMORY
+from sandbox.measure.extremes.outcome import VERDICTS, survived_tenths
+from sandbox.measure.extremes.runner import COST_REFERENCE, SAMPLE_SECONDS, WORKER_MEMORY
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.measure.extremes.survival import LEVEL_STARTS
+from sandbox.measure.starts import MAX_STARTS
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.errors import Fault
 
@@ -63,6 +66,8 @@ class _Options(OutputOptions):
     overrides: tuple[str, ...]
     quick: bool
     pairs: bool
+    starts: int
+    spread: float
     timeout: float
     memory: int
     workers: int | None
@@ -92,13 +97,14 @@ def print_extremes(result: Extremes) -> None:
 
 
 def _print_limits(result: Extremes) -> None:
-    """Print a line for each axis and setup: a letter per level, and the boundary."""
+    """Print a line for each axis and setup: a letter per level, the cost, and the boundary."""
     from rich.text import Text
 
     console = new_console()
     axis_width = max((len(limit.axis) for limit in result.limits), default=0)
     setup_width = max((len(limit.setup) for limit in result.limits), default=0)
     levels = max((len(list(_row(result, limit))) for limit in result.limits), default=0)
+    cost_width = max((len(_cost(limit)) for limit in result.limits), default=0)
     previous_axis = ""
     for limit in result.limits:
         line = Text(
@@ -106,14 +112,37 @@ def _print_limits(result: Extremes) -> None:
         )
         cells = list(_row(result, limit))
         for cell in cells:
-            line.append(LETTERS[cell.verdict], STYLES[cell.verdict])
-        line.append(f"{'':<{levels - len(cells)}}  {_reached(limit)}{_worst(cells)}")
+            line.append(_letter(cell), STYLES[cell.verdict])
+        cost = f"{_cost(limit):>{cost_width}}  " if cost_width else ""
+        line.append(f"{'':<{levels - len(cells)}}  {cost}{_reached(limit)}{_worst(cells)}")
         line.truncate(max(console.width, MIN_WIDTH), overflow="ellipsis")
         console.print(line, soft_wrap=True)
         previous_axis = limit.axis
     if result.limits:
-        legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
-        print_line(f"one letter per level, from the easiest to the hardest: {legend}", "dim")
+        for text in _legend(result):
+            print_line(text, "dim")
+
+
+def _letter(cell: Sample) -> str:
+    """Return the sign of a cell: the letter of its verdict, or the tenths of the starts that survived."""
+    tenths = survived_tenths(cell)
+    return LETTERS[cell.verdict] if tenths is None else str(tenths)
+
+
+def _cost(limit: Boundary) -> str:
+    return "" if limit.cost_ratio is None else f"×{limit.cost_ratio:.3g}"
+
+
+def _legend(result: Extremes) -> Iterator[str]:
+    letters = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
+    yield f"one letter per level, from the easiest to the hardest: {letters}"
+    if result.plan.starts > 1:
+        yield (
+            f"from up to {result.plan.starts} starts, of which 95 % must survive; a digit is a failed level, in tenths "
+            "of the starts that survived; (A to B): levels between which survival falls below 95 %"
+        )
+    if any(limit.cost_ratio is not None for limit in result.limits):
+        yield f"×: counted cost at the easiest level, in that of {COST_REFERENCE} with its default settings"
 
 
 def _worst(cells: Sequence[Sample]) -> str:
@@ -146,12 +175,23 @@ def _reached(limit: Boundary) -> str:
     if limit.refused:
         return f"refused: {limit.reason}"
     reached, failed = format_optional(limit.limit, ".4g"), format_optional(limit.first_failure, ".4g")
+    equal = limit.limit_at_equal_cost
+    at_equal_cost = "" if equal is None or limit.cost_ratio == 1.0 else f", {equal:.4g} at equal cost"
     if limit.first_failure is None:
-        return f"all levels pass, up to {reached}"
+        return f"all levels pass, up to {reached}{at_equal_cost}"
     if limit.limit is None:
         return f"no level passes: {limit.rule}: {limit.reason}"
     beyond = "" if limit.monotone else " (levels beyond pass and fail in turn)"
-    return f"up to {reached}, fails at {failed}{beyond}: {limit.rule}: {limit.reason}"
+    limits = f"up to {reached}{_bounds(limit)}{at_equal_cost}, fails at {failed}{beyond}"
+    return f"{limits}: {limit.rule}: {limit.reason}"
+
+
+def _bounds(limit: Boundary) -> str:
+    """Return the levels between which survival falls below 95 %, unless they are the two at the boundary."""
+    if limit.bounds in (None, (limit.limit, limit.first_failure)):
+        return ""
+    low, high = (format_optional(level, ".4g") for level in limit.bounds)
+    return f" ({low} to {high})"
 
 
 MIN_MEMORY = 1024
@@ -165,11 +205,20 @@ MIN_MEMORY = 1024
 @click.option("--quick", is_flag=True, help="few levels, no pairs, boundaries only as fine as the levels")
 @click.option("--pairs/--no-pairs", default=True, help="also vary two axes at once")
 @click.option(
+    "--starts",
+    type=click.IntRange(1, MAX_STARTS),
+    default=LEVEL_STARTS,
+    metavar="N",
+    help="run each level of an axis from N perturbed starts, of which 95 % must pass; fewer where runs cost much; "
+    f"1: only the start of the scene; default: {LEVEL_STARTS}",
+)
+@spread_option
+@click.option(
     "--timeout",
     type=FiniteRange(0.1, 86_400.0),
     default=SAMPLE_SECONDS,
     metavar="S",
-    help="time limit of each cell, s",
+    help="time limit of each run, s",
 )
 @click.option(
     "--memory",
@@ -226,7 +275,17 @@ def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
     has_pairs = options.pairs and not options.quick
     pairs = tuple(pair for pair in PAIRS if pair.case.name in cases) if has_pairs else ()
     engines = None if names is None else tuple(names)
-    plan = ExtremesPlan(chosen, pairs, engines, options.overrides, options.quick, options.timeout, options.memory)
+    plan = ExtremesPlan(
+        chosen,
+        pairs,
+        engines,
+        options.overrides,
+        quick=options.quick,
+        starts=options.starts,
+        spread=options.spread,
+        seconds=options.timeout,
+        memory=options.memory,
+    )
     return plan if options.workers is None else replace(plan, workers=options.workers)
 
 

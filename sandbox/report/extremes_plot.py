@@ -5,14 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from sandbox.measure.extremes import Extremes, Sample
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.experiment import Axis, AxisPair
-from sandbox.measure.extremes.outcome import MEANINGS, VERDICTS, Verdict
+from sandbox.measure.extremes.outcome import MEANINGS, VERDICTS, Verdict, survived_tenths
 from sandbox.report.style import write_figure
 
 COLOURS: dict[Verdict, str] = {"exact": "#0072b2", "degraded": "#8cc6ec", "refused": "#dcdcdc", "failed": "#d55e00"}
@@ -20,6 +20,9 @@ COLOURS: dict[Verdict, str] = {"exact": "#0072b2", "degraded": "#8cc6ec", "refus
 MARKS: dict[Verdict, str] = {"exact": "E", "degraded": "d", "refused": "–", "failed": "×"}
 INKS: dict[Verdict, str] = {"exact": "white", "degraded": "#222222", "refused": "#777777", "failed": "white"}
 NOT_RUN = "#ffffff"
+PARTLY_SURVIVED = "#f6d2b4"
+"""Colour that a failed level approaches as more of its starts survive."""
+TITLE = "Limits of each engine and setting, with the counted cost relative to pymunk; *: levels pass and fail in turn"
 ROW_HEIGHT = 0.24
 """Height of a row, inches."""
 
@@ -37,18 +40,21 @@ def plot_extremes(result: Extremes, folder: str | Path) -> tuple[Path, ...]:
 
 
 def draw_axes(result: Extremes) -> Figure:
-    """Return a panel for each axis, in two columns; each row is a setup, with its boundary at the end."""
+    """Return a panel for each axis, in two columns; each row is a setup, with its cost and boundary at the end.
+
+    A star marks boundaries beyond which levels pass, or before which they fail.
+    """
     axes = [axis for axis in result.plan.axes if any(cell.axis == axis.name for cell in result.cells)]
     left, right = _halved(axes, [len(result.plan.setups(axis)) + 4.2 for axis in axes])
     height = max(_height(result, side) for side in (left, right)) + 0.9
     figure = Figure(figsize=(17.0, height), facecolor="white")
-    figure.suptitle("Limits of each engine and setting", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
+    figure.suptitle(TITLE, x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
     for k, side in enumerate((left, right)):
         top = 1.0 - 0.85 / height
         for axis in side:
             rows = len(result.plan.setups(axis))
             panel_height = rows * ROW_HEIGHT / height
-            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.28, panel_height))
+            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.26, panel_height))
             _draw_axis(panel, result, axis)
             top -= (rows * ROW_HEIGHT + 1.0) / height
     _legend(figure, 1.0 - 0.42 / height)
@@ -123,11 +129,22 @@ def _bound(limit: Boundary) -> str:
     if limit.refused:
         return ""
     if limit.first_failure is None:
-        return "no failure"
+        return f"{_cost(limit)}no failure"
     if limit.limit is None:
-        return "all fail"
-    rough = "" if limit.monotone else " (not monotone)"
-    return f"to {level_text(float(f'{limit.limit:.4g}'))}{rough}: {limit.rule}"
+        return f"{_cost(limit)}all fail"
+    star = "" if limit.monotone else " *"
+    between = ""
+    if limit.bounds not in (None, (limit.limit, limit.first_failure)):
+        between = " ({}–{})".format(*("…" if level is None else _rounded(level) for level in limit.bounds))
+    return f"{_cost(limit)}to {_rounded(limit.limit)}{between}{star}: {limit.rule}"
+
+
+def _cost(limit: Boundary) -> str:
+    return "" if limit.cost_ratio is None else f"×{limit.cost_ratio:.3g}  "
+
+
+def _rounded(level: float) -> str:
+    return level_text(float(f"{level:.3g}"))
 
 
 def _single(cell: Sample) -> float:
@@ -148,13 +165,18 @@ def _draw_pair(panel: Axes, cells: Sequence[Sample], pair: AxisPair) -> None:
 
 def _draw_cells(panel: Axes, cells: dict[tuple[int, int], Sample], rows: int, columns: int) -> None:
     """Colour and mark the cells; cells that were not run are white."""
-    numbers = [[0] * columns for _ in range(rows)]
+    colours = [[to_rgb(NOT_RUN)] * columns for _ in range(rows)]
     for (row, column), cell in cells.items():
-        numbers[row][column] = 1 + VERDICTS.index(cell.verdict)
-        mark, ink = MARKS[cell.verdict], INKS[cell.verdict]
+        mark, ink, colours[row][column] = MARKS[cell.verdict], INKS[cell.verdict], to_rgb(COLOURS[cell.verdict])
+        tenths = survived_tenths(cell)
+        if tenths is not None and cell.survived is not None:
+            mark, fraction = str(tenths), cell.survived.probability
+            ink = INKS["failed" if fraction < 0.3 else "degraded"]
+            pair = zip(to_rgb(COLOURS["failed"]), to_rgb(PARTLY_SURVIVED), strict=True)
+            red, green, blue = ((1.0 - fraction) * a + fraction * b for a, b in pair)
+            colours[row][column] = red, green, blue
         panel.text(column, row, mark, ha="center", va="center", size=8, color=ink)
-    colours = ListedColormap([NOT_RUN, *(COLOURS[word] for word in VERDICTS)])
-    panel.imshow(numbers, cmap=colours, vmin=-0.5, vmax=len(VERDICTS) + 0.5, aspect="auto")
+    panel.imshow(colours, aspect="auto")
     panel.set_xticks([k - 0.5 for k in range(1, columns)], minor=True)
     panel.set_yticks([k - 0.5 for k in range(1, rows)], minor=True)
     panel.grid(which="minor", color="white", lw=1.5)
@@ -165,4 +187,14 @@ def _draw_cells(panel: Axes, cells: dict[tuple[int, int], Sample], rows: int, co
 
 def _legend(figure: Figure, top: float) -> None:
     patches = [Patch(color=COLOURS[word], label=f"{MARKS[word]}  {word}: {MEANINGS[word]}") for word in VERDICTS]
-    figure.legend(handles=patches, loc="upper left", bbox_to_anchor=(0.005, top), ncols=4, frameon=False, fontsize=9)
+    patches.append(Patch(color=PARTLY_SURVIVED, label="0–9  failed: tenths that survived"))
+    figure.legend(
+        handles=patches,
+        loc="upper left",
+        bbox_to_anchor=(0.005, top),
+        ncols=len(patches),
+        columnspacing=1.2,
+        handlelength=1.4,
+        frameon=False,
+        fontsize=8.5,
+    )

@@ -133,6 +133,20 @@ def test_a_fast_body_does_not_start_behind_a_wall() -> None:
     assert max(found) <= MAX_WIDTHS * 0.1 + 0.001
 
 
+def test_a_fast_body_is_moved_on_by_even_parts_of_its_free_motion() -> None:
+    """Of a step of 200 half widths the body covers between 0 and `MAX_WIDTHS`, not mostly the largest."""
+    scene = loads(
+        toml("world", duration=1.0)
+        + toml("solver", dt=0.1)
+        + toml("ball", position=[0.0, 0.0], velocity=[100.0, 0.0], radius=0.05)
+    )
+    moved = np.sort([Starts(scene).start(number).bodies.position[0, 0] for number in range(1, 101)]) / 0.05
+    assert moved.max() <= MAX_WIDTHS + 0.2  # the displacement and the change of the speed, of 1 % each
+    # Of 100 starts 50 ± 10 are in the lower half, by two standard deviations.
+    assert abs(np.searchsorted(moved, 0.5 * MAX_WIDTHS) - 50) <= 10
+    assert np.diff(moved).max() < 0.1 * MAX_WIDTHS
+
+
 @pytest.mark.parametrize("name", ["bounce", "tower", "double_pendulum", "newtons_cradle", "half_ball"])
 @pytest.mark.fail_slow(60)  # engines that are compiled
 def test_every_engine_starts_from_the_perturbed_state(name: str) -> None:

@@ -1,14 +1,17 @@
 """Plots of studies: heat maps of extremes, and the lines, front and limits of a trade-off."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.outcome import VERDICTS, Outcome, Sample
 from sandbox.measure.extremes.runner import Extremes, ExtremesPlan
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.measure.proportion import Proportion
 from sandbox.report.extremes_plot import COLOURS, MARKS, draw_axes, draw_pairs, level_text, plot_extremes
 from sandbox.report.tradeoff_plot import draw_tradeoff, plot_tradeoff
 
@@ -41,6 +44,30 @@ def test_axes_have_a_mark_per_cell_and_the_boundary_beside() -> None:
     ]
     assert "to 0.5: energy" in texts
     assert [label.get_text() for label in panel.get_yticklabels()] == ["pymunk", "pymunk, 4 substeps", "exact"]
+
+
+def test_failed_level_with_survivors_has_their_tenths_and_a_lighter_colour() -> None:
+    result = synthetic_extremes()
+    failed = [k for k, cell in enumerate(result.cells) if cell.verdict == "failed"]
+    cells, hits = list(result.cells), (0, 7, 14)
+    for k, survivors in zip(failed, hits, strict=False):
+        cells[k] = replace(cells[k], survived=Proportion(survivors, 20))
+    (panel,) = draw_axes(replace(result, cells=tuple(cells))).axes
+    pixels = np.asarray(panel.images[0].get_array())
+    found = {(round(text.get_position()[1]), round(text.get_position()[0])): text.get_text() for text in panel.texts}
+    colours = []
+    for k, mark in zip(failed, (MARKS["failed"], "3", "7"), strict=False):
+        row, column = divmod(k, 7)  # levels of restitution
+        assert found[row, column] == mark
+        colours.append(float(pixels[row, column].sum()))
+    assert colours == sorted(set(colours))
+
+
+def test_boundary_has_its_bounds_and_cost_beside() -> None:
+    result = synthetic_extremes()
+    limit = replace(result.limits[0], bounds=(0.25, 0.9), cost_ratio=2.5)
+    (panel,) = draw_axes(replace(result, limits=(limit,))).axes
+    assert "×2.5  to 0.5 (0.25–0.9): energy" in [text.get_text() for text in panel.texts]
 
 
 def test_pairs_have_a_matrix_per_setup() -> None:

@@ -27,7 +27,7 @@ def main() -> int:
     parser.add_argument("--store", action="store_true", help=f"write {STORED.name}")
     parser.add_argument("--axes", metavar="NAME[,NAME]", default=",".join(AXES), help="which; by default all")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N")
-    parser.add_argument("--timeout", type=float, default=SAMPLE_SECONDS, metavar="S", help="of each cell")
+    parser.add_argument("--timeout", type=float, default=SAMPLE_SECONDS, metavar="S", help="of each run")
     arguments = parser.parse_args()
     names = [name.strip() for name in arguments.axes.split(",")]
     unknown = [name for name in names if name not in AXES]

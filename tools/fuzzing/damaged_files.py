@@ -102,7 +102,15 @@ LIMITS = {
     "versions": {"python": "3"},
     "limits": [
         {"axis": "dt", "engine": "pymunk", "settings": {}, "setup": "pymunk", "limit": 0.02, "first_failure": 0.03},
-        {"axis": "x", "engine": "pymunk", "settings": {}, "setup": "pymunk", "limit": 5, "first_failure": None},
+        {
+            "axis": "x",
+            "engine": "pymunk",
+            "settings": {},
+            "setup": "pymunk",
+            "limit": 5,
+            "first_failure": None,
+            "bounds": [4.5, None],
+        },
     ],
 }
 

@@ -19,6 +19,9 @@ from sandbox.scene.files.document import check_text
 SLACK = 2.0
 """Multiple of the tolerance by which a boundary may differ: the old and the new one each have this tolerance."""
 
+STORED_KEYS = ("tolerance", "starts", "spread", "timeout", "memory", "versions", "machine")
+"""Keys of the document that are stored with the boundaries."""
+
 MAX_BYTES = 64 * 2**20
 
 StoredBoundaries = Sequence[Mapping[str, Any]]
@@ -64,7 +67,7 @@ def store(result: Extremes, path: str | Path, others: StoredBoundaries = ()) -> 
         others: further boundaries, of other axes.
     """
     whole_document = result.document()
-    kept = {key: whole_document[key] for key in ("tolerance", "timeout", "memory", "versions", "machine")}
+    kept = {key: whole_document[key] for key in STORED_KEYS}
     limits = [*map(dict, others), *whole_document["limits"]]
     order = list(AXES)
     document = {**kept, "limits": sorted(limits, key=lambda limit: order.index(limit["axis"]))}
@@ -92,7 +95,10 @@ def read(path: str | Path) -> list[dict[str, Any]]:
     if not isinstance(limits, list) or not all(isinstance(each, dict) and _is_limit(each) for each in limits):
         raise StoredError(f"{path}: contains no boundaries; use an extremes.json of `sandbox extremes --out DIR`")
     for each in limits:
-        if not all(each[key] is None or _is_number(each[key]) for key in ("limit", "first_failure")):
+        bounds = (None, None) if each.get("bounds") is None else each["bounds"]
+        if not isinstance(bounds, list | tuple) or len(bounds) != 2:
+            raise StoredError(f"{path}: the bounds of {short_repr(each['axis'])} are not two levels")
+        if not all(level is None or _is_number(level) for level in (each["limit"], each["first_failure"], *bounds)):
             raise StoredError(f"{path}: a limit of {short_repr(each['axis'])} is not a number")
     return limits
 
@@ -108,7 +114,7 @@ def _is_number(value: Any) -> bool:
 
 
 def changes(before: StoredBoundaries, now: Sequence[Boundary], tolerance: float = TOLERANCE) -> list[BoundaryChange]:
-    """Return the boundaries that have moved by more than their tolerance, of those that exist in both.
+    """Return the boundaries that have moved beyond their bounds and tolerance, of those that exist in both.
 
     Args:
         before: boundaries of the baseline.
@@ -128,26 +134,35 @@ def changes(before: StoredBoundaries, now: Sequence[Boundary], tolerance: float 
 
 
 def _compare(limit: Boundary, old: Mapping[str, Any], tolerance: float) -> int:
-    """Return 1 if more levels pass now, −1 if fewer do, 0 if the boundary has not moved."""
+    """Return 1 if more levels pass now, −1 if fewer do, 0 if the boundary has not moved.
+
+    Boundaries that were measured from several starts have not moved if their bounds overlap.
+    """
     from sandbox.measure.extremes.scenarios import AXES
 
     then, now, axis = old["limit"], limit.limit, AXES.get(limit.axis)
     slack = 1.0 if axis is not None and axis.scale == "whole" else 0.0
+    # Levels become harder towards the last one of the axis.
+    rising = axis is None or axis.levels[-1] >= axis.levels[0]
+    own = limit.bounds or (now, limit.first_failure)
+    stored = old.get("bounds") or (then, old["first_failure"])
+    overlap = _ranges_overlap(_range(own, rising), _range(stored, rising))
+    if overlap and (limit.bounds is not None or old.get("bounds") is not None):
+        return 0
     if then is None or now is None:
         return (then is None and now is not None) - (now is None and then is not None)
     if math.isclose(then, now, rel_tol=SLACK * tolerance) or abs(then - now) <= slack:
         return _compare_unbroken(limit.first_failure, old["first_failure"])
-    # Levels become harder towards the last one of the axis.
-    rising = axis is None or axis.levels[-1] >= axis.levels[0]
-    if _ranges_overlap(_range(now, limit.first_failure, rising), _range(then, old["first_failure"], rising)):
+    if overlap:
         return 0
     return 1 if (now > then) == rising else -1
 
 
-def _range(limit: float, failure: float | None, rising: bool) -> tuple[float, float]:
-    """Return the interval that contains a boundary, the lower end first; without a failure it is unbounded."""
-    beyond = failure if failure is not None else math.inf if rising else -math.inf
-    return min(limit, beyond), max(limit, beyond)
+def _range(levels: Sequence[float | None], rising: bool) -> tuple[float, float]:
+    """Return the interval between an easier and a harder level, the lower end first; None leaves it unbounded."""
+    easier, harder = levels
+    low, high = (easier, harder) if rising else (harder, easier)
+    return -math.inf if low is None else low, math.inf if high is None else high
 
 
 def _ranges_overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:

@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale, Scenario
+from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale
 from sandbox.measure.extremes.outcome import Outcome, PairSample, Sample, Task
+from sandbox.measure.extremes.survival import RunStart, StartSampling, Survival, survival, survival_bounds
+from sandbox.measure.proportion import Proportion
 
 TOLERANCE = 0.01
 """Relative width to which a boundary is found; whole numbers are found exactly."""
@@ -54,6 +56,19 @@ class Boundary:
     refused: bool = False
     """whether the engine refused every level"""
     unit: str = ""
+    bounds: tuple[float | None, float | None] | None = None
+    """levels between which survival falls below 95 %, see `survival_bounds`: the hardest up to which every start
+    survived, and the easiest beyond the limit at which the interval of the fraction lies below 95 %; None if the engine
+    refused every level"""
+    limit_survived: Proportion | None = None
+    """starts that survived at the limit; None without a limit"""
+    failure_survived: Proportion | None = None
+    """starts that survived at the first failure; None without one"""
+    cost_ratio: float | None = None
+    """counted cost of a run at the easiest level, relative to that of plain pymunk; None without both runs"""
+    limit_at_equal_cost: float | None = None
+    """limit / cost_ratio where levels are proportional to the time step: with that step, plain pymunk costs as much as
+    this setup at its limit; None on other axes"""
 
 
 def run_axis(
@@ -65,10 +80,12 @@ def run_axis(
     on_sample: OnSample,
     *,
     bisect: bool = True,
+    sampling: StartSampling | None = None,
 ) -> Boundary:
     """Run an axis on an engine configuration, level by level, and find its boundary.
 
-    Refused levels do not count: a boundary lies between a level that passed and one that failed.
+    Refused levels do not count: a boundary lies between a level that passed and one that failed. A level that fails is
+    run until that is certain; at the boundary, and at levels of which some starts survive, all starts are run.
 
     Args:
         axis: the axis.
@@ -76,16 +93,29 @@ def run_axis(
         levels: levels from the easiest to the hardest.
         overrides: `KEY=VALUE`, changes to every scene.
         submit: runs a task.
-        on_sample: called with each finished sample.
+        on_sample: called with each finished sample, and again if more of its starts are run.
         bisect: whether to bisect between the levels.
+        sampling: from which starts a level is run; default: that of the scene.
     """
+    sampling = sampling or StartSampling(1)
     samples: dict[float, Sample] = {}
+    survivals: dict[float, Survival] = {}
 
-    def run_level(level: float) -> Sample:
-        outcome = submit(_task(axis.case, {axis.parameter: level}, setup, overrides))
-        samples[level] = Sample(axis.name, level, setup.engine, dict(setup.changes), setup.name, outcome)
+    def run_start(level: float) -> RunStart:
+        task = Task(axis.case.name, {axis.parameter: level}, setup.engine, dict(setup.changes), overrides)
+        return lambda number: submit(replace(task, start=number, spread=sampling.spread))
+
+    def keep(level: float, found: Survival) -> Sample:
+        survivals[level] = found
+        settings = dict(setup.changes)
+        samples[level] = Sample(
+            axis.name, level, setup.engine, settings, setup.name, found.outcome(), survived=found.survived
+        )
         on_sample(samples[level])
         return samples[level]
+
+    def run_level(level: float) -> Sample:
+        return keep(level, survival(run_start(level), sampling))
 
     for level in levels:
         run_level(level)
@@ -97,10 +127,15 @@ def run_axis(
         is_slow = next((each.outcome.slow for each in samples.values() if each.verdict == "failed"), False)
         passes = None if is_slow or not bisect else lambda level: run_level(level).passed
         bracket = find_boundary(known, passes, axis.scale)
+        for level, found in tuple(survivals.items()):
+            has_survivors = level in levels and found.survived is not None and found.survived.hits > 0
+            if found.remaining and (has_survivors or level == bracket.first_failure):
+                keep(level, found.run(run_start(level), to_end=True))
         reason, rule = "no level failed", None
         if bracket.first_failure is not None:
             failure = samples[bracket.first_failure].outcome
             reason, rule = failure.reason, failure.rule
+    survived = {level: each.survived for level, each in samples.items()}
     return Boundary(
         axis=axis.name,
         engine=setup.engine,
@@ -113,22 +148,21 @@ def run_axis(
         monotone=bracket.monotone,
         refused=not known,
         unit=axis.unit,
+        bounds=survival_bounds(survived, bracket.limit, levels) if known else None,
+        limit_survived=None if bracket.limit is None else survived[bracket.limit],
+        failure_survived=None if bracket.first_failure is None else survived[bracket.first_failure],
     )
 
 
 def run_pair(
     pair: AxisPair, setup: EngineSetup, overrides: tuple[str, ...], submit: Submit, on_sample: OnSample
 ) -> None:
-    """Run every combination of a pair's levels on an engine configuration."""
+    """Run every combination of a pair's levels on an engine configuration, from the start of the scene only."""
     for both in pair.levels:
         parameters = {pair.first.parameter: both[0], pair.second.parameter: both[1]}
-        outcome = submit(_task(pair.case, parameters, setup, overrides))
+        outcome = submit(Task(pair.case.name, parameters, setup.engine, dict(setup.changes), overrides))
         names = pair.first.parameter, pair.second.parameter
         on_sample(PairSample(pair.name, both, setup.engine, dict(setup.changes), setup.name, outcome, axes=names))
-
-
-def _task(scenario: Scenario, parameters: dict[str, float], setup: EngineSetup, overrides: tuple[str, ...]) -> Task:
-    return Task(scenario.name, parameters, setup.engine, dict(setup.changes), overrides)
 
 
 def find_boundary(

@@ -224,9 +224,9 @@ def classify(tested: RunUnderTest) -> Outcome:
             figures |= {"moved": float((tested.displacement / tested.width).max()), "gained": tested.energy_gain}
             if run.info["joint_error"] is not None:
                 figures["joints"] = run.info["joint_error"]
-    if case.error is None:
+    error = case.error(tested.scene, run) if case.error is not None else math.nan
+    if math.isnan(error):
         return Outcome("degraded", "no rule is broken; the exact solution is not known", figures=figures)
-    error = case.error(tested.scene, run)
     if error > case.fail_above:
         reason = f"the error is {error:.3g} of {case.error_of}; the limit is {case.fail_above:g}"
         return Outcome("failed", reason, "truth", error, figures=figures)

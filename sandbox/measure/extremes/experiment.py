@@ -52,7 +52,8 @@ class Scenario:
     rules: frozenset[str]
     """rules of `checks.RULES` that apply, besides `bounded` and `repeat`, which always do"""
     error: Callable[[Scene, Trajectory], float] | None = None
-    """error of a run against the known solution, as a fraction; None if the solution is not known"""
+    """error of a run against the known solution, as a fraction; None if the solution is not known, and nan from a start
+    of which it is not"""
     error_of: str = ""
     """quantity that the error is a fraction of"""
     fail_above: float = np.inf
@@ -175,6 +176,8 @@ class Axis:
     """rules whose failure the diagnostic predicts"""
     occurred_if: Callable[[Sample], bool] | None = None
     """returns whether the problem occurred, if it is not the failure of a rule"""
+    scales_with_dt: bool = False
+    """whether levels are proportional to the time step, and limits at equal cost therefore comparable"""
 
     def document(self, level: float) -> JsonObject:
         """Return the document of the scene at a level."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 from sandbox.jsonable import in_json
+from sandbox.measure.proportion import Proportion
 
 Verdict = Literal["exact", "degraded", "refused", "failed"]
 
@@ -13,7 +14,7 @@ MEANINGS: dict[Verdict, str] = {
     "exact": "within 1e-6 of the known solution",
     "degraded": "inaccurate, but no rule is broken",
     "refused": "refused before the run, with a reason",
-    "failed": "a rule is broken, or the error is too large to be useful",
+    "failed": "in more than 5 % of the starts a rule is broken, or the error is useless",
 }
 PASSED = ("exact", "degraded")
 
@@ -32,6 +33,10 @@ class Task:
     """changes to the settings of the scene"""
     overrides: tuple[str, ...] = ()
     """`KEY=VALUE`, changes to the scene"""
+    start: int = 0
+    """number of the start, as in `Starts`; 0: that of the scene"""
+    spread: float = 0.0
+    """spread of the starts"""
 
     @classmethod
     def from_json(cls, document: Mapping[str, Any]) -> Self:
@@ -57,7 +62,9 @@ class Outcome:
     solver: Mapping[str, Any] = field(default_factory=dict)
     """settings as the engine resolved them"""
     seconds: float = 0.0
-    """s, time of the task"""
+    """s, time of the task; of a level, of all its starts"""
+    cost: float | None = None
+    """counted cost of the run, s on the machine of the weights (`bounded_run`); None if there was no run"""
     slow: bool = False
     """whether the time limit stopped it: the verdict then depends on the machine"""
 
@@ -82,6 +89,8 @@ class Sample:
     setup: str
     """name of the engine configuration"""
     outcome: Outcome = field(metadata=in_json(inline=True))
+    survived: Proportion | None = None
+    """starts in which no rule was broken; None if the engine refused the level, and for pairs, which are run once"""
 
     @property
     def verdict(self) -> Verdict:
@@ -95,7 +104,7 @@ class Sample:
 
     @property
     def passed(self) -> bool:
-        """Whether the run broke no rule."""
+        """Whether enough starts broke no rule."""
         return self.verdict in PASSED
 
 
@@ -105,3 +114,10 @@ class PairSample(Sample):
 
     axes: tuple[str, str]
     """names of the two parameters"""
+
+
+def survived_tenths(sample: Sample) -> int | None:
+    """Return the tenths of the starts that survived at a failed level, rounded down; None if none did."""
+    if sample.verdict != "failed" or sample.survived is None or sample.survived.hits == 0:
+        return None
+    return 10 * sample.survived.hits // sample.survived.trials

@@ -3,7 +3,7 @@
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from time import perf_counter
 from typing import Any, ClassVar
@@ -14,6 +14,8 @@ from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, set
 from sandbox.measure.extremes.isolation import IsolatedWorker
 from sandbox.measure.extremes.outcome import PairSample, Sample
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.measure.extremes.survival import LEVEL_STARTS, StartSampling
+from sandbox.measure.starts import DEFAULT_SPREAD
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine as this_machine
 from sandbox.provenance import versions as package_versions
@@ -74,7 +76,7 @@ def prediction_scores(samples: Iterable[Sample], axes: Iterable[Axis]) -> tuple[
 
 
 SAMPLE_SECONDS, WORKER_MEMORY = 30.0, 2048
-"""Default limits: s for a sample, and MiB for a worker. The libraries alone take 600 MiB of address space."""
+"""Default limits: s for a run, and MiB for a worker. The libraries alone take 600 MiB of address space."""
 
 
 @dataclass(frozen=True)
@@ -89,12 +91,29 @@ class ExtremesPlan:
     """`KEY=VALUE`, changes to every scene"""
     quick: bool = False
     """few levels, and no bisection between them"""
+    starts: int = LEVEL_STARTS
+    """number of perturbed starts of a level of an axis; fewer where runs cost much; 1: the start of the scene only"""
+    spread: float = DEFAULT_SPREAD
+    """largest change of a start, as in `Starts`"""
     seconds: float = field(default=SAMPLE_SECONDS, metadata=in_json(key="timeout"))
-    """s, time limit of a sample"""
+    """s, time limit of a run"""
     memory: int = WORKER_MEMORY
     """MiB, memory limit of a worker"""
     workers: int = field(default_factory=lambda: os.cpu_count() or 1)
     """number of worker processes"""
+
+    def __post_init__(self) -> None:
+        """Raise ValueError if the starts are not possible."""
+        _ = self.sampling
+
+    @property
+    def sampling(self) -> StartSampling:
+        """From which starts a level is run.
+
+        Raises:
+            ValueError: their number is not positive, or the spread is not from 0 to `MAX_SPREAD`.
+        """
+        return StartSampling(self.starts, self.spread)
 
     def levels(self, axis: Axis) -> tuple[float, ...]:
         """Return the levels of an axis that are run."""
@@ -156,6 +175,9 @@ class Extremes:
         return found
 
 
+COST_REFERENCE = "pymunk"
+"""Setup with which costs are compared."""
+
 SampleJob = Callable[[Submit, OnSample], Boundary | None]
 RunnerMessage = Sample | tuple[Boundary | None, str] | BaseException
 
@@ -174,18 +196,31 @@ def extremes(plan: ExtremesPlan, on_progress: ProgressCallback | None = None) ->
     began = perf_counter()
     jobs = list(_jobs(plan))
     results = _run_jobs(jobs, plan, on_progress or ignore_progress)
-    cells = [each for each in results.samples if not isinstance(each, PairSample)]
+    samples = results.samples.values()
+    cells = [each for each in samples if not isinstance(each, PairSample)]
     order = _order(plan)
     on_levels = {axis.name: set(plan.levels(axis)) for axis in plan.axes}
+    at_levels = sorted((c for c in cells if c.level in on_levels[c.axis]), key=order)
     return Extremes(
         plan=plan,
-        cells=tuple(sorted((c for c in cells if c.level in on_levels[c.axis]), key=order)),
+        cells=tuple(at_levels),
         probes=tuple(sorted((c for c in cells if c.level not in on_levels[c.axis]), key=order)),
-        limits=tuple(sorted(results.boundaries, key=order)),
-        pairs=tuple(sorted((c for c in results.samples if isinstance(c, PairSample)), key=order)),
+        limits=tuple(sorted(with_costs(results.boundaries, at_levels, plan), key=order)),
+        pairs=tuple(sorted((c for c in samples if isinstance(c, PairSample)), key=order)),
         seconds=perf_counter() - began,
         interrupted=results.interrupted,
     )
+
+
+def with_costs(boundaries: Iterable[Boundary], cells: Iterable[Sample], plan: ExtremesPlan) -> Iterator[Boundary]:
+    """Yield boundaries with their costs relative to plain pymunk, from the cells at the easiest level of each axis."""
+    axes = {axis.name: axis for axis in plan.axes}
+    easiest = {(c.axis, c.setup): c.outcome.cost for c in cells if c.level == plan.levels(axes[c.axis])[0]}
+    for each in boundaries:
+        cost, own = easiest.get((each.axis, each.setup)), easiest.get((each.axis, COST_REFERENCE))
+        ratio = cost / own if cost and own else None
+        equal = each.limit / ratio if ratio and each.limit and axes[each.axis].scales_with_dt else None
+        yield replace(each, cost_ratio=ratio, limit_at_equal_cost=equal)
 
 
 def _jobs(plan: ExtremesPlan) -> Iterator[tuple[str, SampleJob]]:
@@ -201,7 +236,8 @@ def _jobs(plan: ExtremesPlan) -> Iterator[tuple[str, SampleJob]]:
 def _axis_job(plan: ExtremesPlan, axis: Axis, setup: EngineSetup) -> SampleJob:
     def job(submit: Submit, on_sample: OnSample) -> Boundary | None:
         levels = plan.levels(axis)
-        return run_axis(axis, setup, levels, plan.overrides, submit, on_sample, bisect=not plan.quick)
+        sampling, bisect = plan.sampling, not plan.quick
+        return run_axis(axis, setup, levels, plan.overrides, submit, on_sample, bisect=bisect, sampling=sampling)
 
     return job
 
@@ -216,7 +252,8 @@ def _pair_job(plan: ExtremesPlan, pair: AxisPair, setup: EngineSetup) -> SampleJ
 
 @dataclass
 class _Results:
-    samples: list[Sample] = field(default_factory=list)
+    samples: dict[tuple[str, str, float | tuple[float, float]], Sample] = field(default_factory=dict)
+    """by axis or pair, engine configuration and level: a sample whose further starts are run is replaced"""
     boundaries: list[Boundary] = field(default_factory=list)
     interrupted: bool = False
 
@@ -230,7 +267,7 @@ def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress
     count = min(plan.workers, max(len(jobs), 1))
     workers = [IsolatedWorker(plan.seconds, plan.memory) for _ in range(count)]
     threads = [threading.Thread(target=_work, args=(worker, waiting, messages), daemon=True) for worker in workers]
-    results, done, failed = _Results(), 0, 0
+    results, done = _Results(), 0
     try:
         for thread in threads:
             thread.start()
@@ -242,13 +279,13 @@ def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress
             if isinstance(message, BaseException):
                 raise message
             if isinstance(message, Sample):
-                results.samples.append(message)
-                failed += message.verdict == "failed"
+                results.samples[message.axis, message.setup, message.level] = message
                 continue
             boundary, job_name = message
             done += 1
             if boundary is not None:
                 results.boundaries.append(boundary)
+            failed = sum(each.verdict == "failed" for each in results.samples.values())
             text = f"{len(results.samples)} cells, {failed} failed; {job_name}"
             on_progress(Progress(text, done / len(jobs)))
     except KeyboardInterrupt:

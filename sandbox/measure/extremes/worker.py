@@ -19,8 +19,10 @@ from sandbox.measure.extremes.checks import RunUnderTest, classify
 from sandbox.measure.extremes.outcome import Outcome, Task
 from sandbox.measure.extremes.scenarios import SCENARIOS
 from sandbox.measure.preflight import warnings
+from sandbox.measure.run.bounded_run import counted_cost
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.runner import run
+from sandbox.measure.starts import Starts
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
@@ -72,10 +74,11 @@ def _evaluate_document(document: Mapping[str, Any]) -> JsonObject:
 
 
 def evaluate_task(task: Task) -> Outcome:
-    """Run a task twice and return its outcome.
+    """Run a task and return its outcome.
 
-    A scene, setting or run that the scene format, the settings or the engine refuse is `refused`. If the second run
-    does not end in the same state, bit for bit, the rule `repeat` is broken.
+    A scene, setting or run that the scene format, the settings or the engine refuse is `refused`. The start of the
+    scene is run twice: if the second run does not end in the same state, bit for bit, the rule `repeat` is broken.
+    Other starts are run once, without the preflight checks, which look at the scene.
     """
     scenario = SCENARIOS[task.case]
     began = perf_counter()
@@ -85,17 +88,22 @@ def evaluate_task(task: Task) -> Outcome:
     except SceneError as error:
         first = error.faults[0]
         return Outcome("refused", f"invalid scene: {first.path}: {first.message}")
-    predicted = tuple(dict.fromkeys(each.kind for each in warnings(scene, settings, task.engine)))
+    predicted: tuple[str, ...] = ()
+    if task.start:
+        scene = Starts(scene, task.spread).start(task.start)
+    else:
+        predicted = tuple(dict.fromkeys(each.kind for each in warnings(scene, settings, task.engine)))
     engine = engine_named(task.engine)
     missing = engine.missing(scene, settings)
     if missing:
         return Outcome("refused", "; ".join(missing), predicted=predicted, solver=settings.model_dump(mode="json"))
-    resolved = engine.resolve(scene, settings)
+    resolved, cost = engine.resolve(scene, settings), None
     solver = resolved.model_dump(mode="json")
     try:
         first_run = run(scene, task.engine, audit=False, **settings.model_dump())
+        cost = counted_cost(scene, task.engine, resolved, first_run.info["steps"], first_run.info["work"])
         outcome = classify(RunUnderTest(scenario, scene, resolved, first_run))
-        if outcome.verdict != "failed":
+        if outcome.verdict != "failed" and not task.start:
             second_run = run(scene, task.engine, audit=False, **settings.model_dump())
             if second_run.info["state_hash"] != first_run.info["state_hash"]:
                 outcome = Outcome("failed", "a repeated run ended in a different state", "repeat")
@@ -103,7 +111,8 @@ def evaluate_task(task: Task) -> Outcome:
         return Outcome("refused", str(error), predicted=predicted, solver=solver)
     except MemoryError:
         outcome = Outcome("failed", "out of memory", "process")
-    return replace(outcome, predicted=predicted, solver=solver, seconds=perf_counter() - began)
+    seconds = perf_counter() - began
+    return replace(outcome, predicted=predicted, solver=solver, seconds=seconds, cost=cost)
 
 
 def _settings(scene: Scene, task: Task) -> Settings:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
 from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
-from sandbox.measure.starts import Starts
+from sandbox.measure.starts import Starts, allowed_failures
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
 from sandbox.measure.tradeoff.objective import Objective
 from sandbox.measure.tradeoff.result import FreshStarts
@@ -18,8 +18,6 @@ from sandbox.measure.tradeoff.search import RUN_FRACTION
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
-HELD_FRACTION = 0.95
-"""Fraction of the starts in which a recommended setting is within the tolerance."""
 STARTS_FRACTION = 0.3
 """Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
 MIN_STARTS = 3
@@ -73,7 +71,7 @@ class StartTrials:
         It stops at the first start that makes that impossible.
         """
         count = self._affordable(point)
-        failures = math.floor((1.0 - HELD_FRACTION) * count + 1e-9)
+        failures = allowed_failures(count)
         for number in range(1, count + 1):
             failures -= self._error(point, number) > self.objective.tolerance
             if failures < 0:

@@ -31,6 +31,15 @@ SIGNS: dict[Verdict, tuple[str, Shade]] = {
     "refused": ("–", "none"),
     "failed": ("✕", "bad"),
 }
+LIMITS = "The last level that passed and the first that failed, found by bisection."
+SURVIVAL = (
+    "A level passes if 95 % of its perturbed starts survive. The bounds are the hardest level up to which all of them "
+    "do, and the easiest that surely fails."
+)
+COST = (
+    "The cost is the counted work at the easiest level relative to plain pymunk; limits of time steps are divided by "
+    "it for a comparison at equal cost."
+)
 PREDICTIONS = (
     "sandbox check warned before each run. Precision is the fraction of warnings that came true; "
     "recall is the fraction of failures that had a warning."
@@ -57,7 +66,7 @@ def extremes_page(document: ExtremesMapping) -> Page:
     tables = concatenated(*(_verdict_table(axis, cells) for axis in axes))
     sections = [Section("Axis by axis", tables, lead="Hover over a cell for its reason.")]
     if document["limits"]:
-        lead = "The last level that passed and the first that failed, found by bisection."
+        lead = " ".join((LIMITS, *((SURVIVAL,) if document["starts"] > 1 else ()), COST))
         sections.append(Section("Limits", _limits(document["limits"]), lead=lead))
     if document["predictions"]:
         sections.append(Section("Predictions", _predictions(document["predictions"]), lead=PREDICTIONS))
@@ -72,14 +81,24 @@ def _verdict_table(axis: str, cells: Sequence[ExtremesMapping]) -> Markup:
     levels = sorted({float(cell["level"]) for cell in axis_cells})
     found: dict[tuple[str, str], dict[float, dict[str, str]]] = {}
     for cell in axis_cells:
-        word: Verdict = cell["verdict"]
-        shown = {"word": word, "sign": SIGNS[word][0], "reason": cell["reason"]}
-        found.setdefault((cell["engine"], _setup(cell)), {})[float(cell["level"])] = shown
+        found.setdefault((cell["engine"], _setup(cell)), {})[float(cell["level"])] = _cell(cell)
     rows = [
         (engine_name(engine), setup, [by_level.get(level) for level in levels])
         for (engine, setup), by_level in found.items()
     ]
     return fragment(TEMPLATE, "verdicts", axis.replace("_", " "), levels, rows)
+
+
+def _cell(cell: ExtremesMapping) -> dict[str, Any]:
+    """Return the word, sign and reason of a cell; where some starts failed and some survived, with their fraction."""
+    word: Verdict = cell["verdict"]
+    sign, reason, survived = SIGNS[word][0], cell["reason"], cell["survived"]
+    is_partial = survived is not None and 0 < survived["hits"] < survived["trials"]
+    if is_partial:
+        sign = f"{sign} {format_percent(survived['probability'])}"
+    if survived is not None and survived["trials"] > 1:
+        reason += f" ({survived['hits']} of {survived['trials']} starts survived)"
+    return {"word": word, "sign": sign, "reason": reason, "is_partial": is_partial}
 
 
 def _setup(cell: ExtremesMapping) -> str:
@@ -92,10 +111,24 @@ def _limits(rows: Sequence[ExtremesMapping]) -> Markup:
         (HtmlColumn("axis"), lambda row: str(row["axis"]).replace("_", " ")),
         (HtmlColumn("engine"), lambda row: engine_name(row["engine"])),
         (HtmlColumn("settings"), lambda row: _setup(row) or "default"),
+        (HtmlColumn("cost", True), lambda row: format_number(row["cost_ratio"], 3)),
         (HtmlColumn("passes up to", True), lambda row: format_number(row["limit"], 4)),
+        (HtmlColumn("at equal cost", True), lambda row: format_number(row["limit_at_equal_cost"], 4)),
         (HtmlColumn("first failure", True), lambda row: format_number(row["first_failure"], 4)),
+        (HtmlColumn("survived there", True), lambda row: _survived(row["failure_survived"])),
+        (HtmlColumn("bounds", True), lambda row: _bounds(row)),
     )
     return row_table(columns, rows, "Limits")
+
+
+def _survived(survived: ExtremesMapping | None) -> str:
+    return UNKNOWN if survived is None else f"{survived['hits']} of {survived['trials']}"
+
+
+def _bounds(limit: ExtremesMapping) -> str:
+    if limit["bounds"] is None or limit["first_failure"] is None:
+        return UNKNOWN
+    return " to ".join(format_number(level, 4) for level in limit["bounds"])
 
 
 def _predictions(predictions: Sequence[ExtremesMapping]) -> Markup:

@@ -133,6 +133,24 @@ def test_changes_are_found_beyond_the_accuracy_of_boundaries(old, now, worse):
     assert [change.worse for change in found] == ([] if worse is None else [worse])
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "worse"),
+    [
+        (None, (0.9, 1.2), None),  # 1.15 without bounds is within the new ones
+        ((1.1, 1.3), (0.9, 1.2), None),
+        ((1.1, 1.3), None, True),  # 1 to 1.01 without bounds is beyond the old ones
+        ((1.3, 1.4), (0.9, 1.2), True),
+        ((0.5, 0.7), (0.9, 1.2), False),
+        ((1.1, None), (0.9, 1.2), None),
+        ((None, 0.7), (0.9, 1.2), False),
+    ],
+)
+def test_boundary_is_worse_only_outside_of_the_bounds_of_its_survival(old, new, worse):
+    (stored,) = before({None: 1.15, (0.5, 0.7): 0.6, (None, 0.7): 0.6}.get(old, 1.15))
+    found = changes([stored if old is None else {**stored, "bounds": old}], [replace(NOW, bounds=new)])
+    assert [change.worse for change in found] == ([] if worse is None else [worse])
+
+
 def test_change_is_described_in_one_line() -> None:
     (change,) = changes(before(2.0), [NOW])
     assert str(change) == "speed on pymunk: worse: passed up to 2 before, up to 1 now: passed the wall"
@@ -152,6 +170,12 @@ def test_change_is_described_in_one_line() -> None:
             "is not a number",
         ),
         ("[" * 100_000, "cannot be read"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": 1, "first_failure": 2, "bounds": 3}]}', "not two levels"),
+        ('{"limits": [{"axis": "a", "setup": "b", "limit": 1, "first_failure": 2, "bounds": [1]}]}', "not two levels"),
+        (
+            '{"limits": [{"axis": "a", "setup": "b", "limit": 1, "first_failure": 2, "bounds": [1, ""]}]}',
+            "not a number",
+        ),
     ],
 )
 def test_file_without_boundaries_raises_stored_error(tmp_path: Path, text: str, words: str) -> None:

@@ -166,6 +166,17 @@ def test_extremes_have_a_cell_for_every_level() -> None:
     assert "75 %" in html
 
 
+def test_extremes_name_the_starts_that_survived() -> None:
+    document = extremes_document()
+    document["cells"][3]["survived"] = {"hits": 9, "trials": 20, "probability": 0.45, "low": 0.26, "high": 0.66}
+    document["limits"][0] |= {"bounds": [0.001, None], "cost_ratio": 2.5}
+    html = extremes_page(document).html()
+    assert 'class="cell failed partial"' in html
+    assert "✕ 45 %" in html
+    assert "(9 of 20 starts survived)" in html
+    assert "0.001 to –" in html
+
+
 def test_methods_are_named_by_their_differing_settings() -> None:
     document = tradeoff_document()
     points = work_points(document)

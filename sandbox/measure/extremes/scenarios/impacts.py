@@ -1,5 +1,7 @@
 """Scenarios of impacts: drops and bounces, a bullet at a wall, head-on collisions."""
 
+import math
+
 import numpy as np
 
 from sandbox.arrays import FloatArray
@@ -57,7 +59,8 @@ def _height_error(scene: Scene, run: Trajectory) -> float:
 
 
 def _fall_energy(scene: Scene) -> float:
-    return float((scene.bodies.mass * G * (scene.bodies.position[:, 1] - 0.5 * FLOOR_THICKNESS - DROP_RADIUS)).sum())
+    height = scene.bodies.position[:, 1] - 0.5 * FLOOR_THICKNESS - DROP_RADIUS
+    return float((scene.bodies.mass * (G * height + 0.5 * (scene.bodies.velocity**2).sum(axis=1))).sum())
 
 
 def _fell_through(scene: Scene, run: Trajectory) -> str | None:
@@ -104,6 +107,7 @@ FALL_AXES = (
         setups=DETECTION_SETUPS,
         kind="tunnelling",
         failure_rules=frozenset({"through", "bounded"}),
+        scales_with_dt=True,
     ),
     Axis(
         "restitution", "of a ball on a plane", "", BOUNCE, "restitution", RESTITUTIONS, (0.0, 0.5, 1.0), scale="linear"
@@ -120,8 +124,8 @@ BULLET_RADIUS, WALL_THICKNESS, BULLET_DT = 0.05, 0.1, 0.01  # m, m, s
 REACH = BULLET_RADIUS + 0.5 * WALL_THICKNESS
 """m, distance of the bullet's centre from the middle of the wall at contact."""
 START_OFFSET = 1e-9
-"""Distance from contact at the start of the bullet, as a fraction of the reach: the worst phase. It passes once v·h
-exceeds r + w/2, whatever the number of substeps.
+"""Distance from contact after the first step of the bullet, as a fraction of the reach: the worst phase. It passes once
+v·h exceeds r + w/2, whatever the number of substeps.
 """
 STEPS = 20
 
@@ -136,7 +140,7 @@ def _bullet(p: Parameters) -> JsonObject:
         ],
         "ball": [
             {
-                "position": [p["offset"] - REACH * (1.0 + START_OFFSET), 0.0],
+                "position": [p["offset"] - REACH * (1.0 + START_OFFSET) - speed * BULLET_DT, 0.0],
                 "velocity": [speed, 0.0],
                 "radius": BULLET_RADIUS,
                 "collides": "fixed",
@@ -184,6 +188,7 @@ BULLET_AXES = (
         setups=DETECTION_SETUPS,
         kind="tunnelling",
         failure_rules=frozenset({"through", "bounded"}),
+        scales_with_dt=True,
     ),
 )
 BULLET_PAIRS = (
@@ -211,22 +216,34 @@ def _head_on(p: Parameters) -> JsonObject:
     }  # fmt: skip
 
 
-def _after(scene: Scene) -> FloatArray:
-    """Return the velocities after the impact, v₁′ = (m₁ − m₂)v/M and v₂′ = 2m₁v/M."""
-    first, second = scene.bodies.mass.tolist()
-    fraction: float = SPEED / (first + second)
-    return np.asarray([(first - second) * fraction, 2.0 * first * fraction])
+def _impact(scene: Scene) -> tuple[float, FloatArray]:
+    """Return the time of the impact, s, and the velocities after it, (2, 2) m/s.
+
+    The centres are then at the distance |d + w·t| = r₁ + r₂, and the elastic impulse 2·m₁·m₂/M·(w·n) acts along their
+    line n.
+    """
+    bodies = scene.bodies
+    (first, second), reach = bodies.mass.tolist(), float(bodies.radius.sum())
+    apart, relative = np.diff(bodies.position, axis=0)[0], np.diff(bodies.velocity, axis=0)[0]
+    approach = -float(apart @ relative)
+    excess = (math.hypot(*apart) - reach) * (math.hypot(*apart) + reach)
+    time = excess / (approach + math.sqrt(approach**2 - float(relative @ relative) * excess))
+    normal = (apart + relative * time) / reach
+    change = 2.0 * float(relative @ normal) / (first + second) * normal
+    return time, bodies.velocity + np.array([second * change, -first * change])
 
 
 def _velocity_error(scene: Scene, run: Trajectory) -> float:
-    return float(np.abs(run.velocity[-1, :, 0] - _after(scene)).max() / SPEED)
+    """Return the error of the final velocities as a fraction of the speed before the impact."""
+    _, after = _impact(scene)
+    return float(np.abs(run.velocity[-1] - after).max() / np.hypot(*scene.bodies.velocity[0]))
 
 
 def _position_error(scene: Scene, run: Trajectory) -> float:
     """Return the error of the final positions as a fraction of the larger radius."""
-    distance = SPEED * scene.world.duration - GAP  # distance after the impact at the speed before it
-    truth = np.asarray([GAP, 0.0]) + _after(scene) * distance / SPEED
-    moved = run.position[-1, :, 0] - run.position[0, :, 0]
+    time, after = _impact(scene)
+    truth = scene.bodies.velocity * time + after * (scene.world.duration - time)
+    moved = run.position[-1] - run.position[0]
     return float(np.abs(moved - truth).max() / scene.bodies.radius.max())
 
 

@@ -213,10 +213,10 @@ def _distance_error(scene: Scene, run: Trajectory) -> float:
     It slides for v/(3μg) with the deceleration μg, and then rolls at two thirds of its speed.
     """
     deceleration = (scene.balls[0].friction or 0.0) * -scene.world.gravity[1]
-    time = scene.world.duration
-    slid = min(time, SPEED / (3.0 * deceleration)) if deceleration > 0.0 else time
-    distance = SPEED * slid - 0.5 * deceleration * slid**2 + (SPEED - deceleration * slid) * (time - slid)
-    return abs(float(run.position[-1, 0, 0]) - distance) / distance
+    time, (start, speed) = scene.world.duration, (scene.bodies.position[0, 0], scene.bodies.velocity[0, 0])
+    slid = min(time, speed / (3.0 * deceleration)) if deceleration > 0.0 else time
+    distance = speed * slid - 0.5 * deceleration * slid**2 + (speed - deceleration * slid) * (time - slid)
+    return abs(float(run.position[-1, 0, 0] - start - distance)) / float(distance)
 
 
 SLIDE = Scenario(
