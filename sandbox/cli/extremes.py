@@ -44,7 +44,7 @@ from sandbox.measure.extremes.isolation import WorkerError
 from sandbox.measure.extremes.outcome import VERDICTS, survived_tenths
 from sandbox.measure.extremes.runner import COST_REFERENCE, SAMPLE_SECONDS, WORKER_MEMORY
 from sandbox.measure.extremes.scenarios import AXES, PAIRS
-from sandbox.measure.extremes.survival import LEVEL_STARTS
+from sandbox.measure.extremes.survival import LEVEL_STARTS, MIN_STARTS
 from sandbox.measure.starts import MAX_STARTS
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.errors import Fault
@@ -66,7 +66,7 @@ class _Options(OutputOptions):
     overrides: tuple[str, ...]
     quick: bool
     pairs: bool
-    starts: int
+    starts: int | None
     spread: float
     timeout: float
     memory: int
@@ -207,10 +207,9 @@ MIN_MEMORY = 1024
 @click.option(
     "--starts",
     type=click.IntRange(1, MAX_STARTS),
-    default=LEVEL_STARTS,
     metavar="N",
     help="run each level of an axis from N perturbed starts, of which 95 % must pass; fewer where runs cost much; "
-    f"1: only the start of the scene; default: {LEVEL_STARTS}",
+    f"1: only the start of the scene; default: {LEVEL_STARTS}, with --quick {MIN_STARTS}",
 )
 @spread_option
 @click.option(
@@ -281,7 +280,7 @@ def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
         engines,
         options.overrides,
         quick=options.quick,
-        starts=options.starts,
+        starts=options.starts or (MIN_STARTS if options.quick else LEVEL_STARTS),
         spread=options.spread,
         seconds=options.timeout,
         memory=options.memory,

@@ -69,7 +69,7 @@ def test_levels_are_run_from_starts_of_which_95_percent_must_survive(capfd: pyte
     assert re.match(
         r"speed  pymunk +d✗✗ +×1  up to 0\.99, fails at 1\.01: through: the bullet passed the wall", single[0]
     )
-    status, several, _ = lines_of(capfd, *words)
+    status, several, _ = lines_of(capfd, *words, "--starts", "20")
     assert status == 0
     assert re.match(
         r"speed  pymunk +dd[✗0-2] +×1  up to 1\.01, fails at 10: through: \d+ of 20 starts failed", several[0]
