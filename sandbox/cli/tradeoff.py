@@ -44,7 +44,7 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
-from sandbox.columns import Column, shown
+from sandbox.columns import TRUTH, Column, shown
 from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import format_quantity
@@ -74,6 +74,8 @@ LEGEND = {
     "cheapest": "the cheapest setting within the tolerance",
     "best": "the most accurate setting within the budget",
 }
+IS_TRUTH = "the engine with this setting gives the truth, so that its error is 0"
+"""Meaning of `TRUTH` in place of an error"""
 LONG = ">frame"
 """Mark of settings that are not recommended, because their dt is longer than a frame."""
 
@@ -95,7 +97,7 @@ def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
         Column("substeps", "solver steps per frame", lambda point: point.settings.substeps, "count"),
         Column("iterations", iterations, lambda point: point.settings.iterations, "count"),
         Column("other settings", "further changes of [solver]", _other_settings, "text", is_optional=True),
-        Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", lambda point: point.error),
+        Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", _error),
         Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
         Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time", is_detail=True),
     ]
@@ -125,7 +127,8 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     if rows:
         print_table(table, keys=SETTING_COLUMNS)
         if verbose:
-            print_legend([*heads_of(table), *LEGEND], {column.head: column.about for column in columns} | LEGEND)
+            meanings = {column.head: column.about for column in columns} | LEGEND | {TRUTH: IS_TRUTH}
+            print_legend([*heads_of(table), *LEGEND, *([TRUTH] if any(p.is_truth for p in rows) else [])], meanings)
         else:
             print_line(_legend(rows, found))
         if any(point.settings.dt > found.max_dt for point in rows):
@@ -174,12 +177,17 @@ def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
     repeats = max(point.repeats for point in rows)
     times = f"minimum of {repeats} timings" if repeats else "from the run that was scored"
     marks = "".join(f"; {mark}: {meaning}" for mark, meaning in LEGEND.items() if mark in used)
+    marks += f"; {TRUTH}: {IS_TRUTH}" if any(point.is_truth for point in rows) else ""
     return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
 
 
 def _long_legend(found: Tradeoff) -> str:
     exception = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
     return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{exception}, so the setting is not recommended"
+
+
+def _error(point: Evaluation) -> float | str | None:
+    return TRUTH if point.is_truth else point.error
 
 
 def _other_settings(point: Evaluation) -> str:

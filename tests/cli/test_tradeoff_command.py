@@ -58,6 +58,21 @@ def test_table_has_the_pareto_front_and_the_recommended_settings(tmp_path, capfd
     assert any(line.startswith("    space.step(dt") or line.startswith("        space.step(dt") for line in out)
 
 
+def test_error_of_the_run_that_is_the_truth_is_printed_as_truth(tmp_path: Path, capfd: Any) -> None:
+    scene = write_scene(tmp_path, BULLET)
+    options = ("--engine", "exact,pymunk", "--set", "solver.dt=0.004", "--effort", "0.2", "--repeats", "1")
+    out = output_of(capfd, "tradeoff", scene, *options)
+    rows = {line.split()[0]: line.split() for line in out if line.split() and line.split()[-1] in ("scene", "cheapest")}
+    assert "truth" in rows["exact"] and "truth" not in rows["pymunk"]
+    points = json_of(capfd, "tradeoff", scene, *options)[1]["points"]
+    own = [point for point in points if point["is_truth"]]
+    assert {point["engine"] for point in own} == {"exact"}
+    assert all(point["error"] == 0.0 for point in own), "also with another dt, which chooses the frames of exact only"
+    assert len({point["settings"]["dt"] for point in own}) > 1
+    as_energy = json_of(capfd, "tradeoff", scene, *options, "--metric", "energy")[1]["points"]
+    assert not any(point["is_truth"] for point in as_energy), "a drift of 0 is measured"
+
+
 def test_setting_that_may_tunnel_is_not_recommended_and_said_so(tmp_path, capfd):
     scene = write_scene(tmp_path, BULLET)
     chosen = "--engine pymunk --effort 0.2 --repeats 5 --metric missed_contacts --budget 100"  # the least of 5: noise

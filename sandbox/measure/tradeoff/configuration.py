@@ -290,6 +290,8 @@ class Evaluation:
     """reasons not to recommend the setting although its error may be within the tolerance, as clauses"""
     worst: WorstError | None = None
     """body, time and place of the largest distance from the truth; None without a truth"""
+    is_truth: bool = False
+    """whether the error is 0 because the run is the truth itself, from all starts"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))
@@ -402,6 +404,9 @@ def evaluate(
         work=result.work,
         objections=objections,
         worst=result.worst,
+        is_truth=result.status == "ok"
+        and METRICS[metric].is_difference
+        and all(each.truth is not None and each.truth.is_run_of(configuration.engine, resolved) for each in contexts),
         counted_seconds=result.counted_seconds,
         spent_seconds=result.spent_seconds,
         seconds=result.seconds,

@@ -143,7 +143,7 @@ def describe(point: Evaluation, objective: Objective, confirmation: FreshStarts 
     """
     assert point.error is not None and point.cost is not None
     unit = objective.metric.unit
-    error = f"{objective.metric.name} {format_quantity(point.error, unit)}"
+    error = f"{objective.metric.name} {format_quantity(point.error, unit)}{', the truth itself' * point.is_truth}"
     if objective.metric.name == "passes" and point.error > 0.0:
         error += f", 1 in {1.0 / point.error:.3g} contacts missed"
     if objective.metric.name == "joint_error" and (distance := point.metrics.get("joint_distance")) is not None:

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from markupsafe import Markup
 
+from sandbox.columns import TRUTH
 from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.tradeoff import Tradeoff
@@ -197,7 +198,7 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     repeats = row.get("repeats")
     median = format_number(row.get("cost_median_ms_per_second"))
     figures = [
-        (metric, f"{format_number(point.error)} {unit}".rstrip() if point.error is not None else UNKNOWN),
+        (metric, f"{_error_cell(point)} {'' if point.error is None or point.is_truth else unit}".rstrip()),
         ("cost", f"{format_number(point.cost)} ms per s" if point.cost is not None else UNKNOWN),
         ("median cost", f"{median} ms per s" if repeats else UNKNOWN),
         ("repeats", str(repeats) if repeats else UNKNOWN),
@@ -303,6 +304,11 @@ def _metric_column(document: TradeoffMapping) -> HtmlColumn:
     return HtmlColumn(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True)
 
 
+def _error_cell(point: WorkPoint) -> str:
+    """Return the error of a point as text, `truth` if its run is the truth itself."""
+    return TRUTH if point.is_truth else format_number(point.error)
+
+
 COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum of the repeats")
 
 
@@ -314,7 +320,7 @@ def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Mark
     columns: CellColumns[WorkPoint] = (
         (HtmlColumn("engine"), lambda point: engine_name(point.engine)),
         (HtmlColumn("changes"), lambda point: _marked_changes(point, document)),
-        (_metric_column(document), lambda point: format_number(point.error)),
+        (_metric_column(document), _error_cell),
         (COST, lambda point: format_number(point.cost)),
         (median, lambda point: format_number(point.row.get("cost_median_ms_per_second"))),
         (frame, lambda point: _frame_cell(point, document)),
@@ -333,7 +339,7 @@ def _points_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Mar
     for point in points:
         cells: list[Content] = [engine_name(point.engine), _marked_changes(point, document)]
         cells.append(badge(point.status, "good" if point.is_drawable else "bad", point.row.get("reason")))
-        cells += [format_number(point.error), format_number(point.cost)]
+        cells += [_error_cell(point), format_number(point.cost)]
         cells += [format_number((point.row.get("metrics") or {}).get(name)) for name in metrics]
         counts = point.row.get("work") or {}
         cells += [f"{counts[name]:,}" if name in counts else UNKNOWN for name in counters]
