@@ -32,7 +32,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
-from sandbox.cli.starts import spread_option, starts_option, starts_text
+from sandbox.cli.starts import margin_option, spread_option, starts_option, starts_text
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -122,6 +122,8 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
         table.add_row(*(cell_text(column, point) for column in columns), Text(" ".join(marks), style="green"))
     name = f"{scene} ({found.scene.title})" if found.scene.title else scene
     print_line(f"{name}: {found.error_about}")
+    if found.margin_about:
+        print_line(found.margin_about)
     print_line(_about(found))
     print_line(starts_text(found))
     if rows:
@@ -271,6 +273,7 @@ class _Options(OutputOptions):
     overrides: tuple[str, ...]
     metric: str | None
     tolerance: float | None
+    margin: float
     budget: float | None
     fps: float
     starts: int
@@ -296,6 +299,7 @@ class _Options(OutputOptions):
     help=f"measure of the error; default: chosen from the scene. One of {', '.join(METRICS)}",
 )
 @click.option("--tolerance", type=NOT_NEGATIVE, metavar="X", help="largest allowed error, in the unit of the metric")
+@margin_option
 @click.option("--budget", type=POSITIVE, metavar="MS", help="computing time per frame that is available, ms")
 @click.option(
     "--fps",
@@ -361,6 +365,7 @@ def tradeoff_command(options: _Options) -> int:
                 names,
                 metric=options.metric,
                 tolerance=options.tolerance,
+                margin=options.margin,
                 budget=options.budget,
                 fps=options.fps,
                 starts=options.starts,

@@ -192,6 +192,7 @@ FAILURE_DISTANCE = 2.2
 FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, "marker": "o", "ms": 11, "mfc": "none"}
 """A ring around each point, so that a front of one point is visible too."""
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
+MARGIN: dict[str, Any] = {**BOUND, "ls": (0, (5.0, 2.5))}
 POINT = "point:"
 """Prefix of the gid of a point; its index follows."""
 
@@ -291,6 +292,9 @@ def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line
     if tolerance:
         panel.axhline(tolerance, **BOUND)
         entries.append((f"tolerance {tolerance:.3g} {document.get('unit') or ''}", Line2D([], [], **BOUND)))
+    if tolerance and document.get("margin"):
+        panel.axhline(document["max_error"], **MARGIN)
+        entries.append((f"less a margin of {100.0 * document['margin']:.3g} %", Line2D([], [], **MARGIN)))
     if budget:
         panel.axvline(budget, **BOUND)
         entries.append((f"budget {budget:.3g} ms per s", Line2D([], [], **BOUND)))

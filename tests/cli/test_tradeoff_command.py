@@ -240,6 +240,21 @@ def test_spread_is_a_fraction_or_in_per_cent(text: str, spread: float, tmp_path:
     assert (document["starts"] == 1) == (spread == 0.0)
 
 
+@pytest.mark.parametrize("text", ["20%", "0.2"])
+def test_margin_is_stated_and_left_unused(text: str, tmp_path: Path, capfd: Any) -> None:
+    command = ("tradeoff", write_scene(tmp_path), *QUICK, "--tolerance", "0.01", "--margin", text)
+    out = output_of(capfd, *command)
+    assert out[1] == "tolerance: recommended settings keep to 8 mm (10 mm less a margin of 20 %)"
+    _, document, _ = json_of(capfd, *command)
+    assert (document["tolerance"], document["margin"], document["max_error"]) == (0.01, 0.2, 0.008)
+    assert document["within_tolerance"]["error"] <= 0.008
+
+
+def test_margin_of_the_whole_tolerance_is_refused(tmp_path: Path, capfd: Any) -> None:
+    assert call(["tradeoff", write_scene(tmp_path), "--margin", "100%"]) == 2
+    assert "--margin" in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("text", ["60%", "-1%", "much", "%", "nan"])
 def test_invalid_spread_is_refused(text: str, tmp_path: Path, capfd: Any) -> None:
     status, out, err = lines_of(capfd, "tradeoff", write_scene(tmp_path), "--spread", text)

@@ -103,6 +103,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         unit=metric.unit,
         tolerance=score.tolerance,
         tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
+        margin=request.margin,
         position_tolerance=request.length,
         budget=request.budget,
         invariant=score.invariant,
@@ -256,6 +257,6 @@ def _other_engines(request: AdviceRequest, score: AdviceScore, measured: AdviceM
         if name == request.engine:
             continue
         setting = None if point is None else _measured_setting(point, score, measured, request)
-        is_within = setting is not None and setting.error is not None and setting.error <= score.tolerance
+        is_within = setting is not None and setting.error is not None and setting.error <= score.max_error
         found.append(OtherEngine(name, setting, is_within, refused.get(name)))
     return tuple(found)

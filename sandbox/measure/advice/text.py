@@ -113,6 +113,8 @@ def target_text(advice: Advice) -> str:
         tolerance = f"{pixels_text(advice.tolerance_px)} px ({scale})"
     else:
         tolerance = f"{advice.metric} {tolerance}"
+    if advice.margin:
+        tolerance += f" less a margin of {100.0 * advice.margin:.3g} %"
     budget = "" if advice.budget is None else f", budget {advice.budget:g} ms per frame"
     return f"{advice.engine} at {advice.fps:g} fps, tolerance {tolerance}{budget}"
 
@@ -213,7 +215,8 @@ def cheapest_head(advice: Advice) -> str:
     """Return the heading of the recommended setting: among how many it is the cheapest, and its fresh starts."""
     tried = f", of {advice.tried_here} tried on {advice.engine}" if advice.tried_here else ""
     confirmed = "" if advice.confirmation is None else f"; {advice.confirmation}"
-    return f"Cheapest setting within the tolerance{tried}{confirmed}"
+    less = " less the margin" if advice.margin else ""
+    return f"Cheapest setting within the tolerance{less}{tried}{confirmed}"
 
 
 def no_setting_text(advice: Advice) -> str:
@@ -227,7 +230,7 @@ def no_setting_text(advice: Advice) -> str:
             f"every setting tried on {advice.engine} misses contacts with the actions, or departs sooner from finer "
             "steps than the present one"
         )
-    is_within = advice.fallback is not None and advice.is_within_tolerance(advice.fallback)
+    is_within = advice.fallback is not None and advice.is_within_margin(advice.fallback)
     return "none without an objection" if is_within else "none"
 
 
@@ -247,14 +250,14 @@ def knob_head(advice: Advice) -> str:
     return f"One change at a time of {which.get(advice.knob_start or '', 'this setting')}{text}"
 
 
-def engine_text(other: OtherEngine) -> str:
+def engine_text(advice: Advice, other: OtherEngine) -> str:
     """Return the remark about another engine: why it cannot run the scene, or that it misses the tolerance."""
     if other.missing is not None:
         return f"cannot run the scene: {other.missing}"
     if other.setting is None:
         return "no setting reached the end of the scene"
     if not other.is_within_tolerance:
-        return "misses the tolerance"
+        return "misses the tolerance, or its margin" if advice.margin else "misses the tolerance"
     return OBJECTIONS if other.setting.objections else ""
 
 

@@ -39,7 +39,7 @@ def recommend_cheapest(
         screen: returns whether a configuration is within the tolerance in enough of the starts that decide.
         confirm: returns its errors from starts that did not decide.
     """
-    candidates = [p for p in _eligible(points, objective) if p.error is not None and p.meets(objective.tolerance)]
+    candidates = [p for p in _eligible(points, objective) if p.error is not None and p.meets(objective.max_error)]
     for point in by_cost(candidates):
         if screen(point):
             found = confirm(point)
@@ -70,7 +70,7 @@ def cheapest_rejected(
     points: Sequence[Evaluation], objective: Objective, chosen: Recommendation | None
 ) -> Recommendation | None:
     """Return the cheapest evaluation within the tolerance that has objections, if none or a dearer one was chosen."""
-    within = [p for p in _eligible(points, objective) if p.ranking_error <= objective.tolerance]
+    within = [p for p in _eligible(points, objective) if p.ranking_error <= objective.max_error]
     first = next(iter(by_cost(within)), None)
     if first is None or not first.objections or (chosen is not None and first is chosen.point):
         return None

@@ -18,7 +18,7 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.proportion import Proportion
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.objective import pareto
+from sandbox.measure.tradeoff.objective import less_margin, pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.compile.scene import Scene
@@ -111,6 +111,8 @@ class Tradeoff(StudyAgainstTruth):
     """cheaper models of the scene whose error is within the tolerance"""
     tolerance: float
     """largest accepted error, in the unit of the metric"""
+    margin: float
+    """fraction of the tolerance that a recommended setting leaves unused"""
     budget: float | None
     """ms, computing time per frame; None if not given"""
     fps: float
@@ -164,7 +166,7 @@ class Tradeoff(StudyAgainstTruth):
         "metric_about",
         "unit",
     )
-    json_properties: ClassVar = (("answers", "sentences"), ("answered_by", "answer_keys"))
+    json_properties: ClassVar = ("max_error", ("answers", "sentences"), ("answered_by", "answer_keys"))
 
     def __repr__(self) -> str:
         """Return the number of points, and the settings within the tolerance and the budget."""
@@ -189,6 +191,11 @@ class Tradeoff(StudyAgainstTruth):
         return self.metric.unit
 
     @property
+    def max_error(self) -> float:
+        """Largest error of a recommended setting, in the unit of the metric: the tolerance less the margin."""
+        return less_margin(self.tolerance, self.margin)
+
+    @property
     def error_about(self) -> str:
         """Metric of the error and the reason for it, as one sentence."""
         return f"error metric: {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
@@ -203,8 +210,7 @@ class Tradeoff(StudyAgainstTruth):
         successful = [point for point in self.points if point.status == "ok"]
         if successful and all(point.error is None for point in successful):
             return [Conclusion(f"{self.metric.name} cannot be measured in this scene; choose another --metric")]
-        tolerance = format_quantity(self.tolerance, self.metric.unit)
-        question = f"cheapest setting with {self.metric.name} within {tolerance}"
+        question = f"cheapest setting with {self.metric.name} within {self._limit_text()}"
         found = [self._answer(question, "within_tolerance", "nearest_to_tolerance")]
         if self.budget is not None:
             question = f"most accurate setting within {self.budget:g} ms per frame at {self.fps:g} fps"
@@ -212,13 +218,27 @@ class Tradeoff(StudyAgainstTruth):
         overall = None if self.within_tolerance is None else self.within_tolerance.point
         for name, each in self.cheapest_by_engine.items():
             if each and each.point is not overall:
-                text = f"cheapest setting of {name} within the tolerance: {each.sentence}"
+                text = f"cheapest setting of {name} within {self._limit_name}: {each.sentence}"
                 found.append(Conclusion(text, f"cheapest_by_engine.{name}"))
         if self.rejected is not None:
             reasons = "; ".join(self.rejected.point.objections)
-            text = f"within the tolerance, but not recommended: {self.rejected.sentence}. Because: {reasons}"
+            text = f"within {self._limit_name}, but not recommended: {self.rejected.sentence}. Because: {reasons}"
             found.append(Conclusion(text, "rejected"))
         return found
+
+    def _limit_text(self) -> str:
+        """Return the largest error of a recommended setting: `10 mm`, or `8 mm (10 mm less a margin of 20 %)`."""
+        tolerance, largest = (format_quantity(each, self.metric.unit) for each in (self.tolerance, self.max_error))
+        return f"{largest} ({tolerance} less a margin of {100.0 * self.margin:.3g} %)" if self.margin else tolerance
+
+    @property
+    def _limit_name(self) -> str:
+        return "the tolerance less the margin" if self.margin else "the tolerance"
+
+    @property
+    def margin_about(self) -> str | None:
+        """Effect of the margin, as one sentence; None without one."""
+        return f"tolerance: recommended settings keep to {self._limit_text()}" if self.margin else None
 
     @property
     def sentences(self) -> list[str]:

@@ -75,7 +75,7 @@ class StartTrials:
         count = self._affordable(point)
         failures = math.floor((1.0 - HELD_FRACTION) * count + 1e-9)
         for number in range(1, count + 1):
-            failures -= self._error(point, number) > self.objective.tolerance
+            failures -= self._error(point, number) > self.objective.max_error
             if failures < 0:
                 return False
         return True
@@ -85,16 +85,16 @@ class StartTrials:
         if self.count < 2:
             return None
         numbers = range(self.count + 1, self.count + 1 + self._affordable(point))
-        return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.tolerance)
+        return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.max_error)
 
     def counterexample(self, evaluations: Sequence[Evaluation]) -> int | None:
         """Return a start from which a setting fails, if an engine has settings within the tolerance but none holds."""
         for engine in self.space.engines:
-            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.tolerance)]
+            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.max_error)]
             own.sort(key=lambda each: each.counted_seconds)
             if own and not any(map(self.holds, own)):
                 tried = {n: error for (setting, n), error in self._errors.items() if setting == own[0].configuration}
-                return next(n for n, error in tried.items() if error > self.objective.tolerance)
+                return next(n for n, error in tried.items() if error > self.objective.max_error)
         return None
 
     def context_at(self, number: int) -> EvaluationContext:
@@ -123,7 +123,7 @@ class StartTrials:
         key = point.configuration, number
         if key not in self._errors:
             limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
-            metric, tolerance = self.objective.metric.name, self.objective.tolerance
+            metric, tolerance = self.objective.metric.name, self.objective.max_error
             found = evaluate(point.configuration, self.space, [self.context_at(number)], metric, tolerance, limit)
             self._errors[key] = found.ranking_error
         return self._errors[key]

@@ -34,6 +34,7 @@ from sandbox.measure.tradeoff.objective import (
     check_objective,
     complete_objective,
     is_dominated,
+    less_margin,
     metric_named,
 )
 from sandbox.measure.tradeoff.recommendation import (
@@ -79,6 +80,7 @@ def tradeoff(
     *,
     metric: str | None = None,
     tolerance: float | None = None,
+    margin: float = 0.0,
     budget: float | None = None,
     fps: float = 60.0,
     starts: int = DEFAULT_STARTS,
@@ -108,6 +110,8 @@ def tradeoff(
             trusted to the end, otherwise an invariant of the scene.
         tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
             no missed contact.
+        margin: fraction of the tolerance that a recommended setting has to leave unused: with 0.2 its error is at most
+            0.8 times the tolerance.
         budget: computing time per frame, ms, for which the most accurate setting is sought.
         fps: frames per second of the budget. A recommended setting has at least this step rate, or the step rate of the
             scene if that is lower.
@@ -148,7 +152,7 @@ def tradeoff(
     for name in names:
         engine_named(name)
     _check_arguments(starts, zoom, effort, time_limit, repeats, most)
-    check_objective(metric, tolerance, budget, fps)
+    check_objective(metric, tolerance, budget, fps, margin)
     base = scene.solver.replace(**settings) if settings else scene.solver
     scene = with_whole_steps(scene, base.dt)
     require_memory(scene, base, 4 * len(scene.bodies))
@@ -156,14 +160,15 @@ def tradeoff(
 
     on_progress(Progress("the truth"))
     drawn = Starts(scene, spread)
-    truth_tolerance = _truth_tolerance(scene, metric, tolerance, zoom)
+    max_error = None if tolerance is None else less_margin(tolerance, margin)
+    truth_tolerance = _truth_tolerance(scene, metric, max_error, zoom)
     context = context_of(scene, base, truth_tolerance, zoom, truth)
     zoom = context.zoom  # without a given one, that of the motion, for which a truth is needed
-    finer = _truth_tolerance(scene, metric, tolerance, zoom)
+    finer = _truth_tolerance(scene, metric, max_error, zoom)
     if finer < truth_tolerance:
         truth_tolerance = finer
         context = context_of(scene, base, finer, zoom)
-    objective = complete_objective(context, metric, tolerance, budget, fps)
+    objective = complete_objective(context, metric, tolerance, budget, fps, margin)
     objective = objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps))
     able = tuple(name for name in names if not _refusal(scene, name, base))
     space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
@@ -259,7 +264,7 @@ class _Study:
             space=self.space,
             contexts=self._search_contexts,
             metric=self.objective.metric.name,
-            tolerance=self.objective.tolerance,
+            tolerance=self.objective.max_error,
             budget=None if budget is None else budget * duration,
             effort=self.effort,
             max_evaluations=most,
@@ -319,6 +324,7 @@ class _Study:
             splits=tuple(splits),
             proposals=tuple(proposals),
             tolerance=self.objective.tolerance,
+            margin=self.objective.margin,
             budget=self.objective.budget,
             fps=self.objective.fps,
             within_tolerance=self._with_warnings(within_tolerance),
@@ -397,7 +403,7 @@ class _Study:
             engine=engine,
             settings=self.space.own_settings(engine) if chosen is None else chosen.point.asked,
             metric=self.objective.metric,
-            tolerance=self.objective.tolerance,
+            tolerance=self.objective.max_error,
             limit=RUN_FRACTION * self.effort,
             deadline=self.deadline,
         )

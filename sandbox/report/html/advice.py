@@ -153,7 +153,7 @@ def _engines(advice: Advice) -> Markup:
     columns = HtmlColumn("engine"), HtmlColumn("setting"), _error_column(advice), FRAME, ratio
     rows: list[list[Content]] = []
     for other in advice.others:
-        setting, remark = other.setting, engine_text(other)
+        setting, remark = other.setting, engine_text(advice, other)
         if setting is None:
             rows.append([engine_name(other.engine), remark, None, None, None])
             continue

@@ -100,6 +100,16 @@ def test_recommendation_is_within_the_tolerance_in_an_independent_run() -> None:
     assert (point.counted or 0.0) <= EQUAL_WORK_FACTOR * min(p.counted or 0.0 for p in close)
 
 
+def test_recommendation_leaves_the_margin_unused() -> None:
+    scene = scene_of(DROP)
+    without, found = study(scene, tolerance=4e-3), study(scene, tolerance=4e-3, margin=0.75)
+    assert without.within_tolerance.point.error > 1e-3, "otherwise the margin changes nothing"
+    assert found.within_tolerance.point.error <= 1e-3
+    assert error_of(scene, found.within_tolerance.point) == found.within_tolerance.point.error
+    assert (found.tolerance, found.margin, found.max_error) == (4e-3, 0.75, 1e-3)
+    assert "within 1 mm (4 mm less a margin of 75 %): " in found.sentences[0]
+
+
 LUCKY = (
     toml("world", gravity=[0.0, 0.0], duration=2.0)
     + toml("solver", dt=0.125)
@@ -240,6 +250,7 @@ def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> Non
         {"tolerance": 0.0}, {"tolerance": math.nan}, {"tolerance": math.inf}, {"budget": 0.0}, {"budget": math.inf},
         {"tolerance": -1.0, "metric": "missed_contacts"}, {"fps": math.nan}, {"starts": 0}, {"zoom": -1.0},
         {"effort": 0.0}, {"effort": math.inf}, {"time_limit": 0.0}, {"repeats": 0}, {"most": 0},
+        {"margin": -0.1}, {"margin": 1.0}, {"margin": math.nan},
     ],
 )  # fmt: skip
 def test_invalid_argument_is_rejected_before_any_run(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:

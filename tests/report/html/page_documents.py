@@ -69,6 +69,7 @@ def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "splits": (),
         "proposals": (),
         "tolerance": 0.02,
+        "margin": 0.0,
         "budget": 0.5,
         "fps": 60.0,
         "within_tolerance": None,
