@@ -173,9 +173,11 @@ if TYPE_CHECKING:
     from sandbox.measure.starts import (
         Starts as Starts,
     )
+    from sandbox.measure.tradeoff.fresh_starts import (
+        FreshStarts as FreshStarts,
+    )
     from sandbox.measure.tradeoff.result import (
         Conclusion as Conclusion,
-        FreshStarts as FreshStarts,
         Recommendation as Recommendation,
         Tradeoff as Tradeoff,
     )
@@ -357,7 +359,8 @@ _NAMES = {
     "sandbox.measure.tradeoff.configuration": "Configuration Evaluation",
     "sandbox.measure.tradeoff.error_budget": "ErrorBudget",
     "sandbox.measure.starts": "Starts",
-    "sandbox.measure.tradeoff.result": "Conclusion FreshStarts Recommendation Tradeoff",
+    "sandbox.measure.tradeoff.fresh_starts": "FreshStarts",
+    "sandbox.measure.tradeoff.result": "Conclusion Recommendation Tradeoff",
     "sandbox.measure.tradeoff.simplify": "Simplification",
     "sandbox.notebook": "live",
     "sandbox.pymunk_capture.game_capture": "GameCapture SpaceCapture capture",

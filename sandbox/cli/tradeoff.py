@@ -1,7 +1,8 @@
 """Command `tradeoff` and its tables."""
 
+import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,15 +48,16 @@ from sandbox.cli.tables import (
 from sandbox.columns import TRUTH, Column, shown
 from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
-from sandbox.formatting import format_quantity
+from sandbox.formatting import UNKNOWN, format_quantity
 from sandbox.measure.compare import compare
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
+from sandbox.measure.tradeoff.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
-from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.measure.tradeoff.result import Tradeoff, shown_of
 from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS, MAX_POINTS, tradeoff
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
@@ -66,8 +68,6 @@ ROUNDING = 1e-12
 """m; a part of an error below this is a rounding error, as coordinates of up to 1 km are exact to 1e-13 m."""
 MAX_REASONS = 3
 """Failures listed with their reason."""
-MAX_ROWS = 8
-"""Rows of the front of one engine; of a longer front, evenly spaced points and the recommended ones are shown."""
 LEGEND = {
     "scene": "the setting in the scene file",
     "front": "no other setting is both cheaper and more accurate",
@@ -98,6 +98,11 @@ def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
         Column("iterations", iterations, lambda point: point.settings.iterations, "count"),
         Column("other settings", "further changes of [solver]", _other_settings, "text", is_optional=True),
         Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", _error),
+        Column(
+            f"median{unit}", "median of the errors from fresh starts", _start_error("median_error"), is_optional=True
+        ),
+        Column(f"95 %{unit}", "95 % quantile of these errors", _start_error("error_95"), is_optional=True),
+        Column("starts", "number of these starts", _start_count, "count", is_optional=True, is_detail=True),
         Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
         Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time", is_detail=True),
     ]
@@ -133,6 +138,8 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
             print_legend([*heads_of(table), *LEGEND, *([TRUTH] if any(p.is_truth for p in rows) else [])], meanings)
         else:
             print_line(_legend(rows, found))
+        if found.starts > 1 and not (found.interrupted or found.out_of_time):
+            print_line(_starts_legend(rows))
         if any(point.settings.dt > found.max_dt for point in rows):
             print_line(_long_legend(found))
     splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
@@ -145,7 +152,7 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
 
 def _rows(found: Tradeoff) -> list[Evaluation]:
     """Return the settings of the table: the front of each engine, and all marked settings, by engine and cost."""
-    rows = [point for front in found.fronts().values() for point in _thinned(front, found)]
+    rows = [point for front in found.fronts().values() for point in shown_of(front)]
     marked = (point for point in found.points if point.status == "ok" and _marks(point, found))
     rows += [point for point in marked if not any(point is row for row in rows)]
     order = list(found.fronts())
@@ -156,15 +163,6 @@ def _about(found: Tradeoff) -> str:
     ended = "; the time limit ended the search, so another run may try other settings" if found.out_of_time else ""
     count = len(found.points)
     return f"{count} setting{'s' if count != 1 else ''} tried{ended}"
-
-
-def _thinned(front: Sequence[Evaluation], found: Tradeoff) -> list[Evaluation]:
-    """Return at most `MAX_ROWS` settings of the front of an engine, and all recommended ones."""
-    recommended = [point for point in front if set(_marks(point, found)) - {"front"}]
-    if len(front) <= MAX_ROWS:
-        return list(front)
-    evenly = [front[round(k * (len(front) - 1) / (MAX_ROWS - 1))] for k in range(MAX_ROWS)]
-    return [point for point in front if point in evenly or point in recommended]
 
 
 def _marks(point: Evaluation, found: Tradeoff) -> list[str]:
@@ -183,6 +181,18 @@ def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
     return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
 
 
+def _starts_legend(rows: Sequence[Evaluation]) -> str:
+    """Return from how many fresh starts the rows were run, and why some were not."""
+    counts = sorted(filter(None, map(_start_count, rows)))
+    cause = "their runs and truths take more than a part of the effort (--effort)"
+    if not counts:
+        return f"no errors from fresh starts: {cause}"
+    span = f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
+    text = f"median, 95 %: of the errors from {span} fresh starts"
+    text += "" if counts[0] >= MIN_QUANTILE_STARTS else f"; of fewer than {MIN_QUANTILE_STARTS}, 95 % is the largest"
+    return text if len(counts) == len(rows) else f"{text}; {UNKNOWN}: {cause}"
+
+
 def _long_legend(found: Tradeoff) -> str:
     exception = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
     return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{exception}, so the setting is not recommended"
@@ -190,6 +200,22 @@ def _long_legend(found: Tradeoff) -> str:
 
 def _error(point: Evaluation) -> float | str | None:
     return TRUTH if point.is_truth else point.error
+
+
+def _start_error(quantile: str) -> Callable[[Evaluation], float | str | None]:
+    """Return the value of a column of errors from fresh starts; infinite where too many runs failed."""
+
+    def value(point: Evaluation) -> float | str | None:
+        if point.fresh_starts is None:
+            return None
+        error: float | None = getattr(point.fresh_starts, quantile)
+        return TRUTH if point.is_truth and error == 0.0 else math.inf if error is None else error
+
+    return value
+
+
+def _start_count(point: Evaluation) -> int | None:
+    return None if point.fresh_starts is None else point.fresh_starts.held.trials
 
 
 def _other_settings(point: Evaluation) -> str:

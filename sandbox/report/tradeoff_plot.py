@@ -65,6 +65,13 @@ class WorkPoint:
         return bool(self.row.get("is_truth"))  # documents of earlier versions lack it
 
     @property
+    def start_errors(self) -> tuple[float, float, float] | None:
+        """Quantiles of the errors from fresh starts, 5, 50 and 95 %; None if they are unknown or infinite."""
+        found = self.row.get("fresh_starts") or {}
+        low, median, high = (found.get(key) for key in ("error_5", "median_error", "error_95"))
+        return None if low is None or median is None or high is None else (low, median, high)
+
+    @property
     def is_drawable(self) -> bool:
         """Whether it has both an error and a cost."""
         return self.status == "ok" and self.error is not None and self.cost is not None and self.cost > 0.0
@@ -193,6 +200,8 @@ FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, 
 """A ring around each point, so that a front of one point is visible too."""
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
 MARGIN: dict[str, Any] = {**BOUND, "ls": (0, (5.0, 2.5))}
+WHISKER: dict[str, Any] = {"lw": 1.6, "marker": "_", "ms": 7, "mew": 1.6, "zorder": 2.5}
+"""Range of the errors of a point from fresh starts, below the point."""
 POINT = "point:"
 """Prefix of the gid of a point; its index follows."""
 
@@ -239,6 +248,7 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
         panel.plot(*zip(*(point.position for point in front), strict=True), **FRONT)
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
     _label_truth(panel, points)
+    entries += _draw_start_errors(panel, points)
     entries += _draw_bounds(panel, document)
     _draw_failures(panel, points, document, entries)
     panel.grid(color=GRID, lw=0.6)
@@ -283,6 +293,18 @@ def _label_truth(panel: Axes, points: Sequence[WorkPoint]) -> None:
     for point in own.values():
         if point.is_drawable:
             panel.annotate(TRUTH, point.position, (9, 0), **layout)
+
+
+def _draw_start_errors(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, Line2D]]:
+    """Draw the range of the errors from fresh starts of each point that has some; return the entry of the legend."""
+    drawn = [point for point in points if point.is_drawable and not point.is_truth]
+    ranges = [(point, each) for point in drawn if (each := point.start_errors) is not None]
+    for point, (low, median, high) in ranges:
+        x, colour = point.position[0], colour_of(point.engine)
+        ends = [max(each, point.floor) for each in (low, high)]
+        panel.plot([x, x], ends, color=colour, **WHISKER)
+        panel.plot([x], [max(median, point.floor)], color=colour, **{**WHISKER, "ms": 5, "marker": "D", "mfc": "white"})
+    return [("fresh starts: 5 to 95 %, median", Line2D([], [], color=INK, **WHISKER))] if ranges else []
 
 
 def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line2D]]:

@@ -104,6 +104,14 @@ def test_point_that_is_the_truth_is_labelled(document: dict[str, Any]) -> None:
     assert [(text.get_text(), text.xy) for text in panel.texts] == [("truth", (30.0, 0.001))]
 
 
+def test_errors_from_fresh_starts_are_a_range(document: dict[str, Any]) -> None:
+    document["points"][1]["fresh_starts"] = {"error_5": 0.005, "median_error": 0.02, "error_95": 0.03}
+    document["points"][0]["fresh_starts"] = {"error_5": 0.1, "median_error": 0.2, "error_95": None}  # runs failed
+    (panel,) = draw_tradeoff(document).axes
+    ranges = [line.get_xydata().tolist() for line in panel.lines if line.get_marker() == "_"]
+    assert ranges == [[[20.0, 0.005], [20.0, 0.03]]]
+
+
 def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any]) -> None:
     (panel,) = draw_tradeoff(document).axes
     ((x, y),) = [line.get_xydata()[0] for line in panel.lines if line.get_marker() == "x"]

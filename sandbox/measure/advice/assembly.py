@@ -26,10 +26,11 @@ from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )
-from sandbox.measure.tradeoff.result import FreshStarts, Tradeoff
+from sandbox.measure.tradeoff.result import Tradeoff
 from sandbox.provenance import machine, versions
 from sandbox.scene.description.world import Settings
 

@@ -17,6 +17,7 @@ from sandbox.measure.compare.metrics import METRICS, EvaluationContext, WorstErr
 from sandbox.measure.compare.self_convergence import preferred_settings
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objections import ErrorLimits, find_objections
 from sandbox.measure.tradeoff.timing import Timing
 from sandbox.scene.compile.contacts import contact_matrix
@@ -292,6 +293,8 @@ class Evaluation:
     """body, time and place of the largest distance from the truth; None without a truth"""
     is_truth: bool = False
     """whether the error is 0 because the run is the truth itself, from all starts"""
+    fresh_starts: FreshStarts | None = None
+    """errors from perturbed starts, of the points of a front that are shown; None if they are not known"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))

@@ -4,20 +4,18 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple, Self
-
-import numpy as np
+from typing import Any, ClassVar, NamedTuple
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
-from sandbox.jsonable import finite, in_json, to_json
+from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.compare.result import StudyAgainstTruth
 from sandbox.measure.preflight.diagnostic import Diagnostic
-from sandbox.measure.proportion import Proportion
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import less_margin, pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
@@ -32,34 +30,8 @@ LIMITS: Mapping[Limit | None, str] = {
 
 MAX_SHOWN = 4
 """Answers in the representation of a trade-off."""
-
-
-@dataclass(frozen=True)
-class FreshStarts:
-    """Errors of a setting over perturbed starts that were not used to choose it."""
-
-    held: Proportion
-    """starts in which the error was within the tolerance; without trials if the effort allows none"""
-    median_error: float | None
-    """median over the starts, in the unit of the metric; None if half of the runs failed"""
-    error_95: float | None
-    """95 % quantile over the starts, in the unit of the metric; None if more than 5 % of the runs failed"""
-
-    @classmethod
-    def of(cls, errors: Sequence[float], tolerance: float) -> Self:
-        """Return the confirmation by the errors of the starts; infinite for a run that failed."""
-        if not errors:
-            return cls(Proportion(0, 0), None, None)
-        median, high = np.quantile(errors, (0.5, 0.95), method="higher").tolist()
-        held = Proportion(sum(error <= tolerance for error in errors), len(errors))
-        return cls(held, finite(median), finite(high))
-
-    def __str__(self) -> str:
-        """Return in how many starts the setting held: `held in 29 of 30 fresh starts (95 % interval 83 to 99 %)`."""
-        if not self.held.trials:
-            return "not tried from other starts, because their truths and runs take more than the effort"
-        low, high = (100.0 * each for each in self.held.interval)
-        return f"held in {self.held.hits} of {self.held.trials} fresh starts (95 % interval {low:.0f} to {high:.0f} %)"
+MAX_FRONT = 8
+"""Points of the front of one engine that are shown, and run from other starts"""
 
 
 @dataclass(frozen=True)
@@ -301,6 +273,13 @@ def _has_method(point: Evaluation, other: Configuration) -> bool:
     """Return whether a point differs from a configuration only in its step."""
     own = point.configuration
     return (own.engine, own.iterations, own.options) == (other.engine, other.iterations, other.options)
+
+
+def shown_of(front: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the points of a front that are shown: at most `MAX_FRONT`, evenly spaced, with its ends."""
+    if len(front) <= MAX_FRONT:
+        return list(front)
+    return [front[round(k * (len(front) - 1) / (MAX_FRONT - 1))] for k in range(MAX_FRONT)]
 
 
 def front_of(points: Sequence[Evaluation]) -> list[Evaluation]:

@@ -1,19 +1,21 @@
 """Trials of settings from perturbed starts: whether a setting holds, and how often.
 
-The starts 1 to `count` decide on a setting, those up to 2·`count` confirm it. Each is judged against its own truth.
+The starts 1 to `count` decide on a setting, those up to 2·`count` confirm it, and are those of the errors of other
+settings too. Each is judged against its own truth.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
 from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
 from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import Objective
-from sandbox.measure.tradeoff.result import FreshStarts
 from sandbox.measure.tradeoff.search import RUN_FRACTION
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -22,6 +24,8 @@ HELD_FRACTION = 0.95
 """Fraction of the starts in which a recommended setting is within the tolerance."""
 STARTS_FRACTION = 0.3
 """Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
+FRONT_FRACTION = 0.5
+"""Fraction of the effort for the starts from which the shown points of the fronts are run, all together."""
 MIN_STARTS = 3
 """Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
 TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
@@ -87,6 +91,30 @@ class StartTrials:
         numbers = range(self.count + 1, self.count + 1 + self._affordable(point))
         return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.max_error)
 
+    def errors_of_front(self, points: Sequence[Evaluation]) -> dict[Configuration, FreshStarts]:
+        """Return the errors of points over starts that do not decide; without those that the effort does not allow.
+
+        Each point gets an equal part of the effort that is left, the cheapest first, so that the dearest get what the
+        others do not need. The truth of a start counts for all of them.
+        """
+        found: dict[Configuration, FreshStarts] = {}
+        remaining = FRONT_FRACTION * self.effort
+        by_cost = sorted(points, key=lambda each: each.counted_seconds) if self.count > 1 else []
+        for others, point in zip(reversed(range(len(by_cost))), by_cost, strict=True):
+            allowed, numbers = remaining / (others + 1), list[int]()
+            for number in range(self.count + 1, 2 * self.count + 1):
+                run = 0.0 if (point.configuration, number) in self._errors else point.counted_seconds
+                truth = 0.0 if number in self._contexts else self._truth_cost
+                allowed -= run + truth / (others + 1)
+                if allowed < 0.0:
+                    break
+                numbers.append(number)
+                remaining -= run + truth
+            if len(numbers) >= min(MIN_STARTS, self.count) and clock_without_compilation() < self.deadline:
+                errors = [self._error(point, number) for number in numbers]
+                found[point.configuration] = FreshStarts.of(errors, self.objective.max_error)
+        return found
+
     def counterexample(self, evaluations: Sequence[Evaluation]) -> int | None:
         """Return a start from which a setting fails, if an engine has settings within the tolerance but none holds."""
         for engine in self.space.engines:
@@ -110,13 +138,19 @@ class StartTrials:
         """Return the number of starts from which a configuration is run, or 0: counted work decides, not the clock."""
         if self.count < 2 or clock_without_compilation() >= self.deadline:
             return 0
-        truth, cost = self.context.truth, point.counted_seconds
-        if truth is not None and (runs := TRUTH_RUNS[truth.kind]):
-            info = truth.trajectory.info
-            settings = Settings.model_validate(info["settings"])
-            cost += runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
+        cost = point.counted_seconds + self._truth_cost
         affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.count
         return min(self.count, affordable) if affordable >= min(MIN_STARTS, self.count) else 0
+
+    @cached_property
+    def _truth_cost(self) -> float:
+        """Counted cost of the truth of a start, s, from that of the scene."""
+        truth = self.context.truth
+        if truth is None or not (runs := TRUTH_RUNS[truth.kind]):
+            return 0.0
+        info = truth.trajectory.info
+        settings = Settings.model_validate(info["settings"])
+        return runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
 
     def _error(self, point: Evaluation, number: int) -> float:
         """Return the error of a configuration from another start; infinite if its run fails."""

@@ -45,7 +45,7 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of, shown_of
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
 from sandbox.measure.tradeoff.start_trials import StartTrials, context_of
@@ -311,6 +311,11 @@ class _Study:
         near_tolerance = None if within_tolerance else nearest_to_tolerance(points, self.objective)
         has_answer = within_budget or self.objective.budget is None
         near_budget = None if has_answer else nearest_to_budget(points, self.objective)
+        rejected = cheapest_rejected(points, self.objective, within_tolerance)
+        picks = [within_tolerance, within_budget, *cheapest.values()]
+        if repeats and self.is_explained and clock_without_compilation() < self.deadline:
+            self.on_progress(Progress("running the settings of the table from other starts"))
+            points = self._with_fresh_starts(points, list(filter(None, picks)))
         context = self.context
         return Tradeoff(
             scene=self.space.scene,
@@ -327,12 +332,12 @@ class _Study:
             margin=self.objective.margin,
             budget=self.objective.budget,
             fps=self.objective.fps,
-            within_tolerance=self._with_warnings(within_tolerance),
-            within_budget=self._with_warnings(within_budget),
-            cheapest_by_engine={name: self._with_warnings(each) for name, each in cheapest.items()},
-            rejected=cheapest_rejected(points, self.objective, within_tolerance),
-            nearest_to_tolerance=self._with_warnings(near_tolerance),
-            nearest_to_budget=self._with_warnings(near_budget),
+            within_tolerance=self._completed(within_tolerance, points),
+            within_budget=self._completed(within_budget, points),
+            cheapest_by_engine={name: self._completed(each, points) for name, each in cheapest.items()},
+            rejected=self._completed(rejected, points),
+            nearest_to_tolerance=self._completed(near_tolerance, points),
+            nearest_to_budget=self._completed(near_budget, points),
             starts=self.trials.count,
             spread=self.trials.starts.spread,
             searched_starts=(0, *self.counterexamples),
@@ -409,12 +414,22 @@ class _Study:
         )
         return model_simplifications(self._search_contexts, replaced)
 
-    def _with_warnings(self, chosen: Recommendation | None) -> Recommendation | None:
-        """Return a recommendation with the diagnostics of its setting."""
+    def _with_fresh_starts(self, points: Sequence[Evaluation], picks: Sequence[Recommendation]) -> list[Evaluation]:
+        """Return the points, those that the table shows with their errors from fresh starts."""
+        by_engine = [[p for p in points if p.engine == name] for name in self.space.engines]
+        shown = [point for own in by_engine for point in shown_of(front_of(own))]
+        shown += [p for p in points if p.is_own and p.status == "ok"] + [pick.point for pick in picks]
+        found = self.trials.errors_of_front(list({each.configuration: each for each in shown}.values()))
+        found |= {p.point.configuration: p.confirmation for p in picks if p.confirmation and p.confirmation.held.trials}
+        return [replace(each, fresh_starts=found.get(each.configuration)) for each in points]
+
+    def _completed(self, chosen: Recommendation | None, points: Sequence[Evaluation]) -> Recommendation | None:
+        """Return a recommendation with the diagnostics of its setting, and the point of the result."""
         if chosen is None:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
-        return replace(chosen, warnings=tuple(found))
+        point = next(each for each in points if each.configuration == chosen.point.configuration)
+        return replace(chosen, point=point, warnings=tuple(found))
 
 
 def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diagnostic]:

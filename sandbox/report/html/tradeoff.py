@@ -1,6 +1,8 @@
 """HTML page of a trade-off: recommendations, diagram, error budget and all settings."""
 
+import math
 from collections.abc import Collection, Sequence
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -199,6 +201,7 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     median = format_number(row.get("cost_median_ms_per_second"))
     figures = [
         (metric, f"{_error_cell(point)} {'' if point.error is None or point.is_truth else unit}".rstrip()),
+        *_start_figures(point),
         ("cost", f"{format_number(point.cost)} ms per s" if point.cost is not None else UNKNOWN),
         ("median cost", f"{median} ms per s" if repeats else UNKNOWN),
         ("repeats", str(repeats) if repeats else UNKNOWN),
@@ -214,6 +217,28 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     figures += [("note", message) for message in messages]
     title = next(describe(point, document["metric"], unit))
     return {"title": title, "figures": figures, "text": settings_text(point.settings, point.engine)}
+
+
+def _start_figures(point: WorkPoint) -> list[tuple[str, str]]:
+    """Return the errors of a point from fresh starts; empty if it was not run from any."""
+    found = point.row.get("fresh_starts")
+    if not found:
+        return []
+    return [
+        ("fresh starts", str(found["held"]["trials"])),
+        ("median of these", format_number(found["median_error"])),
+        ("95 % of these", format_number(found["error_95"])),
+    ]
+
+
+def _start_cell(point: WorkPoint, key: str) -> str:
+    """Return a quantile of the errors of a point from fresh starts, and `∞` where too many of its runs failed."""
+    found = point.row.get("fresh_starts")
+    if not found:
+        return UNKNOWN
+    if point.is_truth and found[key] == 0.0:
+        return TRUTH
+    return format_number(math.inf if found[key] is None else found[key])
 
 
 def _frame_text(point: WorkPoint, document: TradeoffMapping) -> str:
@@ -315,12 +340,17 @@ COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum 
 def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
     """Return a row for each point of the front."""
     at = f" at {document['fps']:g} fps" if document.get("fps") else ""
-    median = HtmlColumn("median", True, "milliseconds per simulated second, median of the repeats")
+    median = HtmlColumn("median ms per s", True, "milliseconds per simulated second, median of the repeats")
     frame = HtmlColumn("ms per frame", True, f"median of the most expensive frame{at}")
     columns: CellColumns[WorkPoint] = (
         (HtmlColumn("engine"), lambda point: engine_name(point.engine)),
         (HtmlColumn("changes"), lambda point: _marked_changes(point, document)),
         (_metric_column(document), _error_cell),
+        (
+            HtmlColumn("median", True, "median of the errors from fresh starts"),
+            partial(_start_cell, key="median_error"),
+        ),
+        (HtmlColumn("95 %", True, "95 % quantile of these errors"), partial(_start_cell, key="error_95")),
         (COST, lambda point: format_number(point.cost)),
         (median, lambda point: format_number(point.row.get("cost_median_ms_per_second"))),
         (frame, lambda point: _frame_cell(point, document)),

@@ -23,6 +23,7 @@ from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import UnknownMetricError
 from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, NOISE_FACTOR
+from sandbox.measure.tradeoff.result import shown_of
 from sandbox.measure.tradeoff.study import setting_warnings
 from sandbox.progress import Progress
 from sandbox.scene.compile.scene import Scene
@@ -151,6 +152,28 @@ def test_scene_that_cannot_vary_has_one_start() -> None:
     found = study(scene_of(DROP), starts=5, spread=0.0, most=1)
     assert found.starts == 1
     assert found.within_tolerance is None or found.within_tolerance.confirmation is None
+
+
+@pytest.mark.fail_slow(60)  # hundreds of runs
+def test_settings_of_the_table_have_the_errors_of_the_same_fresh_starts() -> None:
+    scene = scene_of(LUCKY)
+    found = study(scene, tolerance=0.02, starts=8, effort=20.0, most=8)
+    shown = [point for front in found.fronts().values() for point in shown_of(front)]
+    assert len(shown) > 2
+    starts = Starts(scene)
+    for point in shown:
+        errors = sorted(error_of(starts.start(number), point) for number in range(9, 17))  # after those that decide
+        assert point.fresh_starts.held.trials == 8
+        assert point.fresh_starts.median_error == errors[4]
+        assert (point.fresh_starts.error_5, point.fresh_starts.error_95) == (errors[0], errors[-1])
+    pick = found.within_tolerance
+    assert pick.point.fresh_starts == pick.confirmation
+    assert any(pick.point is each for each in found.points)
+
+
+def test_settings_whose_starts_take_too_much_have_none() -> None:
+    found = study(scene_of(DROP), effort=1e-4, starts=30, most=3)
+    assert all(point.fresh_starts is None for point in found.points)
 
 
 def test_effort_bounds_the_starts() -> None:

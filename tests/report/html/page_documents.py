@@ -13,7 +13,8 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.result import FreshStarts, Recommendation, Tradeoff
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
