@@ -407,7 +407,7 @@ def _knob_cells(advice: Advice, knob: Knob) -> list[Any]:
         _error_cell(advice, setting),
         ratio_text(knob.error_ratio),
         format_optional(setting.frame_ms),
-        ratio_text(knob.cost_ratio),
+        ratio_text(knob.cost_ratio, knob.cost_ratio_interval),
         Text(remark, style="dim"),
     ]
 
@@ -440,7 +440,7 @@ def _engine_cells(advice: Advice, other: OtherEngine) -> list[Any]:
         setting_text(setting, advice.fps),
         _error_cell(advice, setting),
         format_optional(setting.frame_ms),
-        ratio_text(setting.ratio),
+        ratio_text(setting.ratio, setting.ratio_interval),
         Text(engine_text(advice, other), style="dim"),
     ]
 

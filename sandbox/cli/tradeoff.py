@@ -151,9 +151,12 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
 
 
 def _rows(found: Tradeoff) -> list[Evaluation]:
-    """Return the settings of the table: the front of each engine, and all marked settings, by engine and cost."""
+    """Return the settings of the table: of the front of each engine up to `MAX_FRONT`, and those with another mark.
+
+    They are ordered by engine and cost.
+    """
     rows = [point for front in found.fronts().values() for point in shown_of(front)]
-    marked = (point for point in found.points if point.status == "ok" and _marks(point, found))
+    marked = (point for point in found.points if point.status == "ok" and set(_marks(point, found)) - {"front"})
     rows += [point for point in marked if not any(point is row for row in rows)]
     order = list(found.fronts())
     return sorted(rows, key=lambda each: (order.index(each.engine), each.cost or 0.0))

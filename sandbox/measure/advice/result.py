@@ -49,6 +49,8 @@ class MeasuredSetting:
     was not timed"""
     ratio: float | None = None
     """cost per simulated second relative to the present setting; None if one of them was not timed"""
+    ratio_interval: tuple[float, float] | None = None
+    """95 % confidence interval of the ratio, with 5 timings or more"""
     repeats: int = 0
     """number of timings"""
 
@@ -65,6 +67,8 @@ class Knob:
     """cost relative to the setting without the change"""
     error_ratio: float | None
     """error relative to the setting without the change"""
+    cost_ratio_interval: tuple[float, float] | None = None
+    """95 % confidence interval of the cost ratio, with 5 timings or more"""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine, ReplayedActions
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value
+from sandbox.measure.tradeoff.timing import MIN_TURNS
 from sandbox.scene.description.world import Settings
 
 SMALLEST_PX = 1e-3
@@ -93,16 +94,18 @@ def cost_parts(advice: Advice, setting: MeasuredSetting) -> Iterator[str]:
     dt = setting.settings.dt
     text = f"{setting.frame_ms:.3g} ms per {'frame' if dt * advice.fps <= FRAME_TOLERANCE else f'step of {dt:.4g} s'}"
     if setting.ratio is not None and setting is not advice.present:
-        text += f", {ratio_text(setting.ratio)} the present cost per second"
+        text += f", {ratio_text(setting.ratio, setting.ratio_interval)} the present cost per second"
     fits = advice.fits_budget(setting)
     if fits is not None:
         text += f", {'within' if fits else 'more than'} the budget of {advice.budget:g} ms"
     yield text
 
 
-def ratio_text(ratio: float | None) -> str:
-    """Return a ratio: `×0.52`."""
-    return UNKNOWN if ratio is None else f"×{ratio:.3g}"
+def ratio_text(ratio: float | None, interval: tuple[float, float] | None = None) -> str:
+    """Return a ratio: `×0.52`, or with its confidence interval `×0.52 (0.5 to 0.55)`."""
+    if ratio is None:
+        return UNKNOWN
+    return f"×{ratio:.3g}" if interval is None else f"×{ratio:.2g} ({interval[0]:.2g} to {interval[1]:.2g})"
 
 
 def target_text(advice: Advice) -> str:
@@ -270,4 +273,6 @@ def search_sentence(advice: Advice) -> str:
         parts.append("the time limit ended the search")
     repeats = advice.present.repeats or (advice.chosen.repeats if advice.chosen else 0)
     costs = f"costs are medians of {repeats} timings in turns on this machine" if repeats else "no costs were timed"
+    if repeats >= MIN_TURNS:
+        costs += ", with 95 % intervals of their ratios"
     return "; ".join([*parts, costs])

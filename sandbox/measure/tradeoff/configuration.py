@@ -301,6 +301,8 @@ class Evaluation:
     """s, counted cost of the runs of all starts that were made for this evaluation"""
     seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, measured time of the recorded run on this machine"""
+    turns: tuple[float, ...] = field(default=(), metadata=in_json(omit=True))
+    """s, time of each separate repeat, paired with those of the other points that were timed in the same turns"""
 
     def __repr__(self) -> str:
         """Return engine, changes and status, error and cost."""
@@ -339,7 +341,8 @@ class Evaluation:
         """Return the evaluation with measured costs."""
         if timing is None:
             return self
-        return replace(self, cost=timing.least, cost_median=timing.median, repeats=timing.repeats)
+        turns = timing.turns if timing.repeats else ()
+        return replace(self, cost=timing.least, cost_median=timing.median, repeats=timing.repeats, turns=turns)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import less_margin, pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
+from sandbox.measure.tradeoff.timing import CostRatio
 from sandbox.scene.compile.scene import Scene
 
 LIMITS: Mapping[Limit | None, str] = {
@@ -47,6 +48,9 @@ class Recommendation:
     warnings: tuple[Diagnostic, ...] = ()
     """problems that formulas predict for the setting (those of `sandbox check --no-trial`). The measured runs may not
     show them: a body can tunnel at a slightly different speed"""
+    cost_ratio: CostRatio | None = None
+    """cost relative to the cheapest setting of all engines within the tolerance; None if it is that setting, or if they
+    were not timed in the same turns"""
 
 
 class Conclusion(NamedTuple):

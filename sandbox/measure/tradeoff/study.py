@@ -40,6 +40,7 @@ from sandbox.measure.tradeoff.objective import (
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
     cheapest_rejected,
+    label,
     nearest_to_budget,
     nearest_to_tolerance,
     recommend_cheapest,
@@ -49,7 +50,7 @@ from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of, 
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
 from sandbox.measure.tradeoff.start_trials import StartTrials, context_of
-from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
+from sandbox.measure.tradeoff.timing import CostRatio, TimedRun, Timing, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
@@ -333,8 +334,10 @@ class _Study:
             budget=self.objective.budget,
             fps=self.objective.fps,
             within_tolerance=self._completed(within_tolerance, points),
-            within_budget=self._completed(within_budget, points),
-            cheapest_by_engine={name: self._completed(each, points) for name, each in cheapest.items()},
+            within_budget=self._completed(within_budget, points, within_tolerance),
+            cheapest_by_engine={
+                name: self._completed(each, points, within_tolerance) for name, each in cheapest.items()
+            },
             rejected=self._completed(rejected, points),
             nearest_to_tolerance=self._completed(near_tolerance, points),
             nearest_to_budget=self._completed(near_budget, points),
@@ -423,13 +426,28 @@ class _Study:
         found |= {p.point.configuration: p.confirmation for p in picks if p.confirmation and p.confirmation.held.trials}
         return [replace(each, fresh_starts=found.get(each.configuration)) for each in points]
 
-    def _completed(self, chosen: Recommendation | None, points: Sequence[Evaluation]) -> Recommendation | None:
-        """Return a recommendation with the diagnostics of its setting, and the point of the result."""
+    def _completed(
+        self, chosen: Recommendation | None, points: Sequence[Evaluation], cheapest: Recommendation | None = None
+    ) -> Recommendation | None:
+        """Return a recommendation with the diagnostics of its setting, and its cost relative to the cheapest one.
+
+        Args:
+            chosen: the recommendation.
+            points: all points of the result, of which it gets its own.
+            cheapest: cheapest setting of all engines; None: no relative cost.
+        """
         if chosen is None:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
         point = next(each for each in points if each.configuration == chosen.point.configuration)
-        return replace(chosen, point=point, warnings=tuple(found))
+        completed = replace(chosen, point=point, warnings=tuple(found))
+        if cheapest is None or cheapest.point.configuration == point.configuration:
+            return completed
+        ratio = CostRatio.of(point.turns, cheapest.point.turns)
+        if ratio is None:
+            return completed
+        sentence = f"{chosen.sentence}; {ratio} times the cost of {label(cheapest.point)}"
+        return replace(completed, sentence=sentence, cost_ratio=ratio)
 
 
 def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diagnostic]:

@@ -422,4 +422,8 @@ def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
 
 
 def _ratio_cell(row: TradeoffMapping) -> str:
-    return f"×{format_number(row['ratio'])}" if row.get("ratio") is not None else UNKNOWN
+    if row.get("ratio") is None:
+        return UNKNOWN
+    low, high = row.get("interval") or (None, None)
+    interval = "" if low is None else f" ({format_number(low, 2)} to {format_number(high, 2)})"
+    return f"×{format_number(row['ratio'], 2)}{interval}"
