@@ -202,6 +202,8 @@ BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
 MARGIN: dict[str, Any] = {**BOUND, "ls": (0, (5.0, 2.5))}
 WHISKER: dict[str, Any] = {"lw": 1.6, "marker": "_", "ms": 7, "mew": 1.6, "zorder": 2.5}
 """Range of the errors of a point from fresh starts, below the point."""
+LABEL_WIDTH, LABEL_HEIGHT = 0.1, 0.045
+"""Space of the label of an order, as fractions of the panel."""
 POINT = "point:"
 """Prefix of the gid of a point; its index follows."""
 
@@ -249,6 +251,7 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
     _label_truth(panel, points)
     entries += _draw_start_errors(panel, points)
+    _label_orders(panel, document, points)
     entries += _draw_bounds(panel, document)
     _draw_failures(panel, points, document, entries)
     panel.grid(color=GRID, lw=0.6)
@@ -293,6 +296,25 @@ def _label_truth(panel: Axes, points: Sequence[WorkPoint]) -> None:
     for point in own.values():
         if point.is_drawable:
             panel.annotate(TRUTH, point.position, (9, 0), **layout)
+
+
+def _label_orders(panel: Axes, document: TradeoffMapping, points: Sequence[WorkPoint]) -> None:
+    """Label the lines of methods whose errors fall steadily with their order, where there is space.
+
+    Methods with the most substeps come first.
+    """
+    placed: list[tuple[float, float]] = []
+    for each in sorted(document.get("orders") or [], key=lambda found: -len(found["points"])):
+        series = sorted((points[k] for k in each["points"] if points[k].is_drawable), key=lambda point: -point.substep)
+        if len(series) < 2:
+            continue
+        x, y = (math.sqrt(a * b) for a, b in zip(*(point.position for point in series[-2:]), strict=True))
+        left, bottom = panel.transAxes.inverted().transform(panel.transData.transform((x, y)))
+        if any(abs(left - a) < LABEL_WIDTH and abs(bottom - b) < LABEL_HEIGHT for a, b in placed):
+            continue
+        placed.append((left, bottom))
+        layout: dict[str, Any] = {"xytext": (-4, -4), "textcoords": "offset points", "ha": "right", "va": "top"}
+        panel.annotate(f"order {each['order']:.1f}", (x, y), color=colour_of(each["engine"]), fontsize=9, **layout)
 
 
 def _draw_start_errors(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, Line2D]]:

@@ -112,6 +112,14 @@ def test_errors_from_fresh_starts_are_a_range(document: dict[str, Any]) -> None:
     assert ranges == [[[20.0, 0.005], [20.0, 0.03]]]
 
 
+def test_order_is_a_label_between_the_finest_points(document: dict[str, Any]) -> None:
+    found = {"engine": "pymunk", "order": 1.04, "points": [0, 1]}
+    document["orders"] = [found, found]  # a second one at the same place is left out
+    (panel,) = draw_tradeoff(document).axes
+    (label,) = [text for text in panel.texts if text.get_text() == "order 1.0"]
+    assert label.xy == pytest.approx((40.0**0.5, 0.001**0.5), rel=1e-12)  # middle on logarithmic axes; rounding
+
+
 def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any]) -> None:
     (panel,) = draw_tradeoff(document).axes
     ((x, y),) = [line.get_xydata()[0] for line in panel.lines if line.get_marker() == "x"]

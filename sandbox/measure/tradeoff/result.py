@@ -14,6 +14,7 @@ from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.compare.result import StudyAgainstTruth
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
+from sandbox.measure.tradeoff.convergence import ConvergenceOrder, convergence_orders
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
 from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import less_margin, pareto
@@ -142,7 +143,7 @@ class Tradeoff(StudyAgainstTruth):
         "metric_about",
         "unit",
     )
-    json_properties: ClassVar = ("max_error", ("answers", "sentences"), ("answered_by", "answer_keys"))
+    json_properties: ClassVar = ("max_error", "orders", ("answers", "sentences"), ("answered_by", "answer_keys"))
 
     def __repr__(self) -> str:
         """Return the number of points, and the settings within the tolerance and the budget."""
@@ -170,6 +171,11 @@ class Tradeoff(StudyAgainstTruth):
     def max_error(self) -> float:
         """Largest error of a recommended setting, in the unit of the metric: the tolerance less the margin."""
         return less_margin(self.tolerance, self.margin)
+
+    @property
+    def orders(self) -> list[ConvergenceOrder]:
+        """Order of convergence of each method whose errors fall steadily with the substep, over three or more."""
+        return convergence_orders(self.points, self.tolerance)
 
     @property
     def error_about(self) -> str:

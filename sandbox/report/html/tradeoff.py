@@ -269,6 +269,12 @@ def details(document: TradeoffMapping) -> list[Section]:
         )
         body = concatenated(_front_table(front, document), _long_legend(front, document))
         found.append(Section("The Pareto front", body, lead=lead))
+    if document.get("orders"):
+        lead = (
+            "Power of the substep that the error of a method is proportional to, fitted over three substeps or more. "
+            "Methods whose errors do not fall steadily have none."
+        )
+        found.append(Section("Orders of convergence", _orders(document["orders"]), lead=lead))
     if document.get("split"):
         lead = (
             "Solver: error that more iterations remove. Time step: error that the finest step tried removes. "
@@ -281,6 +287,17 @@ def details(document: TradeoffMapping) -> list[Section]:
     rows = _points_table(points, document), _long_legend(points, document)
     found.append(Section("All settings tried", fragment(TEMPLATE, "all_settings", summary, *rows)))
     return found
+
+
+def _orders(orders: Sequence[TradeoffMapping]) -> Markup:
+    columns: CellColumns[TradeoffMapping] = (
+        (HtmlColumn("engine"), lambda row: engine_name(row["engine"])),
+        (HtmlColumn("method"), lambda row: _changes_text(row["changes"]) or "as the scene has it"),
+        (HtmlColumn("order", True), lambda row: format_number(row["order"])),
+        (HtmlColumn("substeps, s", True), lambda row: f"{row['finest']:.3g} to {row['coarsest']:.3g}"),
+        (HtmlColumn("settings", True), lambda row: str(len(row["points"]))),
+    )
+    return row_table(columns, orders, "Orders of convergence")
 
 
 def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
@@ -401,11 +418,16 @@ def _marked_changes(point: WorkPoint, document: TradeoffMapping) -> Content:
 def _changes(point: WorkPoint) -> str:
     """Return the changes of a point to the scene's own solver, in a line."""
     changes = point.row.get("changes") or {}
+    text = _changes_text(changes) or "the scene's own settings"
+    return f"{text} (the scene's own)" if changes and point.row.get("scene_setting") else text
+
+
+def _changes_text(changes: TradeoffMapping) -> str:
+    """Return changes of settings in a line."""
     words = [
         f"{key} {format_number(value, 4) if isinstance(value, float) else value}" for key, value in changes.items()
     ]
-    text = ", ".join(words).replace("_", " ") or "the scene's own settings"
-    return f"{text} (the scene's own)" if changes and point.row.get("scene_setting") else text
+    return ", ".join(words).replace("_", " ")
 
 
 def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
