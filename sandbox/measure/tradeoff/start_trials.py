@@ -11,11 +11,12 @@ from functools import cached_property
 
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
-from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation, counted_cost
+from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.starts import Starts
-from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
 from sandbox.measure.tradeoff.fresh_starts import FreshStarts
-from sandbox.measure.tradeoff.objective import Objective
+from sandbox.measure.tradeoff.objective import AUDIT_METRICS, Objective
 from sandbox.measure.tradeoff.search import RUN_FRACTION
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -156,8 +157,15 @@ class StartTrials:
         """Return the error of a configuration from another start; infinite if its run fails."""
         key = point.configuration, number
         if key not in self._errors:
-            limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
-            metric, tolerance = self.objective.metric.name, self.objective.max_error
-            found = evaluate(point.configuration, self.space, [self.context_at(number)], metric, tolerance, limit)
-            self._errors[key] = found.ranking_error
+            self._errors[key] = self._measured_error(point, self.context_at(number))
         return self._errors[key]
+
+    def _measured_error(self, point: Evaluation, context: EvaluationContext) -> float:
+        """Run a configuration and return its error. Other metrics are not measured, which takes longer than the run."""
+        metric, limit = self.objective.metric, max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
+        try:
+            run, _ = bounded_run(context.scene, point.engine, point.asked, limit, audit=metric.name in AUDIT_METRICS)
+        except (RunTimeoutError, TooLargeError):
+            return math.inf
+        error = metric.measure(run, context) if run.status == "ok" else None
+        return math.inf if error is None or math.isnan(error) else error

@@ -7,6 +7,8 @@ import pytest
 import sandbox
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.convergence import convergence_orders
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find
 from tests.measure.tradeoff.evaluations_by_hand import point_of
 
 
@@ -21,8 +23,9 @@ def series(*errors: float, **more: object) -> list[Evaluation]:
     ("integrator", "order"), [("explicit_euler", 1), ("semi_implicit_euler", 1), ("velocity_verlet", 2), ("rk4", 4)]
 )
 def test_orders_of_integrators_on_a_spring(integrator: str, order: int) -> None:
+    scene = load(find("spring"), ["world.duration=1.0"])
     found = sandbox.tradeoff(
-        "spring", "reference", tolerance=1e-7, integrator=integrator, dt=0.02, effort=2.0, repeats=1, starts=1,
+        scene, "reference", tolerance=1e-9, integrator=integrator, dt=0.01, effort=2.0, repeats=1, starts=1,
         is_explained=False,
     )  # fmt: skip
     (own,) = [each for each in found.orders if not each.changes]
