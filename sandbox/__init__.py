@@ -173,11 +173,19 @@ if TYPE_CHECKING:
     from sandbox.measure.starts import (
         Starts as Starts,
     )
+    from sandbox.measure.tradeoff.convergence import (
+        ConvergenceOrder as ConvergenceOrder,
+    )
+    from sandbox.measure.tradeoff.fresh_starts import (
+        FreshStarts as FreshStarts,
+    )
     from sandbox.measure.tradeoff.result import (
         Conclusion as Conclusion,
-        FreshStarts as FreshStarts,
         Recommendation as Recommendation,
         Tradeoff as Tradeoff,
+    )
+    from sandbox.measure.tradeoff.timing import (
+        CostRatio as CostRatio,
     )
     from sandbox.measure.tradeoff.simplify import (
         Simplification as Simplification,
@@ -357,7 +365,10 @@ _NAMES = {
     "sandbox.measure.tradeoff.configuration": "Configuration Evaluation",
     "sandbox.measure.tradeoff.error_budget": "ErrorBudget",
     "sandbox.measure.starts": "Starts",
-    "sandbox.measure.tradeoff.result": "Conclusion FreshStarts Recommendation Tradeoff",
+    "sandbox.measure.tradeoff.convergence": "ConvergenceOrder",
+    "sandbox.measure.tradeoff.fresh_starts": "FreshStarts",
+    "sandbox.measure.tradeoff.timing": "CostRatio",
+    "sandbox.measure.tradeoff.result": "Conclusion Recommendation Tradeoff",
     "sandbox.measure.tradeoff.simplify": "Simplification",
     "sandbox.notebook": "live",
     "sandbox.pymunk_capture.game_capture": "GameCapture SpaceCapture capture",

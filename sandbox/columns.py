@@ -5,6 +5,9 @@ from typing import Generic, Literal, NamedTuple, TypeVar
 
 R = TypeVar("R")
 
+TRUTH = "truth"
+"""Text in the place of an error that is 0 because the run is the truth itself"""
+
 Kind = Literal["number", "time", "change", "count", "text"]
 """Format of the values: a number; a time, s, or a cost; a signed fraction; a count; a text"""
 
@@ -28,4 +31,8 @@ class Column(NamedTuple, Generic[R]):
 def shown(columns: Iterable[Column[R]], rows: Sequence[R], details: bool = True) -> list[Column[R]]:
     """Return the columns that a table of some rows has; a short table is one without details."""
     needed = (column for column in columns if details or not column.is_detail)
-    return [column for column in needed if not column.is_optional or any(map(column.value, rows))]
+    return [column for column in needed if not column.is_optional or any(map(_has_value(column), rows))]
+
+
+def _has_value(column: Column[R]) -> Callable[[R], bool]:
+    return lambda row: column.value(row) not in (None, 0, "", TRUTH)

@@ -28,7 +28,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, report_remarks
-from sandbox.cli.starts import RECOMMEND, spread_option, starts_option
+from sandbox.cli.starts import RECOMMEND, margin_option, spread_option, starts_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
@@ -126,6 +126,7 @@ class _Options(OutputOptions):
     fps: float
     budget: tuple[float, str] | None
     tolerance: tuple[float, str]
+    margin: float
     given_zoom: float | None
     pixels: bool
     starts: int
@@ -172,6 +173,7 @@ class _Options(OutputOptions):
     metavar="LENGTH",
     help="largest allowed error of a position: 1px, 5mm, 2cm or 0.02m; default: 1px",
 )
+@margin_option
 @click.option(
     "--zoom",
     "given_zoom",
@@ -226,6 +228,7 @@ def advise_command(options: _Options) -> int:
                 options.engine,
                 fps=options.fps,
                 tolerance=options.tolerance_metres(zoom),
+                margin=options.margin,
                 budget=options.budget_ms,
                 zoom=zoom,
                 starts=options.starts,
@@ -404,7 +407,7 @@ def _knob_cells(advice: Advice, knob: Knob) -> list[Any]:
         _error_cell(advice, setting),
         ratio_text(knob.error_ratio),
         format_optional(setting.frame_ms),
-        ratio_text(knob.cost_ratio),
+        ratio_text(knob.cost_ratio, knob.cost_ratio_interval),
         Text(remark, style="dim"),
     ]
 
@@ -424,7 +427,7 @@ def _print_engines(advice: Advice) -> None:
         print_table(table)
     for other in advice.others:
         if other.setting is None:
-            print_item(f"{other.engine}: {engine_text(other)}", INDENT)
+            print_item(f"{other.engine}: {engine_text(advice, other)}", INDENT)
 
 
 def _engine_cells(advice: Advice, other: OtherEngine) -> list[Any]:
@@ -437,8 +440,8 @@ def _engine_cells(advice: Advice, other: OtherEngine) -> list[Any]:
         setting_text(setting, advice.fps),
         _error_cell(advice, setting),
         format_optional(setting.frame_ms),
-        ratio_text(setting.ratio),
-        Text(engine_text(other), style="dim"),
+        ratio_text(setting.ratio, setting.ratio_interval),
+        Text(engine_text(advice, other), style="dim"),
     ]
 
 

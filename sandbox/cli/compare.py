@@ -45,7 +45,7 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
-from sandbox.columns import Column, shown
+from sandbox.columns import TRUTH, Column, shown
 from sandbox.formatting import format_plural
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
 from sandbox.measure.compare.columns import COLUMNS, ONE_SIDED
@@ -117,6 +117,8 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
 def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
     """Return the lines below the table."""
     lines = [*LEGEND] if legend and any(row.status != "refused" for row in comparison.rows) else []
+    if legend and (own := [row.name for row in comparison.rows if row.is_truth]):
+        lines.append(f"{TRUTH}: the run of {' and '.join(own)} is the truth itself, so that its errors are 0")
     if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
         lines.append(
             "energy: change since the start, which includes correct losses, because the truth ends before the run does"

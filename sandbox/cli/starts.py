@@ -1,4 +1,4 @@
-"""Options of commands that measure from perturbed starts, and the line that states them."""
+"""Options of `tradeoff` and `advise` that make a recommendation hold elsewhere, and the line about its starts."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -30,6 +30,14 @@ spread_option = click.option(
     metavar="X%",
     help="largest change of a start: of positions as a part of the smallest half width, and of velocities; "
     f"default: {100 * DEFAULT_SPREAD:g}%",
+)
+margin_option = click.option(
+    "--margin",
+    type=FractionRange(min=0.0, max=1.0, max_open=True),
+    default=0.0,
+    metavar="X%",
+    help="part of the tolerance that a recommended setting leaves unused: with 20% its error is at most 0.8 times the "
+    "tolerance; default: 0%",
 )
 
 

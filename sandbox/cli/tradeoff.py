@@ -1,7 +1,8 @@
 """Command `tradeoff` and its tables."""
 
+import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,7 +33,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
-from sandbox.cli.starts import RECOMMEND, spread_option, starts_option, starts_text
+from sandbox.cli.starts import RECOMMEND, margin_option, spread_option, starts_option, starts_text
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -44,18 +45,19 @@ from sandbox.cli.tables import (
     print_line,
     print_table,
 )
-from sandbox.columns import Column, shown
+from sandbox.columns import TRUTH, Column, shown
 from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
-from sandbox.formatting import format_quantity
+from sandbox.formatting import UNKNOWN, format_quantity
 from sandbox.measure.compare import compare
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
+from sandbox.measure.tradeoff.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
-from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.measure.tradeoff.result import Tradeoff, shown_of
 from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS, MAX_POINTS, tradeoff
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
@@ -66,14 +68,14 @@ ROUNDING = 1e-12
 """m; a part of an error below this is a rounding error, as coordinates of up to 1 km are exact to 1e-13 m."""
 MAX_REASONS = 3
 """Failures listed with their reason."""
-MAX_ROWS = 8
-"""Rows of the front of one engine; of a longer front, evenly spaced points and the recommended ones are shown."""
 LEGEND = {
     "scene": "the setting in the scene file",
     "front": "no other setting is both cheaper and more accurate",
     "cheapest": "the cheapest setting within the tolerance",
     "best": "the most accurate setting within the budget",
 }
+IS_TRUTH = "the engine with this setting gives the truth, so that its error is 0"
+"""Meaning of `TRUTH` in place of an error"""
 LONG = ">frame"
 """Mark of settings that are not recommended, because their dt is longer than a frame."""
 
@@ -95,7 +97,12 @@ def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
         Column("substeps", "solver steps per frame", lambda point: point.settings.substeps, "count"),
         Column("iterations", iterations, lambda point: point.settings.iterations, "count"),
         Column("other settings", "further changes of [solver]", _other_settings, "text", is_optional=True),
-        Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", lambda point: point.error),
+        Column(f"{found.metric.name}{unit}", f"{found.metric.about}{unit}", _error),
+        Column(
+            f"median{unit}", "median of the errors from fresh starts", _start_error("median_error"), is_optional=True
+        ),
+        Column(f"95 %{unit}", "95 % quantile of these errors", _start_error("error_95"), is_optional=True),
+        Column("starts", "number of these starts", _start_count, "count", is_optional=True, is_detail=True),
         Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
         Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time", is_detail=True),
     ]
@@ -120,14 +127,19 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
         table.add_row(*(cell_text(column, point) for column in columns), Text(" ".join(marks), style="green"))
     name = f"{scene} ({found.scene.title})" if found.scene.title else scene
     print_line(f"{name}: {found.error_about}")
+    if found.margin_about:
+        print_line(found.margin_about)
     print_line(_about(found))
     print_line(starts_text(found))
     if rows:
         print_table(table, keys=SETTING_COLUMNS)
         if verbose:
-            print_legend([*heads_of(table), *LEGEND], {column.head: column.about for column in columns} | LEGEND)
+            meanings = {column.head: column.about for column in columns} | LEGEND | {TRUTH: IS_TRUTH}
+            print_legend([*heads_of(table), *LEGEND, *([TRUTH] if any(p.is_truth for p in rows) else [])], meanings)
         else:
             print_line(_legend(rows, found))
+        if found.starts > 1 and not (found.interrupted or found.out_of_time):
+            print_line(_starts_legend(rows))
         if any(point.settings.dt > found.max_dt for point in rows):
             print_line(_long_legend(found))
     splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
@@ -139,9 +151,12 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
 
 
 def _rows(found: Tradeoff) -> list[Evaluation]:
-    """Return the settings of the table: the front of each engine, and all marked settings, by engine and cost."""
-    rows = [point for front in found.fronts().values() for point in _thinned(front, found)]
-    marked = (point for point in found.points if point.status == "ok" and _marks(point, found))
+    """Return the settings of the table: of the front of each engine up to `MAX_FRONT`, and those with another mark.
+
+    They are ordered by engine and cost.
+    """
+    rows = [point for front in found.fronts().values() for point in shown_of(front)]
+    marked = (point for point in found.points if point.status == "ok" and set(_marks(point, found)) - {"front"})
     rows += [point for point in marked if not any(point is row for row in rows)]
     order = list(found.fronts())
     return sorted(rows, key=lambda each: (order.index(each.engine), each.cost or 0.0))
@@ -151,15 +166,6 @@ def _about(found: Tradeoff) -> str:
     ended = "; the time limit ended the search, so another run may try other settings" if found.out_of_time else ""
     count = len(found.points)
     return f"{count} setting{'s' if count != 1 else ''} tried{ended}"
-
-
-def _thinned(front: Sequence[Evaluation], found: Tradeoff) -> list[Evaluation]:
-    """Return at most `MAX_ROWS` settings of the front of an engine, and all recommended ones."""
-    recommended = [point for point in front if set(_marks(point, found)) - {"front"}]
-    if len(front) <= MAX_ROWS:
-        return list(front)
-    evenly = [front[round(k * (len(front) - 1) / (MAX_ROWS - 1))] for k in range(MAX_ROWS)]
-    return [point for point in front if point in evenly or point in recommended]
 
 
 def _marks(point: Evaluation, found: Tradeoff) -> list[str]:
@@ -174,12 +180,45 @@ def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
     repeats = max(point.repeats for point in rows)
     times = f"minimum of {repeats} timings" if repeats else "from the run that was scored"
     marks = "".join(f"; {mark}: {meaning}" for mark, meaning in LEGEND.items() if mark in used)
+    marks += f"; {TRUTH}: {IS_TRUTH}" if any(point.is_truth for point in rows) else ""
     return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
+
+
+def _starts_legend(rows: Sequence[Evaluation]) -> str:
+    """Return from how many fresh starts the rows were run, and why some were not."""
+    counts = sorted(filter(None, map(_start_count, rows)))
+    cause = "their runs and truths take more than a part of the effort (--effort)"
+    if not counts:
+        return f"no errors from fresh starts: {cause}"
+    span = f"{counts[0]}" if counts[0] == counts[-1] else f"{counts[0]} to {counts[-1]}"
+    text = f"median, 95 %: of the errors from {span} fresh starts"
+    text += "" if counts[0] >= MIN_QUANTILE_STARTS else f"; of fewer than {MIN_QUANTILE_STARTS}, 95 % is the largest"
+    return text if len(counts) == len(rows) else f"{text}; {UNKNOWN}: {cause}"
 
 
 def _long_legend(found: Tradeoff) -> str:
     exception = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
     return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{exception}, so the setting is not recommended"
+
+
+def _error(point: Evaluation) -> float | str | None:
+    return TRUTH if point.is_truth else point.error
+
+
+def _start_error(quantile: str) -> Callable[[Evaluation], float | str | None]:
+    """Return the value of a column of errors from fresh starts; infinite where too many runs failed."""
+
+    def value(point: Evaluation) -> float | str | None:
+        if point.fresh_starts is None:
+            return None
+        error: float | None = getattr(point.fresh_starts, quantile)
+        return TRUTH if point.is_truth and error == 0.0 else math.inf if error is None else error
+
+    return value
+
+
+def _start_count(point: Evaluation) -> int | None:
+    return None if point.fresh_starts is None else point.fresh_starts.held.trials
 
 
 def _other_settings(point: Evaluation) -> str:
@@ -263,6 +302,7 @@ class _Options(OutputOptions):
     overrides: tuple[str, ...]
     metric: str | None
     tolerance: float | None
+    margin: float
     budget: float | None
     fps: float
     starts: int
@@ -288,6 +328,7 @@ class _Options(OutputOptions):
     help=f"measure of the error; default: chosen from the scene. One of {', '.join(METRICS)}",
 )
 @click.option("--tolerance", type=NOT_NEGATIVE, metavar="X", help="largest allowed error, in the unit of the metric")
+@margin_option
 @click.option("--budget", type=POSITIVE, metavar="MS", help="computing time per frame that is available, ms")
 @click.option(
     "--fps",
@@ -353,6 +394,7 @@ def tradeoff_command(options: _Options) -> int:
                 names,
                 metric=options.metric,
                 tolerance=options.tolerance,
+                margin=options.margin,
                 budget=options.budget,
                 fps=options.fps,
                 starts=options.starts,

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sandbox.arrays import FloatArray
+from sandbox.columns import TRUTH
 from sandbox.formatting import format_number
 from sandbox.measure.compare import Comparison
 from sandbox.measure.compare.result import set_text
@@ -290,9 +291,13 @@ def _line_class(colour: int, run: int) -> str:
 
 
 def _labels(comparison: Comparison) -> dict[str, str]:
-    """Return the label of each row by its name: without the engine if all rows have the same one."""
+    """Return the label of each row by its name: without the engine if all rows have the same one.
+
+    A run that is the truth itself, whose errors are 0, is marked.
+    """
     has_engines = len({row.engine for row in comparison.rows}) > 1
-    return {row.name: row.name if has_engines or not row.set else set_text(row.set) for row in comparison.rows}
+    names = {row.name: row.name if has_engines or not row.set else set_text(row.set) for row in comparison.rows}
+    return {row.name: f"{names[row.name]} ({TRUTH})" if row.is_truth else names[row.name] for row in comparison.rows}
 
 
 def _widths(comparison: Comparison, scale: float = 1.0) -> Iterator[float]:

@@ -1,5 +1,6 @@
 """Work-precision diagram of a trade-off: error against cost."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatter
 
+from sandbox.columns import TRUTH
 from sandbox.formatting import format_plural
 from sandbox.measure.tradeoff.objective import pareto
 from sandbox.report.colours import colour_of
@@ -22,7 +24,7 @@ TradeoffMapping = Mapping[str, Any]
 CHOICES = ("integrator", "detection", "response", "joints", "iterations", "broad_phase", "half_kick")
 """Settings by which methods differ; along the curve of a method dt and substeps change."""
 SMALLEST = 1e-16
-"""Smaller errors, such as 0, are drawn at this value of the logarithmic axis."""
+"""Smaller errors are drawn at this value of the logarithmic axis."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class WorkPoint:
     cost: float | None
     """ms per simulated second"""
     row: TradeoffMapping
+    floor: float = SMALLEST
+    """error at which a smaller one, such as 0, is drawn"""
 
     @property
     def settings(self) -> Mapping[str, Any]:
@@ -56,6 +60,18 @@ class WorkPoint:
         return float(self.settings["dt"]) / int(self.settings.get("substeps") or 1)
 
     @property
+    def is_truth(self) -> bool:
+        """Whether the error is 0 because the run is the truth itself."""
+        return bool(self.row.get("is_truth"))  # documents of earlier versions lack it
+
+    @property
+    def start_errors(self) -> tuple[float, float, float] | None:
+        """Quantiles of the errors from fresh starts, 5, 50 and 95 %; None if they are unknown or infinite."""
+        found = self.row.get("fresh_starts") or {}
+        low, median, high = (found.get(key) for key in ("error_5", "median_error", "error_95"))
+        return None if low is None or median is None or high is None else (low, median, high)
+
+    @property
     def is_drawable(self) -> bool:
         """Whether it has both an error and a cost."""
         return self.status == "ok" and self.error is not None and self.cost is not None and self.cost > 0.0
@@ -65,7 +81,13 @@ class WorkPoint:
         """Cost and error as the axes show them, of a point that is drawable."""
         assert self.cost is not None
         assert self.error is not None
-        return self.cost, shown_error(self.error)
+        return self.cost, self.shown_error
+
+    @property
+    def shown_error(self) -> float:
+        """Error as a logarithmic axis can show it, of a point that has one."""
+        assert self.error is not None
+        return max(self.error, self.floor)
 
 
 def work_points(document: TradeoffMapping) -> list[WorkPoint]:
@@ -73,6 +95,7 @@ def work_points(document: TradeoffMapping) -> list[WorkPoint]:
     first: dict[str, TradeoffMapping] = {}
     for row in document["points"]:
         first.setdefault(row["engine"], row["settings"])
+    floor = _floor([*(row["error"] for row in document["points"]), document.get("tolerance")])
     return [
         WorkPoint(
             k,
@@ -81,9 +104,16 @@ def work_points(document: TradeoffMapping) -> list[WorkPoint]:
             row["error"],
             row["cost_ms_per_second"],
             row,
+            floor,
         )
         for k, row in enumerate(document["points"])
     ]
+
+
+def _floor(errors: Sequence[float | None]) -> float:
+    """Return the error at which 0 is drawn: a power of ten below the smallest other error."""
+    smallest = min((error for error in errors if error), default=1.0)
+    return max(SMALLEST, 10.0 ** (math.floor(math.log10(smallest)) - 1))
 
 
 def _method(settings: TradeoffMapping, first: TradeoffMapping) -> str:
@@ -123,11 +153,6 @@ def point_of(points: Sequence[WorkPoint], row: TradeoffMapping | None) -> WorkPo
     return next((p for p in points if p.engine == row["engine"] and p.settings == row["settings"]), None)
 
 
-def shown_error(error: float) -> float:
-    """Return an error as a logarithmic axis can show it."""
-    return max(error, SMALLEST)
-
-
 def budget_of(document: TradeoffMapping) -> float | None:
     """Return the budget, ms per simulated second; a document states it per frame."""
     budget = document.get("budget")
@@ -157,7 +182,8 @@ def describe(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
     yield f"{point.engine}{', ' if point.method else ''}{point.method}"
     yield f"dt {point.settings['dt']:.4g} s, {format_plural(point.settings.get('substeps', 1), 'substep')}"
     if point.error is not None:
-        yield f"{metric.replace('_', ' ')} {point.error:.3g} {unit}".rstrip()
+        error = "0, the truth itself" if point.is_truth else f"{point.error:.3g} {unit}".rstrip()
+        yield f"{metric.replace('_', ' ')} {error}"
     if point.cost is not None:
         yield f"{point.cost:.3g} ms per simulated second"
     if point.status != "ok":
@@ -173,6 +199,11 @@ FAILURE_DISTANCE = 2.2
 FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, "marker": "o", "ms": 11, "mfc": "none"}
 """A ring around each point, so that a front of one point is visible too."""
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
+MARGIN: dict[str, Any] = {**BOUND, "ls": (0, (5.0, 2.5))}
+WHISKER: dict[str, Any] = {"lw": 1.6, "marker": "_", "ms": 7, "mew": 1.6, "zorder": 2.5}
+"""Range of the errors of a point from fresh starts, below the point."""
+LABEL_WIDTH, LABEL_HEIGHT = 0.1, 0.045
+"""Space of the label of an order, as fractions of the panel."""
 POINT = "point:"
 """Prefix of the gid of a point; its index follows."""
 
@@ -218,6 +249,9 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
     if front:
         panel.plot(*zip(*(point.position for point in front), strict=True), **FRONT)
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
+    _label_truth(panel, points)
+    entries += _draw_start_errors(panel, points)
+    _label_orders(panel, document, points)
     entries += _draw_bounds(panel, document)
     _draw_failures(panel, points, document, entries)
     panel.grid(color=GRID, lw=0.6)
@@ -255,6 +289,46 @@ def _draw_methods(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, L
     ]
 
 
+def _label_truth(panel: Axes, points: Sequence[WorkPoint]) -> None:
+    """Label the points whose error is 0 because their run is the truth, once for each engine, at the dearest."""
+    own = {point.engine: point for point in sorted(points, key=lambda each: each.cost or 0.0) if point.is_truth}
+    layout: dict[str, Any] = {"textcoords": "offset points", "va": "center", "fontsize": 10, "color": INK}
+    for point in own.values():
+        if point.is_drawable:
+            panel.annotate(TRUTH, point.position, (9, 0), **layout)
+
+
+def _label_orders(panel: Axes, document: TradeoffMapping, points: Sequence[WorkPoint]) -> None:
+    """Label the lines of methods whose errors fall steadily with their order, where there is space.
+
+    Methods with the most substeps come first.
+    """
+    placed: list[tuple[float, float]] = []
+    for each in sorted(document.get("orders") or [], key=lambda found: -len(found["points"])):
+        series = sorted((points[k] for k in each["points"] if points[k].is_drawable), key=lambda point: -point.substep)
+        if len(series) < 2:
+            continue
+        x, y = (math.sqrt(a * b) for a, b in zip(*(point.position for point in series[-2:]), strict=True))
+        left, bottom = panel.transAxes.inverted().transform(panel.transData.transform((x, y)))
+        if any(abs(left - a) < LABEL_WIDTH and abs(bottom - b) < LABEL_HEIGHT for a, b in placed):
+            continue
+        placed.append((left, bottom))
+        layout: dict[str, Any] = {"xytext": (-4, -4), "textcoords": "offset points", "ha": "right", "va": "top"}
+        panel.annotate(f"order {each['order']:.1f}", (x, y), color=colour_of(each["engine"]), fontsize=9, **layout)
+
+
+def _draw_start_errors(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, Line2D]]:
+    """Draw the range of the errors from fresh starts of each point that has some; return the entry of the legend."""
+    drawn = [point for point in points if point.is_drawable and not point.is_truth]
+    ranges = [(point, each) for point in drawn if (each := point.start_errors) is not None]
+    for point, (low, median, high) in ranges:
+        x, colour = point.position[0], colour_of(point.engine)
+        ends = [max(each, point.floor) for each in (low, high)]
+        panel.plot([x, x], ends, color=colour, **WHISKER)
+        panel.plot([x], [max(median, point.floor)], color=colour, **{**WHISKER, "ms": 5, "marker": "D", "mfc": "white"})
+    return [("fresh starts: 5 to 95 %, median", Line2D([], [], color=INK, **WHISKER))] if ranges else []
+
+
 def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line2D]]:
     """Draw tolerance and budget; return the entries of the legend."""
     entries = []
@@ -262,6 +336,9 @@ def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line
     if tolerance:
         panel.axhline(tolerance, **BOUND)
         entries.append((f"tolerance {tolerance:.3g} {document.get('unit') or ''}", Line2D([], [], **BOUND)))
+    if tolerance and document.get("margin"):
+        panel.axhline(document["max_error"], **MARGIN)
+        entries.append((f"less a margin of {100.0 * document['margin']:.3g} %", Line2D([], [], **MARGIN)))
     if budget:
         panel.axvline(budget, **BOUND)
         entries.append((f"budget {budget:.3g} ms per s", Line2D([], [], **BOUND)))
@@ -281,7 +358,7 @@ def _draw_failures(
     top = FAILURE_DISTANCE * (max((*errors, document.get("tolerance") or 0.0)) or 1.0)
     for point in failed:
         x = right if point.cost is None or not point.cost > 0.0 else point.cost
-        y = top if point.error is None or point.status != "ok" else shown_error(point.error)
+        y = top if point.error is None or point.status != "ok" else point.shown_error
         style: dict[str, Any] = {"marker": "x", "ms": 7.5, "mew": 1.8, "lw": 0, "clip_on": False, "zorder": 4}
         panel.plot([x], [y], color=colour_of(point.engine), **style, gid=f"{POINT}{point.index}")
     entries.append((f"failed ({len(failed)})", Line2D([], [], color=INK, marker="x", lw=0, ms=7.5, mew=1.8)))

@@ -58,6 +58,21 @@ def test_table_has_the_pareto_front_and_the_recommended_settings(tmp_path, capfd
     assert any(line.startswith("    space.step(dt") or line.startswith("        space.step(dt") for line in out)
 
 
+def test_error_of_the_run_that_is_the_truth_is_printed_as_truth(tmp_path: Path, capfd: Any) -> None:
+    scene = write_scene(tmp_path, BULLET)
+    options = ("--engine", "exact,pymunk", "--set", "solver.dt=0.004", "--effort", "0.2", "--repeats", "1")
+    out = output_of(capfd, "tradeoff", scene, *options)
+    rows = {line.split()[0]: line.split() for line in out if line.split() and line.split()[-1] in ("scene", "cheapest")}
+    assert "truth" in rows["exact"] and "truth" not in rows["pymunk"]
+    points = json_of(capfd, "tradeoff", scene, *options)[1]["points"]
+    own = [point for point in points if point["is_truth"]]
+    assert {point["engine"] for point in own} == {"exact"}
+    assert all(point["error"] == 0.0 for point in own), "also with another dt, which chooses the frames of exact only"
+    assert len({point["settings"]["dt"] for point in own}) > 1
+    as_energy = json_of(capfd, "tradeoff", scene, *options, "--metric", "energy")[1]["points"]
+    assert not any(point["is_truth"] for point in as_energy), "a drift of 0 is measured"
+
+
 def test_setting_that_may_tunnel_is_not_recommended_and_said_so(tmp_path, capfd):
     scene = write_scene(tmp_path, BULLET)
     chosen = "--engine pymunk --effort 0.2 --repeats 5 --metric missed_contacts --budget 100"  # the least of 5: noise
@@ -223,6 +238,21 @@ def test_spread_is_a_fraction_or_in_per_cent(text: str, spread: float, tmp_path:
     _, document, _ = json_of(capfd, *command, "--effort", "0.01", "--spread", text)
     assert document["spread"] == pytest.approx(spread)
     assert (document["starts"] == 1) == (spread == 0.0)
+
+
+@pytest.mark.parametrize("text", ["20%", "0.2"])
+def test_margin_is_stated_and_left_unused(text: str, tmp_path: Path, capfd: Any) -> None:
+    command = ("tradeoff", write_scene(tmp_path), *QUICK, "--tolerance", "0.01", "--margin", text)
+    out = output_of(capfd, *command)
+    assert out[1] == "tolerance: recommended settings keep to 8 mm (10 mm less a margin of 20 %)"
+    _, document, _ = json_of(capfd, *command)
+    assert (document["tolerance"], document["margin"], document["max_error"]) == (0.01, 0.2, 0.008)
+    assert document["within_tolerance"]["error"] <= 0.008
+
+
+def test_margin_of_the_whole_tolerance_is_refused(tmp_path: Path, capfd: Any) -> None:
+    assert call(["tradeoff", write_scene(tmp_path), "--margin", "100%"]) == 2
+    assert "--margin" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("text", ["60%", "-1%", "much", "%", "nan"])

@@ -13,7 +13,7 @@ from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice import Advice, advise, scoring, study
 from sandbox.measure.advice.game_code import game_code
-from sandbox.measure.advice.text import fallback_head
+from sandbox.measure.advice.text import fallback_head, target_text
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.recording import RecordedGame, Recording
@@ -112,6 +112,14 @@ def test_recommended_setting_meets_the_tolerance_when_run_again(text: str) -> No
     found = errors(run, truth.trajectory, ~scene.bodies.fixed).largest("position", truth.trusted_until)
     assert found == pytest.approx(advice.recommended.error, abs=1e-4)
     assert found is not None and found <= advice.tolerance
+
+
+@pytest.mark.fail_slow(60)  # takes over half a second
+def test_recommended_setting_leaves_the_margin_unused() -> None:
+    without, found = advice_of(PENDULUM, effort=0.5), advice_of(PENDULUM, effort=0.5, margin=0.8)
+    assert without.recommended.error > 0.2 * without.tolerance, "otherwise the margin changes nothing"
+    assert found.recommended.error <= 0.2 * found.tolerance
+    assert "less a margin of 80 %" in target_text(found)
 
 
 def test_knobs_of_a_flight_have_the_errors_of_euler() -> None:

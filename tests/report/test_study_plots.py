@@ -99,6 +99,7 @@ def point(engine: str, dt: float, error: float | None, cost: float | None, statu
         "engine": engine,
         "settings": {"dt": dt, "substeps": 1},
         "error": error,
+        "is_truth": engine == "exact",
         "cost_ms_per_second": cost,
         "status": status,
         "reason": None if status == "ok" else "it ran away",
@@ -118,11 +119,32 @@ def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
     assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
     fronts = [line for line in panel.lines if line.get_linewidth() == 3.0]
     assert [list(map(float, front.get_xdata())) for front in fronts] == [[2.0, 20.0, 30.0]]
-    assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 1e-16]  # 0 is drawn at the smallest error
+    assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 0.001]  # 0 is drawn a decade below the smallest
     horizontal = [float(line.get_ydata()[0]) for line in panel.lines if list(line.get_xdata()) == [0, 1]]
     assert horizontal == [0.02]
     vertical = [float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]]
     assert vertical == [30.0]  # 0.5 ms per frame at 60 frames per second
+
+
+def test_point_that_is_the_truth_is_labelled(document: dict[str, Any]) -> None:
+    (panel,) = draw_tradeoff(document).axes
+    assert [(text.get_text(), text.xy) for text in panel.texts] == [("truth", (30.0, 0.001))]
+
+
+def test_errors_from_fresh_starts_are_a_range(document: dict[str, Any]) -> None:
+    document["points"][1]["fresh_starts"] = {"error_5": 0.005, "median_error": 0.02, "error_95": 0.03}
+    document["points"][0]["fresh_starts"] = {"error_5": 0.1, "median_error": 0.2, "error_95": None}  # runs failed
+    (panel,) = draw_tradeoff(document).axes
+    ranges = [line.get_xydata().tolist() for line in panel.lines if line.get_marker() == "_"]
+    assert ranges == [[[20.0, 0.005], [20.0, 0.03]]]
+
+
+def test_order_is_a_label_between_the_finest_points(document: dict[str, Any]) -> None:
+    found = {"engine": "pymunk", "order": 1.04, "points": [0, 1]}
+    document["orders"] = [found, found]  # a second one at the same place is left out
+    (panel,) = draw_tradeoff(document).axes
+    (label,) = [text for text in panel.texts if text.get_text() == "order 1.0"]
+    assert label.xy == pytest.approx((40.0**0.5, 0.001**0.5), rel=1e-12)  # middle on logarithmic axes; rounding
 
 
 def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any]) -> None:

@@ -26,10 +26,12 @@ from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )
-from sandbox.measure.tradeoff.result import FreshStarts, Tradeoff
+from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.measure.tradeoff.timing import CostRatio
 from sandbox.provenance import machine, versions
 from sandbox.scene.description.world import Settings
 
@@ -103,6 +105,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         unit=metric.unit,
         tolerance=score.tolerance,
         tolerance_px=score.tolerance * request.zoom if metric.unit == "m" else None,
+        margin=request.margin,
         position_tolerance=request.length,
         budget=request.budget,
         invariant=score.invariant,
@@ -148,7 +151,7 @@ def _measured_setting(
 ) -> MeasuredSetting:
     """Return an evaluation with its error on the screen, and its cost if it was timed."""
     is_length = METRICS[score.metric].unit == "m"
-    timed, present = measured.timed.get(evaluation_key(point)), measured.timed.get(evaluation_key(measured.present))
+    timed, ratio = measured.timed.get(evaluation_key(point)), _cost_ratio(measured, point, measured.present)
     return MeasuredSetting(
         engine=point.engine,
         settings=point.settings,
@@ -163,7 +166,8 @@ def _measured_setting(
         worst=point.worst if score.metric == "max_position" else None,
         within_until=measured.within_until.get(evaluation_key(point)),
         frame_ms=None if timed is None else timed.frame_time(request.fps),
-        ratio=_ratio(None if timed is None else timed.cost_median, None if present is None else present.cost_median),
+        ratio=None if ratio is None else ratio.ratio,
+        ratio_interval=None if ratio is None else ratio.interval,
         repeats=0 if timed is None else timed.repeats,
     )
 
@@ -172,6 +176,12 @@ def _left_at(context: EvaluationContext) -> dict[str, float]:
     """Return the time at which each body leaves the level, s, of those that do while the truth is trusted."""
     left = context.left_at
     return {context.scene.bodies.names[k]: float(left[k]) for k in np.flatnonzero(left < context.until).tolist()}
+
+
+def _cost_ratio(measured: AdviceMeasurements, point: Evaluation, base: Evaluation) -> CostRatio | None:
+    """Return the cost of an evaluation relative to another one; None if one of them was not timed."""
+    found, other = (measured.timed.get(evaluation_key(each)) for each in (point, base))
+    return None if found is None or other is None else CostRatio.of(found.turns, other.turns)
 
 
 def _ratio(value: float | None, base: float | None) -> float | None:
@@ -228,9 +238,10 @@ def _knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasureme
     start, found = _measured_setting(measured.start, score, measured, request), []
     for point in measured.knobs:
         setting = _measured_setting(point, score, measured, request)
-        cost_ratio = _ratio(setting.frame_ms, start.frame_ms)
+        cost = _cost_ratio(measured, point, measured.start)
+        ratio, interval = (None, None) if cost is None else (cost.ratio, cost.interval)
         error_ratio = _ratio(setting.error, start.error)
-        found.append(Knob(settings_change(start.settings, setting.settings), setting, cost_ratio, error_ratio))
+        found.append(Knob(settings_change(start.settings, setting.settings), setting, ratio, error_ratio, interval))
     return tuple(found)
 
 
@@ -256,6 +267,6 @@ def _other_engines(request: AdviceRequest, score: AdviceScore, measured: AdviceM
         if name == request.engine:
             continue
         setting = None if point is None else _measured_setting(point, score, measured, request)
-        is_within = setting is not None and setting.error is not None and setting.error <= score.tolerance
+        is_within = setting is not None and setting.error is not None and setting.error <= score.max_error
         found.append(OtherEngine(name, setting, is_within, refused.get(name)))
     return tuple(found)

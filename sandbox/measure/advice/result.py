@@ -8,7 +8,8 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
 from sandbox.measure.compare.metrics import WorstError
-from sandbox.measure.tradeoff.result import FreshStarts
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
+from sandbox.measure.tradeoff.objective import less_margin
 from sandbox.scene.description.world import Settings
 
 FallbackKind = Literal["invariant", "budget", "accuracy", "actions"]
@@ -48,6 +49,8 @@ class MeasuredSetting:
     was not timed"""
     ratio: float | None = None
     """cost per simulated second relative to the present setting; None if one of them was not timed"""
+    ratio_interval: tuple[float, float] | None = None
+    """95 % confidence interval of the ratio, with 5 timings or more"""
     repeats: int = 0
     """number of timings"""
 
@@ -64,6 +67,8 @@ class Knob:
     """cost relative to the setting without the change"""
     error_ratio: float | None
     """error relative to the setting without the change"""
+    cost_ratio_interval: tuple[float, float] | None = None
+    """95 % confidence interval of the cost ratio, with 5 timings or more"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class OtherEngine:
     setting: MeasuredSetting | None
     """cheapest setting within the tolerance, or the most accurate one if there is none; None if it has no setting"""
     is_within_tolerance: bool
-    """whether that setting is within the tolerance"""
+    """whether that setting is within the tolerance, less the margin"""
     missing: str | None
     """reason why the engine cannot run the scene; None if it can"""
 
@@ -127,6 +132,8 @@ class Advice:
     """largest accepted error, in the unit of the metric"""
     tolerance_px: float | None
     """the same on the screen, px; None if the metric is no length"""
+    margin: float
+    """fraction of the tolerance that a recommended setting leaves unused"""
     position_tolerance: float
     """m, largest accepted error of a position, also if errors are no positions"""
     budget: float | None
@@ -241,6 +248,10 @@ class Advice:
     def is_within_tolerance(self, setting: MeasuredSetting) -> bool | None:
         """Return whether the error of a setting is within the tolerance; None if the error is unknown."""
         return None if setting.error is None else setting.error <= self.tolerance
+
+    def is_within_margin(self, setting: MeasuredSetting) -> bool:
+        """Return whether the error of a setting is known and leaves the margin unused."""
+        return setting.error is not None and setting.error <= less_margin(self.tolerance, self.margin)
 
     def document(self, scene: str | None = None) -> dict[str, Any]:
         """Return the advice as one JSON document.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from sandbox.measure.compare.ground_truth import Truth, find_truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext, Metric
 from sandbox.measure.metrics.trajectory_error import default_tolerance
-from sandbox.measure.tradeoff.objective import choose_metric, default_metric_tolerance
+from sandbox.measure.tradeoff.objective import choose_metric, default_metric_tolerance, less_margin
 from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
@@ -37,6 +37,8 @@ class AdviceRequest:
     fps: float
     length: float
     """m, largest accepted error of a position"""
+    margin: float
+    """fraction of the tolerance that a recommended setting leaves unused"""
     budget: float | None
     zoom: float
     starts: int
@@ -88,12 +90,19 @@ class AdviceScore(NamedTuple):
     """context at the frames of the present dt"""
     truth: Truth | str
     """truth at the frames of the game, or the reason why there is none"""
+    margin: float
+    """fraction of the tolerance that a recommended setting leaves unused"""
+
+    @property
+    def max_error(self) -> float:
+        """Largest error of a recommended setting, in the unit of the metric: the tolerance less the margin."""
+        return less_margin(self.tolerance, self.margin)
 
 
 def find_score(request: AdviceRequest) -> AdviceScore:
     """Find the truth and choose the metric: positions, or an invariant if no truth is trusted for some frames."""
     scene, present, loop = request.scene, request.present, request.loop
-    tolerance = min(default_tolerance(scene), request.length)
+    tolerance = min(default_tolerance(scene), less_margin(request.length, request.margin))
     shared = _shared_settings(request)
     truth = find_truth(scene, shared or loop, tolerance)
     own = truth if shared is not None else find_truth(scene, present, tolerance)
@@ -103,10 +112,12 @@ def find_score(request: AdviceRequest) -> AdviceScore:
     if trusted >= min(MIN_TRUSTED_FRAMES * request.frame, scene.world.duration) and context.moving.any():
         invariant = metric.name if trusted < scene.world.duration and metric.name != "max_position" else None
         limit = None if invariant is None else _limit(metric, request)
-        return AdviceScore("max_position", request.length, None, invariant, limit, context, present_context, truth)
+        position = "max_position", request.length, None, invariant, limit
+        return AdviceScore(*position, context, present_context, truth, request.margin)
     if metric.name == "max_position":  # until a time at which hardly anything has moved
         metric = METRICS["energy"]
-    return AdviceScore(metric.name, _limit(metric, request), reason, None, None, context, present_context, truth)
+    chosen = metric.name, _limit(metric, request), reason, None, None
+    return AdviceScore(*chosen, context, present_context, truth, request.margin)
 
 
 def _limit(metric: Metric, request: AdviceRequest) -> float:

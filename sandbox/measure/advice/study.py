@@ -39,7 +39,7 @@ from sandbox.measure.tradeoff.configuration import (
     evaluate,
     refused_evaluation,
 )
-from sandbox.measure.tradeoff.objective import Objective
+from sandbox.measure.tradeoff.objective import Objective, check_objective
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
     by_cost,
@@ -86,6 +86,7 @@ def advise(
     *,
     fps: float = DEFAULT_FPS,
     tolerance: float | None = None,
+    margin: float = 0.0,
     budget: float | None = None,
     zoom: float = DEFAULT_ZOOM,
     starts: int = DEFAULT_STARTS,
@@ -107,6 +108,7 @@ def advise(
             can run it.
         fps: frames per second of the game.
         tolerance: largest accepted error of a position, m; default: 1 px.
+        margin: fraction of the tolerance that a recommended setting has to leave unused, as of `tradeoff`.
         budget: computing time per frame, ms.
         zoom: px/m, for errors on the screen.
         starts: number of perturbed starts that decide on the recommended setting, as of `tradeoff`.
@@ -130,6 +132,7 @@ def advise(
     engine_named(engine)
     tolerance = 1.0 / zoom if tolerance is None and zoom > 0.0 else tolerance
     _check(fps=fps, zoom=zoom, tolerance=tolerance, budget=budget, effort=effort, time_limit=time_limit)
+    check_objective(None, None, None, fps, margin)
     if not MIN_FPS <= fps <= MAX_FPS:
         raise ValueError(f"fps is {fps:g}; it must be {MIN_FPS:g} to {MAX_FPS:g}")
     if repeats < 1:
@@ -143,6 +146,7 @@ def advise(
         recording=recording,
         fps=fps,
         length=tolerance,
+        margin=margin,
         budget=budget,
         zoom=zoom,
         starts=starts,
@@ -211,6 +215,7 @@ def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurem
         engines,
         metric=score.metric,
         tolerance=score.tolerance,
+        margin=request.margin,
         budget=request.budget,
         fps=request.fps,
         zoom=request.zoom,
@@ -226,7 +231,14 @@ def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurem
         **request.loop.model_dump(),
     )
     measured.found, measured.interrupted = found, found.interrupted
-    objective = Objective(found.metric, found.tolerance, request.budget, request.fps, FRAME_TOLERANCE * request.frame)
+    objective = Objective(
+        found.metric,
+        found.tolerance,
+        request.budget,
+        request.fps,
+        FRAME_TOLERANCE * request.frame,
+        margin=request.margin,
+    )
     for name in engines:
         points = [point for point in found.points if point.engine == name and point.status != "refused"]
         cheapest = found.cheapest_by_engine.get(name)
@@ -292,7 +304,7 @@ def _turn_knobs(request: AdviceRequest, score: AdviceScore, measured: AdviceMeas
             evaluate(neighbour, space, [score.context], score.metric, score.tolerance, limit, request.deadline)
         )
     if measured.recommended is None and measured.found.starts < 2:  # no other starts would have to confirm it
-        within = [each for each in measured.knobs if each.meets(score.tolerance)]
+        within = [each for each in measured.knobs if each.meets(score.max_error)]
         measured.recommended = min(within, key=lambda each: each.counted_seconds, default=None)
 
 
@@ -428,7 +440,7 @@ def _candidates(request: AdviceRequest, score: AdviceScore, measured: AdviceMeas
     if measured.recommended is None or measured.found is None:
         return
     tried = [*measured.found.points, *measured.knobs]
-    within = by_cost([each for each in tried if each.engine == request.engine and each.meets(score.tolerance)])
+    within = by_cost([each for each in tried if each.engine == request.engine and each.meets(score.max_error)])
     keys = [evaluation_key(each) for each in within]
     begin = keys.index(evaluation_key(measured.recommended)) + 1 if evaluation_key(measured.recommended) in keys else 0
     last = measured.recommended
@@ -442,7 +454,7 @@ def _candidates(request: AdviceRequest, score: AdviceScore, measured: AdviceMeas
             return
         limit = 2.0 * RUN_FRACTION * request.effort
         last = evaluate(finer, space, [score.context], score.metric, score.tolerance, limit, request.deadline)
-        if last.meets(score.tolerance):
+        if last.meets(score.max_error):
             yield last
 
 

@@ -7,6 +7,7 @@ from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.result import Advice, MeasuredSetting, OtherEngine, ReplayedActions
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value
+from sandbox.measure.tradeoff.timing import MIN_TURNS
 from sandbox.scene.description.world import Settings
 
 SMALLEST_PX = 1e-3
@@ -93,16 +94,18 @@ def cost_parts(advice: Advice, setting: MeasuredSetting) -> Iterator[str]:
     dt = setting.settings.dt
     text = f"{setting.frame_ms:.3g} ms per {'frame' if dt * advice.fps <= FRAME_TOLERANCE else f'step of {dt:.4g} s'}"
     if setting.ratio is not None and setting is not advice.present:
-        text += f", {ratio_text(setting.ratio)} the present cost per second"
+        text += f", {ratio_text(setting.ratio, setting.ratio_interval)} the present cost per second"
     fits = advice.fits_budget(setting)
     if fits is not None:
         text += f", {'within' if fits else 'more than'} the budget of {advice.budget:g} ms"
     yield text
 
 
-def ratio_text(ratio: float | None) -> str:
-    """Return a ratio: `×0.52`."""
-    return UNKNOWN if ratio is None else f"×{ratio:.3g}"
+def ratio_text(ratio: float | None, interval: tuple[float, float] | None = None) -> str:
+    """Return a ratio: `×0.52`, or with its confidence interval `×0.52 (0.5 to 0.55)`."""
+    if ratio is None:
+        return UNKNOWN
+    return f"×{ratio:.3g}" if interval is None else f"×{ratio:.2g} ({interval[0]:.2g} to {interval[1]:.2g})"
 
 
 def target_text(advice: Advice) -> str:
@@ -113,6 +116,8 @@ def target_text(advice: Advice) -> str:
         tolerance = f"{pixels_text(advice.tolerance_px)} px ({scale})"
     else:
         tolerance = f"{advice.metric} {tolerance}"
+    if advice.margin:
+        tolerance += f" less a margin of {100.0 * advice.margin:.3g} %"
     budget = "" if advice.budget is None else f", budget {advice.budget:g} ms per frame"
     return f"{advice.engine} at {advice.fps:g} fps, tolerance {tolerance}{budget}"
 
@@ -213,7 +218,8 @@ def cheapest_head(advice: Advice) -> str:
     """Return the heading of the recommended setting: among how many it is the cheapest, and its fresh starts."""
     tried = f", of {advice.tried_here} tried on {advice.engine}" if advice.tried_here else ""
     confirmed = "" if advice.confirmation is None else f"; {advice.confirmation}"
-    return f"Cheapest setting within the tolerance{tried}{confirmed}"
+    less = " less the margin" if advice.margin else ""
+    return f"Cheapest setting within the tolerance{less}{tried}{confirmed}"
 
 
 def no_setting_text(advice: Advice) -> str:
@@ -227,7 +233,7 @@ def no_setting_text(advice: Advice) -> str:
             f"every setting tried on {advice.engine} misses contacts with the actions, or departs sooner from finer "
             "steps than the present one"
         )
-    is_within = advice.fallback is not None and advice.is_within_tolerance(advice.fallback)
+    is_within = advice.fallback is not None and advice.is_within_margin(advice.fallback)
     return "none without an objection" if is_within else "none"
 
 
@@ -247,14 +253,14 @@ def knob_head(advice: Advice) -> str:
     return f"One change at a time of {which.get(advice.knob_start or '', 'this setting')}{text}"
 
 
-def engine_text(other: OtherEngine) -> str:
+def engine_text(advice: Advice, other: OtherEngine) -> str:
     """Return the remark about another engine: why it cannot run the scene, or that it misses the tolerance."""
     if other.missing is not None:
         return f"cannot run the scene: {other.missing}"
     if other.setting is None:
         return "no setting reached the end of the scene"
     if not other.is_within_tolerance:
-        return "misses the tolerance"
+        return "misses the tolerance, or its margin" if advice.margin else "misses the tolerance"
     return OBJECTIONS if other.setting.objections else ""
 
 
@@ -267,4 +273,6 @@ def search_sentence(advice: Advice) -> str:
         parts.append("the time limit ended the search")
     repeats = advice.present.repeats or (advice.chosen.repeats if advice.chosen else 0)
     costs = f"costs are medians of {repeats} timings in turns on this machine" if repeats else "no costs were timed"
+    if repeats >= MIN_TURNS:
+        costs += ", with 95 % intervals of their ratios"
     return "; ".join([*parts, costs])

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import fields
 
-from sandbox.columns import Column
+from sandbox.columns import TRUTH, Column
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.compare.result import Row, Score
 
@@ -11,11 +11,11 @@ from sandbox.measure.compare.result import Row, Score
 def _error(name: str) -> Column[Row]:
     """Return the column of a metric."""
     metric = METRICS[name]
-    about = f"{metric.about}, while that is trusted"
+    about = f"{metric.about}, while that is trusted; {TRUTH}: the run is the truth itself"
     return Column(
         f"{metric.head}, {metric.unit}",
         about,
-        lambda row: getattr(row.score, name),
+        lambda row: TRUTH if row.is_truth else getattr(row.score, name),
         is_optional=metric.unit == "rad",  # nothing turns in many scenes
         is_detail=name not in ("max_position", "max_angle"),
     )

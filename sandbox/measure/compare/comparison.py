@@ -292,6 +292,7 @@ def score_run(
         first = last
     return replace(
         row,
+        is_truth=run.status == "ok" and truth.is_run_of(engine, Settings.model_validate(run.info["settings"])),
         score=Score.of(run, context),
         first_divergence=first,
         events=match_contacts(run, truth.trajectory, scene, settings.dt, tolerance, min(until, last)),

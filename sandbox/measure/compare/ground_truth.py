@@ -323,9 +323,27 @@ class Truth:
     difference: float = 0.0
     """m; of a refined truth, its largest distance from the previous halving of dt: smaller errors mean nothing"""
 
+    def is_run_of(self, engine: str, settings: Settings) -> bool:
+        """Return whether a run of an engine is this trajectory, so that its error is 0 by definition.
+
+        Args:
+            engine: name of the engine.
+            settings: settings as the engine resolved them. The frames do not matter, nor those of `exact`, which only
+                choose its frames.
+        """
+        if self.kind == "closed_form" or engine != self.trajectory.info["engine"]:
+            return False
+        return self.kind == "exact" or _without_frames(settings) == _without_frames(
+            Settings.model_validate(self.trajectory.info["settings"])
+        )
+
     def __repr__(self) -> str:
         """Return kind, source and end of the truth."""
         return f"<Truth {self.kind}: {self.about}; trusted until {self.trusted_until:.4g} s>"
+
+
+def _without_frames(settings: Settings) -> dict[str, object]:
+    return settings.model_dump(exclude={"record_every"})
 
 
 def frame_settings(settings: Settings) -> Settings:

@@ -212,6 +212,8 @@ class Metric(NamedTuple):
     measure: Measure
     head: str | None = None
     """head of its column in a comparison; None if it has none"""
+    is_difference: bool = False
+    """whether it is a difference from the truth, and so 0 of the truth itself"""
 
 
 def largest(quantity: str) -> Measure:
@@ -361,20 +363,31 @@ def pixels(run: Trajectory, context: EvaluationContext) -> float | None:
 METRICS: Mapping[str, Metric] = {
     metric.name: metric
     for metric in (
-        Metric("max_position", "m", "largest distance from the truth", largest("position"), "max error"),
-        Metric("final_position", "m", "distance from the truth at the end", final_position),
+        Metric(
+            "max_position", "m", "largest distance from the truth", largest("position"), "max error", is_difference=True
+        ),
+        Metric("final_position", "m", "distance from the truth at the end", final_position, is_difference=True),
         Metric(
             "rms_position",
             "m",
             "root of the mean square distance from the truth",
             root_mean_square("position"),
             "rms error",
+            is_difference=True,
         ),
-        Metric("max_velocity", "m/s", "largest error of a velocity", largest("velocity"), "max error"),
-        Metric("rms_velocity", "m/s", "root of the mean square error of velocities", root_mean_square("velocity")),
-        Metric("max_angle", "rad", "largest error of an angle", largest("angle"), "max error"),
-        Metric("pixels", "px", "largest distance from the truth on the screen", pixels),
-        Metric("bounce_height", "m", "error of the bounce height", bounce_height),
+        Metric(
+            "max_velocity", "m/s", "largest error of a velocity", largest("velocity"), "max error", is_difference=True
+        ),
+        Metric(
+            "rms_velocity",
+            "m/s",
+            "root of the mean square error of velocities",
+            root_mean_square("velocity"),
+            is_difference=True,
+        ),
+        Metric("max_angle", "rad", "largest error of an angle", largest("angle"), "max error", is_difference=True),
+        Metric("pixels", "px", "largest distance from the truth on the screen", pixels, is_difference=True),
+        Metric("bounce_height", "m", "error of the bounce height", bounce_height, is_difference=True),
         Metric("energy", "", "drift of the energy as a fraction of the kinetic energy", energy),
         Metric("joint_error", "", "largest error of a joint as a fraction of its length", joints),
         Metric("joint_distance", "m", "largest error of a joint", joint_distance),
@@ -382,7 +395,7 @@ METRICS: Mapping[str, Metric] = {
         Metric("drift", "m", "motion of bodies that should stay at rest", drift),
         Metric("missed_contacts", "", "contacts that the engine missed", missed_contacts),
         Metric("passes", "", "fraction of the contacts that were missed", passes),
-        Metric("settle_time", "s", "error of the time when all bodies are at rest", settle_time),
+        Metric("settle_time", "s", "error of the time when all bodies are at rest", settle_time, is_difference=True),
     )
 }
 

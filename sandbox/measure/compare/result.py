@@ -128,6 +128,8 @@ class Row:
     """kind of the truth that the row is scored against"""
     trusted_until: float | None = None
     """s, time up to which that truth is trusted"""
+    is_truth: bool = False
+    """whether the run is that truth itself, so that its errors are 0"""
     score: Score = field(default_factory=Score, metadata=in_json(inline=True))
     """errors up to `trusted_until`"""
     energy_drift: float | None = None
@@ -166,6 +168,7 @@ class Row:
     def __repr__(self) -> str:
         """Return engine and status, the largest error and the number of contacts of each kind."""
         error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
+        error = "0, the truth" if self.is_truth else error
         counts = ", ".join(f"{kind} {len(self.contacts(kind))}" for kind in get_args(MatchKind))
         return f"<Row {self.name}: {self.status}, max error {error}, contacts: {counts}>"
 

@@ -17,6 +17,7 @@ from sandbox.measure.compare.metrics import METRICS, EvaluationContext, WorstErr
 from sandbox.measure.compare.self_convergence import preferred_settings
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objections import ErrorLimits, find_objections
 from sandbox.measure.tradeoff.timing import Timing
 from sandbox.scene.compile.contacts import contact_matrix
@@ -290,12 +291,18 @@ class Evaluation:
     """reasons not to recommend the setting although its error may be within the tolerance, as clauses"""
     worst: WorstError | None = None
     """body, time and place of the largest distance from the truth; None without a truth"""
+    is_truth: bool = False
+    """whether the error is 0 because the run is the truth itself, from all starts"""
+    fresh_starts: FreshStarts | None = None
+    """errors from perturbed starts, of the points of a front that are shown; None if they are not known"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of the runs of all starts that were made for this evaluation"""
     seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, measured time of the recorded run on this machine"""
+    turns: tuple[float, ...] = field(default=(), metadata=in_json(omit=True))
+    """s, time of each separate repeat, paired with those of the other points that were timed in the same turns"""
 
     def __repr__(self) -> str:
         """Return engine, changes and status, error and cost."""
@@ -334,7 +341,8 @@ class Evaluation:
         """Return the evaluation with measured costs."""
         if timing is None:
             return self
-        return replace(self, cost=timing.least, cost_median=timing.median, repeats=timing.repeats)
+        turns = timing.turns if timing.repeats else ()
+        return replace(self, cost=timing.least, cost_median=timing.median, repeats=timing.repeats, turns=turns)
 
 
 @dataclass(frozen=True)
@@ -402,6 +410,9 @@ def evaluate(
         work=result.work,
         objections=objections,
         worst=result.worst,
+        is_truth=result.status == "ok"
+        and METRICS[metric].is_difference
+        and all(each.truth is not None and each.truth.is_run_of(configuration.engine, resolved) for each in contexts),
         counted_seconds=result.counted_seconds,
         spent_seconds=result.spent_seconds,
         seconds=result.seconds,

@@ -22,6 +22,11 @@ AUDIT_METRICS = frozenset({"missed_contacts", "passes"})
 """Metrics that only an audited run has."""
 
 
+def less_margin(tolerance: float, margin: float) -> float:
+    """Return a tolerance without the fraction of it that is left as a margin."""
+    return (1.0 - margin) * tolerance
+
+
 class UnknownMetricError(ValueError):
     """No metric has that name."""
 
@@ -41,6 +46,13 @@ class Objective(NamedTuple):
     """s, longest dt of a recommended configuration: between its steps the error is unknown"""
     reason: str = "it was requested"
     """reason for the choice of the metric, as a clause"""
+    margin: float = 0.0
+    """fraction of the tolerance that a recommended setting leaves unused"""
+
+    @property
+    def max_error(self) -> float:
+        """Largest error of a recommended setting: the tolerance less the margin."""
+        return less_margin(self.tolerance, self.margin)
 
     @property
     def seconds_budget(self) -> float | None:
@@ -48,13 +60,18 @@ class Objective(NamedTuple):
         return None if self.budget is None else 1e-3 * self.budget * self.fps
 
 
-def check_objective(metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> None:
+def check_objective(
+    metric: str | None, tolerance: float | None, budget: float | None, fps: float, margin: float = 0.0
+) -> None:
     """Check an objective before anything is run.
 
     Raises:
         UnknownMetricError: no metric has that name.
-        ValueError: a number is not positive and finite; only the tolerance of a count may be 0.
+        ValueError: a number is not positive and finite; only the tolerance of a count may be 0. The margin is not from
+            0 to less than 1.
     """
+    if not 0.0 <= margin < 1.0:
+        raise ValueError(f"the margin is {margin:g}; it must be at least 0 and less than 1, such as 0.2 for 20 %")
     counted = metric is not None and metric_named(metric).name in COUNT_METRICS
     if tolerance is not None and not (0.0 < tolerance < math.inf or (tolerance == 0.0 and counted)):
         raise ValueError(f"the tolerance is {tolerance:g}; it must be positive and finite")
@@ -64,13 +81,18 @@ def check_objective(metric: str | None, tolerance: float | None, budget: float |
 
 
 def complete_objective(
-    context: EvaluationContext, metric: str | None, tolerance: float | None, budget: float | None, fps: float
+    context: EvaluationContext,
+    metric: str | None,
+    tolerance: float | None,
+    budget: float | None,
+    fps: float,
+    margin: float = 0.0,
 ) -> Objective:
     """Return an objective that passed `check_objective`, with defaults for the values not given."""
     chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), "it was requested")
     if tolerance is None:
         tolerance = default_metric_tolerance(chosen, default_tolerance(context.scene))
-    return Objective(chosen, tolerance, budget, fps, reason=reason)
+    return Objective(chosen, tolerance, budget, fps, reason=reason, margin=margin)
 
 
 def default_metric_tolerance(metric: Metric, length: float) -> float:

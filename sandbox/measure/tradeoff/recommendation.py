@@ -5,8 +5,9 @@ from collections.abc import Callable, Sequence
 from sandbox.engines.pymunk_adapter.engine import is_space_default, space_attributes
 from sandbox.formatting import format_quantity
 from sandbox.measure.tradeoff.configuration import Evaluation
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import Objective
-from sandbox.measure.tradeoff.result import FreshStarts, Recommendation
+from sandbox.measure.tradeoff.result import Recommendation
 from sandbox.scene.description.world import Settings
 
 FRAME_TOLERANCE = 1.01
@@ -39,7 +40,7 @@ def recommend_cheapest(
         screen: returns whether a configuration is within the tolerance in enough of the starts that decide.
         confirm: returns its errors from starts that did not decide.
     """
-    candidates = [p for p in _eligible(points, objective) if p.error is not None and p.meets(objective.tolerance)]
+    candidates = [p for p in _eligible(points, objective) if p.error is not None and p.meets(objective.max_error)]
     for point in by_cost(candidates):
         if screen(point):
             found = confirm(point)
@@ -70,7 +71,7 @@ def cheapest_rejected(
     points: Sequence[Evaluation], objective: Objective, chosen: Recommendation | None
 ) -> Recommendation | None:
     """Return the cheapest evaluation within the tolerance that has objections, if none or a dearer one was chosen."""
-    within = [p for p in _eligible(points, objective) if p.ranking_error <= objective.tolerance]
+    within = [p for p in _eligible(points, objective) if p.ranking_error <= objective.max_error]
     first = next(iter(by_cost(within)), None)
     if first is None or not first.objections or (chosen is not None and first is chosen.point):
         return None
@@ -143,7 +144,7 @@ def describe(point: Evaluation, objective: Objective, confirmation: FreshStarts 
     """
     assert point.error is not None and point.cost is not None
     unit = objective.metric.unit
-    error = f"{objective.metric.name} {format_quantity(point.error, unit)}"
+    error = f"{objective.metric.name} {format_quantity(point.error, unit)}{', the truth itself' * point.is_truth}"
     if objective.metric.name == "passes" and point.error > 0.0:
         error += f", 1 in {1.0 / point.error:.3g} contacts missed"
     if objective.metric.name == "joint_error" and (distance := point.metrics.get("joint_distance")) is not None:

@@ -4,23 +4,23 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar, NamedTuple, Self
-
-import numpy as np
+from typing import Any, ClassVar, NamedTuple
 
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
-from sandbox.jsonable import finite, in_json, to_json
+from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.compare.result import StudyAgainstTruth
 from sandbox.measure.preflight.diagnostic import Diagnostic
-from sandbox.measure.proportion import Proportion
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
+from sandbox.measure.tradeoff.convergence import ConvergenceOrder, convergence_orders
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.objective import pareto
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
+from sandbox.measure.tradeoff.objective import less_margin, pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
+from sandbox.measure.tradeoff.timing import CostRatio
 from sandbox.scene.compile.scene import Scene
 
 LIMITS: Mapping[Limit | None, str] = {
@@ -32,34 +32,8 @@ LIMITS: Mapping[Limit | None, str] = {
 
 MAX_SHOWN = 4
 """Answers in the representation of a trade-off."""
-
-
-@dataclass(frozen=True)
-class FreshStarts:
-    """Errors of a setting over perturbed starts that were not used to choose it."""
-
-    held: Proportion
-    """starts in which the error was within the tolerance; without trials if the effort allows none"""
-    median_error: float | None
-    """median over the starts, in the unit of the metric; None if half of the runs failed"""
-    error_95: float | None
-    """95 % quantile over the starts, in the unit of the metric; None if more than 5 % of the runs failed"""
-
-    @classmethod
-    def of(cls, errors: Sequence[float], tolerance: float) -> Self:
-        """Return the confirmation by the errors of the starts; infinite for a run that failed."""
-        if not errors:
-            return cls(Proportion(0, 0), None, None)
-        median, high = np.quantile(errors, (0.5, 0.95), method="higher").tolist()
-        held = Proportion(sum(error <= tolerance for error in errors), len(errors))
-        return cls(held, finite(median), finite(high))
-
-    def __str__(self) -> str:
-        """Return in how many starts the setting held: `held in 29 of 30 fresh starts (95 % interval 83 to 99 %)`."""
-        if not self.held.trials:
-            return "not tried from other starts, because their truths and runs take more than the effort"
-        low, high = (100.0 * each for each in self.held.interval)
-        return f"held in {self.held.hits} of {self.held.trials} fresh starts (95 % interval {low:.0f} to {high:.0f} %)"
+MAX_FRONT = 8
+"""Points of the front of one engine that are shown, and run from other starts"""
 
 
 @dataclass(frozen=True)
@@ -75,6 +49,9 @@ class Recommendation:
     warnings: tuple[Diagnostic, ...] = ()
     """problems that formulas predict for the setting (those of `sandbox check --no-trial`). The measured runs may not
     show them: a body can tunnel at a slightly different speed"""
+    cost_ratio: CostRatio | None = None
+    """cost relative to the cheapest setting of all engines within the tolerance; None if it is that setting, or if they
+    were not timed in the same turns"""
 
 
 class Conclusion(NamedTuple):
@@ -111,6 +88,8 @@ class Tradeoff(StudyAgainstTruth):
     """cheaper models of the scene whose error is within the tolerance"""
     tolerance: float
     """largest accepted error, in the unit of the metric"""
+    margin: float
+    """fraction of the tolerance that a recommended setting leaves unused"""
     budget: float | None
     """ms, computing time per frame; None if not given"""
     fps: float
@@ -164,7 +143,7 @@ class Tradeoff(StudyAgainstTruth):
         "metric_about",
         "unit",
     )
-    json_properties: ClassVar = (("answers", "sentences"), ("answered_by", "answer_keys"))
+    json_properties: ClassVar = ("max_error", "orders", ("answers", "sentences"), ("answered_by", "answer_keys"))
 
     def __repr__(self) -> str:
         """Return the number of points, and the settings within the tolerance and the budget."""
@@ -189,6 +168,16 @@ class Tradeoff(StudyAgainstTruth):
         return self.metric.unit
 
     @property
+    def max_error(self) -> float:
+        """Largest error of a recommended setting, in the unit of the metric: the tolerance less the margin."""
+        return less_margin(self.tolerance, self.margin)
+
+    @property
+    def orders(self) -> list[ConvergenceOrder]:
+        """Order of convergence of each method whose errors fall steadily with the substep, over three or more."""
+        return convergence_orders(self.points, self.tolerance)
+
+    @property
     def error_about(self) -> str:
         """Metric of the error and the reason for it, as one sentence."""
         return f"error metric: {self.metric.name} ({self.metric.about}), because {self.metric_reason}"
@@ -203,8 +192,7 @@ class Tradeoff(StudyAgainstTruth):
         successful = [point for point in self.points if point.status == "ok"]
         if successful and all(point.error is None for point in successful):
             return [Conclusion(f"{self.metric.name} cannot be measured in this scene; choose another --metric")]
-        tolerance = format_quantity(self.tolerance, self.metric.unit)
-        question = f"cheapest setting with {self.metric.name} within {tolerance}"
+        question = f"cheapest setting with {self.metric.name} within {self._limit_text()}"
         found = [self._answer(question, "within_tolerance", "nearest_to_tolerance")]
         if self.budget is not None:
             question = f"most accurate setting within {self.budget:g} ms per frame at {self.fps:g} fps"
@@ -212,13 +200,27 @@ class Tradeoff(StudyAgainstTruth):
         overall = None if self.within_tolerance is None else self.within_tolerance.point
         for name, each in self.cheapest_by_engine.items():
             if each and each.point is not overall:
-                text = f"cheapest setting of {name} within the tolerance: {each.sentence}"
+                text = f"cheapest setting of {name} within {self._limit_name}: {each.sentence}"
                 found.append(Conclusion(text, f"cheapest_by_engine.{name}"))
         if self.rejected is not None:
             reasons = "; ".join(self.rejected.point.objections)
-            text = f"within the tolerance, but not recommended: {self.rejected.sentence}. Because: {reasons}"
+            text = f"within {self._limit_name}, but not recommended: {self.rejected.sentence}. Because: {reasons}"
             found.append(Conclusion(text, "rejected"))
         return found
+
+    def _limit_text(self) -> str:
+        """Return the largest error of a recommended setting: `10 mm`, or `8 mm (10 mm less a margin of 20 %)`."""
+        tolerance, largest = (format_quantity(each, self.metric.unit) for each in (self.tolerance, self.max_error))
+        return f"{largest} ({tolerance} less a margin of {100.0 * self.margin:.3g} %)" if self.margin else tolerance
+
+    @property
+    def _limit_name(self) -> str:
+        return "the tolerance less the margin" if self.margin else "the tolerance"
+
+    @property
+    def margin_about(self) -> str | None:
+        """Effect of the margin, as one sentence; None without one."""
+        return f"tolerance: recommended settings keep to {self._limit_text()}" if self.margin else None
 
     @property
     def sentences(self) -> list[str]:
@@ -281,6 +283,13 @@ def _has_method(point: Evaluation, other: Configuration) -> bool:
     """Return whether a point differs from a configuration only in its step."""
     own = point.configuration
     return (own.engine, own.iterations, own.options) == (other.engine, other.iterations, other.options)
+
+
+def shown_of(front: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the points of a front that are shown: at most `MAX_FRONT`, evenly spaced, with its ends."""
+    if len(front) <= MAX_FRONT:
+        return list(front)
+    return [front[round(k * (len(front) - 1) / (MAX_FRONT - 1))] for k in range(MAX_FRONT)]
 
 
 def front_of(points: Sequence[Evaluation]) -> list[Evaluation]:

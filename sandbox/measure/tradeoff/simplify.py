@@ -18,7 +18,16 @@ from sandbox.jsonable import in_json
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.measure.compare.metrics import EvaluationContext, Metric
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation
-from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
+from sandbox.measure.tradeoff.timing import (
+    MIN_TURNS,
+    CostRatio,
+    TimedRun,
+    Timing,
+    run_seconds,
+    take_turns,
+    time_in_turns,
+    warm_up,
+)
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -56,9 +65,11 @@ class Simplification:
     cost: float = field(metadata=in_json(key="cost_ms_per_second"))
     """ms per simulated second"""
     ratio: float
-    """cost / cost of the setting that it replaces, timed in turns"""
+    """cost relative to the setting that it replaces, timed in turns"""
     sentence: str
     """description of the model, its error and its cost"""
+    interval: tuple[float, float] | None = None
+    """95 % confidence interval of the ratio; None with fewer than `MIN_TURNS` turns"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,7 @@ class ReplacedSetting:
     """counted cost that one run may have, s"""
     deadline: float = math.inf
     """time of `clock_without_compilation` after which a run is stopped, s"""
-    repeats: int = 3
+    repeats: int = MIN_TURNS
     """number of timings"""
 
 
@@ -102,7 +113,7 @@ def model_simplifications(contexts: Sequence[EvaluationContext], replaced: Repla
         before, after = time_in_turns(
             [TimedRun(s, replaced.engine, replaced.settings) for s in scenes], replaced.repeats
         )
-        if before is not None and after is not None and after.least <= MAX_COST_RATIO * before.least:
+        if before is not None and after is not None and _is_cheaper(after, before):
             found.append(_simplification(change.what, change.advice, replaced.engine, error, after, before, replaced))
     return sorted(found, key=lambda each: each.ratio)
 
@@ -115,22 +126,32 @@ def _closed_form(contexts: Sequence[EvaluationContext], replaced: ReplacedSettin
     runs = [solved_run(context.scene, settings) for context in contexts]
     errors = [None if r is None else metric.measure(r, context) for r, context in zip(runs, contexts, strict=True)]
     worst = max(math.inf if each is None or math.isnan(each) else each for each in errors)
-    (before,) = time_in_turns([TimedRun(scene, replaced.engine, settings)], replaced.repeats)
-    if worst > replaced.tolerance or before is None:
+    if worst > replaced.tolerance:
         return
-    seconds = []
-    for _ in range(replaced.repeats):
+
+    def solution_seconds() -> float:
         began = clock_without_compilation()
         solved_run(scene, settings)
-        seconds.append(clock_without_compilation() - began)
-    after = Timing.of(seconds, scene.world.duration)
-    if after.least <= MAX_COST_RATIO * before.least:
+        return clock_without_compilation() - began
+
+    warm_up(scene, replaced.engine, settings)
+    simulated, solved = take_turns(
+        [lambda: run_seconds(scene, replaced.engine, settings), solution_seconds], replaced.repeats
+    )
+    if not simulated:
+        return
+    before, after = (Timing.of(each, scene.world.duration) for each in (simulated, solved))
+    if _is_cheaper(after, before):
         what = "no simulation: the scene has a closed-form solution"
         advice = (
             "as long as no input changes the motion, it can also be computed from a formula, without an engine (the "
             "scene has a closed-form solution)"
         )
         yield _simplification(what, advice, None, worst, after, before, replaced)
+
+
+def _is_cheaper(after: Timing, before: Timing) -> bool:
+    return before.least > 0.0 and after.least <= MAX_COST_RATIO * before.least
 
 
 def _error(context: EvaluationContext, scene: Scene, replaced: ReplacedSetting) -> float | None:
@@ -153,12 +174,13 @@ def _simplification(
     before: Timing,
     replaced: ReplacedSetting,
 ) -> Simplification:
-    ratio = after.least / before.least
+    relative = CostRatio.of(after.turns, before.turns)
+    assert relative is not None, "both were timed, in the same turns"
     sentence = (
         f"{advice}: {replaced.metric.name} {format_quantity(error, replaced.metric.unit)}, {after.least:.3g} ms per "
-        f"simulated second, {ratio:.2g} times the cost of simulating the scene as it is"
+        f"simulated second, {relative} times the cost of simulating the scene as it is"
     )
-    return Simplification(what, engine, error, after.least, ratio, sentence)
+    return Simplification(what, engine, error, after.least, relative.ratio, sentence, relative.interval)
 
 
 def _changed(scene: Scene, change: SettingChange) -> Scene | None:

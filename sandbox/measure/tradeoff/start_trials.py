@@ -1,25 +1,30 @@
 """Trials of settings from perturbed starts: whether a setting holds, and how often.
 
-The starts 1 to `count` decide on a setting, those up to 2·`count` confirm it. Each is judged against its own truth.
+The starts 1 to `count` decide on a setting, those up to 2·`count` confirm it, and are those of the errors of other
+settings too. Each is judged against its own truth.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
-from sandbox.measure.run.bounded_run import clock_without_compilation, counted_cost
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation, counted_cost
+from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.starts import Starts, allowed_failures
-from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
-from sandbox.measure.tradeoff.objective import Objective
-from sandbox.measure.tradeoff.result import FreshStarts
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
+from sandbox.measure.tradeoff.objective import AUDIT_METRICS, Objective
 from sandbox.measure.tradeoff.search import RUN_FRACTION
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 
 STARTS_FRACTION = 0.3
 """Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
+FRONT_FRACTION = 0.5
+"""Fraction of the effort for the starts from which the shown points of the fronts are run, all together."""
 MIN_STARTS = 3
 """Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
 TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
@@ -73,7 +78,7 @@ class StartTrials:
         count = self._affordable(point)
         failures = allowed_failures(count)
         for number in range(1, count + 1):
-            failures -= self._error(point, number) > self.objective.tolerance
+            failures -= self._error(point, number) > self.objective.max_error
             if failures < 0:
                 return False
         return True
@@ -83,16 +88,40 @@ class StartTrials:
         if self.count < 2:
             return None
         numbers = range(self.count + 1, self.count + 1 + self._affordable(point))
-        return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.tolerance)
+        return FreshStarts.of([self._error(point, number) for number in numbers], self.objective.max_error)
+
+    def errors_of_front(self, points: Sequence[Evaluation]) -> dict[Configuration, FreshStarts]:
+        """Return the errors of points over starts that do not decide; without those that the effort does not allow.
+
+        Each point gets an equal part of the effort that is left, the cheapest first, so that the dearest get what the
+        others do not need. The truth of a start counts for all of them.
+        """
+        found: dict[Configuration, FreshStarts] = {}
+        remaining = FRONT_FRACTION * self.effort
+        by_cost = sorted(points, key=lambda each: each.counted_seconds) if self.count > 1 else []
+        for others, point in zip(reversed(range(len(by_cost))), by_cost, strict=True):
+            allowed, numbers = remaining / (others + 1), list[int]()
+            for number in range(self.count + 1, 2 * self.count + 1):
+                run = 0.0 if (point.configuration, number) in self._errors else point.counted_seconds
+                truth = 0.0 if number in self._contexts else self._truth_cost
+                allowed -= run + truth / (others + 1)
+                if allowed < 0.0:
+                    break
+                numbers.append(number)
+                remaining -= run + truth
+            if len(numbers) >= min(MIN_STARTS, self.count) and clock_without_compilation() < self.deadline:
+                errors = [self._error(point, number) for number in numbers]
+                found[point.configuration] = FreshStarts.of(errors, self.objective.max_error)
+        return found
 
     def counterexample(self, evaluations: Sequence[Evaluation]) -> int | None:
         """Return a start from which a setting fails, if an engine has settings within the tolerance but none holds."""
         for engine in self.space.engines:
-            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.tolerance)]
+            own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.max_error)]
             own.sort(key=lambda each: each.counted_seconds)
             if own and not any(map(self.holds, own)):
                 tried = {n: error for (setting, n), error in self._errors.items() if setting == own[0].configuration}
-                return next(n for n, error in tried.items() if error > self.objective.tolerance)
+                return next(n for n, error in tried.items() if error > self.objective.max_error)
         return None
 
     def context_at(self, number: int) -> EvaluationContext:
@@ -108,20 +137,33 @@ class StartTrials:
         """Return the number of starts from which a configuration is run, or 0: counted work decides, not the clock."""
         if self.count < 2 or clock_without_compilation() >= self.deadline:
             return 0
-        truth, cost = self.context.truth, point.counted_seconds
-        if truth is not None and (runs := TRUTH_RUNS[truth.kind]):
-            info = truth.trajectory.info
-            settings = Settings.model_validate(info["settings"])
-            cost += runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
+        cost = point.counted_seconds + self._truth_cost
         affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.count
         return min(self.count, affordable) if affordable >= min(MIN_STARTS, self.count) else 0
+
+    @cached_property
+    def _truth_cost(self) -> float:
+        """Counted cost of the truth of a start, s, from that of the scene."""
+        truth = self.context.truth
+        if truth is None or not (runs := TRUTH_RUNS[truth.kind]):
+            return 0.0
+        info = truth.trajectory.info
+        settings = Settings.model_validate(info["settings"])
+        return runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
 
     def _error(self, point: Evaluation, number: int) -> float:
         """Return the error of a configuration from another start; infinite if its run fails."""
         key = point.configuration, number
         if key not in self._errors:
-            limit = max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
-            metric, tolerance = self.objective.metric.name, self.objective.tolerance
-            found = evaluate(point.configuration, self.space, [self.context_at(number)], metric, tolerance, limit)
-            self._errors[key] = found.ranking_error
+            self._errors[key] = self._measured_error(point, self.context_at(number))
         return self._errors[key]
+
+    def _measured_error(self, point: Evaluation, context: EvaluationContext) -> float:
+        """Run a configuration and return its error. Other metrics are not measured, which takes longer than the run."""
+        metric, limit = self.objective.metric, max(RUN_FRACTION * self.effort, 2.0 * point.counted_seconds)
+        try:
+            run, _ = bounded_run(context.scene, point.engine, point.asked, limit, audit=metric.name in AUDIT_METRICS)
+        except (RunTimeoutError, TooLargeError):
+            return math.inf
+        error = metric.measure(run, context) if run.status == "ok" else None
+        return math.inf if error is None or math.isnan(error) else error

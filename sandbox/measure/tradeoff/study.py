@@ -34,21 +34,23 @@ from sandbox.measure.tradeoff.objective import (
     check_objective,
     complete_objective,
     is_dominated,
+    less_margin,
     metric_named,
 )
 from sandbox.measure.tradeoff.recommendation import (
     FRAME_TOLERANCE,
     cheapest_rejected,
+    label,
     nearest_to_budget,
     nearest_to_tolerance,
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of, shown_of
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
 from sandbox.measure.tradeoff.start_trials import StartTrials, context_of
-from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
+from sandbox.measure.tradeoff.timing import CostRatio, TimedRun, Timing, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
@@ -79,6 +81,7 @@ def tradeoff(
     *,
     metric: str | None = None,
     tolerance: float | None = None,
+    margin: float = 0.0,
     budget: float | None = None,
     fps: float = 60.0,
     starts: int = DEFAULT_STARTS,
@@ -108,6 +111,8 @@ def tradeoff(
             trusted to the end, otherwise an invariant of the scene.
         tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
             no missed contact.
+        margin: fraction of the tolerance that a recommended setting has to leave unused: with 0.2 its error is at most
+            0.8 times the tolerance.
         budget: computing time per frame, ms, for which the most accurate setting is sought.
         fps: frames per second of the budget. A recommended setting has at least this step rate, or the step rate of the
             scene if that is lower.
@@ -148,7 +153,7 @@ def tradeoff(
     for name in names:
         engine_named(name)
     _check_arguments(starts, zoom, effort, time_limit, repeats, most)
-    check_objective(metric, tolerance, budget, fps)
+    check_objective(metric, tolerance, budget, fps, margin)
     base = scene.solver.replace(**settings) if settings else scene.solver
     scene = with_whole_steps(scene, base.dt)
     require_memory(scene, base, 4 * len(scene.bodies))
@@ -156,14 +161,15 @@ def tradeoff(
 
     on_progress(Progress("the truth"))
     drawn = Starts(scene, spread)
-    truth_tolerance = _truth_tolerance(scene, metric, tolerance, zoom)
+    max_error = None if tolerance is None else less_margin(tolerance, margin)
+    truth_tolerance = _truth_tolerance(scene, metric, max_error, zoom)
     context = context_of(scene, base, truth_tolerance, zoom, truth)
     zoom = context.zoom  # without a given one, that of the motion, for which a truth is needed
-    finer = _truth_tolerance(scene, metric, tolerance, zoom)
+    finer = _truth_tolerance(scene, metric, max_error, zoom)
     if finer < truth_tolerance:
         truth_tolerance = finer
         context = context_of(scene, base, finer, zoom)
-    objective = complete_objective(context, metric, tolerance, budget, fps)
+    objective = complete_objective(context, metric, tolerance, budget, fps, margin)
     objective = objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps))
     able = tuple(name for name in names if not _refusal(scene, name, base))
     space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
@@ -259,7 +265,7 @@ class _Study:
             space=self.space,
             contexts=self._search_contexts,
             metric=self.objective.metric.name,
-            tolerance=self.objective.tolerance,
+            tolerance=self.objective.max_error,
             budget=None if budget is None else budget * duration,
             effort=self.effort,
             max_evaluations=most,
@@ -306,6 +312,11 @@ class _Study:
         near_tolerance = None if within_tolerance else nearest_to_tolerance(points, self.objective)
         has_answer = within_budget or self.objective.budget is None
         near_budget = None if has_answer else nearest_to_budget(points, self.objective)
+        rejected = cheapest_rejected(points, self.objective, within_tolerance)
+        picks = [within_tolerance, within_budget, *cheapest.values()]
+        if repeats and self.is_explained and clock_without_compilation() < self.deadline:
+            self.on_progress(Progress("running the settings of the table from other starts"))
+            points = self._with_fresh_starts(points, list(filter(None, picks)))
         context = self.context
         return Tradeoff(
             scene=self.space.scene,
@@ -319,14 +330,17 @@ class _Study:
             splits=tuple(splits),
             proposals=tuple(proposals),
             tolerance=self.objective.tolerance,
+            margin=self.objective.margin,
             budget=self.objective.budget,
             fps=self.objective.fps,
-            within_tolerance=self._with_warnings(within_tolerance),
-            within_budget=self._with_warnings(within_budget),
-            cheapest_by_engine={name: self._with_warnings(each) for name, each in cheapest.items()},
-            rejected=cheapest_rejected(points, self.objective, within_tolerance),
-            nearest_to_tolerance=self._with_warnings(near_tolerance),
-            nearest_to_budget=self._with_warnings(near_budget),
+            within_tolerance=self._completed(within_tolerance, points),
+            within_budget=self._completed(within_budget, points, within_tolerance),
+            cheapest_by_engine={
+                name: self._completed(each, points, within_tolerance) for name, each in cheapest.items()
+            },
+            rejected=self._completed(rejected, points),
+            nearest_to_tolerance=self._completed(near_tolerance, points),
+            nearest_to_budget=self._completed(near_budget, points),
             starts=self.trials.count,
             spread=self.trials.starts.spread,
             searched_starts=(0, *self.counterexamples),
@@ -397,18 +411,43 @@ class _Study:
             engine=engine,
             settings=self.space.own_settings(engine) if chosen is None else chosen.point.asked,
             metric=self.objective.metric,
-            tolerance=self.objective.tolerance,
+            tolerance=self.objective.max_error,
             limit=RUN_FRACTION * self.effort,
             deadline=self.deadline,
         )
         return model_simplifications(self._search_contexts, replaced)
 
-    def _with_warnings(self, chosen: Recommendation | None) -> Recommendation | None:
-        """Return a recommendation with the diagnostics of its setting."""
+    def _with_fresh_starts(self, points: Sequence[Evaluation], picks: Sequence[Recommendation]) -> list[Evaluation]:
+        """Return the points, those that the table shows with their errors from fresh starts."""
+        by_engine = [[p for p in points if p.engine == name] for name in self.space.engines]
+        shown = [point for own in by_engine for point in shown_of(front_of(own))]
+        shown += [p for p in points if p.is_own and p.status == "ok"] + [pick.point for pick in picks]
+        found = self.trials.errors_of_front(list({each.configuration: each for each in shown}.values()))
+        found |= {p.point.configuration: p.confirmation for p in picks if p.confirmation and p.confirmation.held.trials}
+        return [replace(each, fresh_starts=found.get(each.configuration)) for each in points]
+
+    def _completed(
+        self, chosen: Recommendation | None, points: Sequence[Evaluation], cheapest: Recommendation | None = None
+    ) -> Recommendation | None:
+        """Return a recommendation with the diagnostics of its setting, and its cost relative to the cheapest one.
+
+        Args:
+            chosen: the recommendation.
+            points: all points of the result, of which it gets its own.
+            cheapest: cheapest setting of all engines; None: no relative cost.
+        """
         if chosen is None:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
-        return replace(chosen, warnings=tuple(found))
+        point = next(each for each in points if each.configuration == chosen.point.configuration)
+        completed = replace(chosen, point=point, warnings=tuple(found))
+        if cheapest is None or cheapest.point.configuration == point.configuration:
+            return completed
+        ratio = CostRatio.of(point.turns, cheapest.point.turns)
+        if ratio is None:
+            return completed
+        sentence = f"{chosen.sentence}; {ratio} times the cost of {label(cheapest.point)}"
+        return replace(completed, sentence=sentence, cost_ratio=ratio)
 
 
 def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diagnostic]:

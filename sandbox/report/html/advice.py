@@ -141,7 +141,7 @@ def _knobs(advice: Advice) -> Markup:
             _error_cell(advice, knob.setting) if knob.setting.status == "ok" else error_text(advice, knob.setting),
             ratio_text(knob.error_ratio),
             format_number(knob.setting.frame_ms),
-            ratio_text(knob.cost_ratio),
+            ratio_text(knob.cost_ratio, knob.cost_ratio_interval),
         ]
         for knob in advice.knobs
     ]
@@ -153,7 +153,7 @@ def _engines(advice: Advice) -> Markup:
     columns = HtmlColumn("engine"), HtmlColumn("setting"), _error_column(advice), FRAME, ratio
     rows: list[list[Content]] = []
     for other in advice.others:
-        setting, remark = other.setting, engine_text(other)
+        setting, remark = other.setting, engine_text(advice, other)
         if setting is None:
             rows.append([engine_name(other.engine), remark, None, None, None])
             continue
@@ -164,7 +164,7 @@ def _engines(advice: Advice) -> Markup:
                 f"{text}; {remark}" if remark else text,
                 _error_cell(advice, setting),
                 format_number(setting.frame_ms),
-                ratio_text(setting.ratio),
+                ratio_text(setting.ratio, setting.ratio_interval),
             ]
         )
     return table(columns, rows, "The same tolerance on the other engines")

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from sandbox.columns import shown
+from sandbox.columns import TRUTH, shown
 from sandbox.formatting import UNKNOWN, format_number
 from sandbox.measure.compare import Comparison, Row
 from sandbox.measure.compare.columns import COLUMNS, DIVERGENCE
@@ -35,7 +35,8 @@ from sandbox.report.html.page import (
     value_cells,
     write_page,
 )
-from sandbox.report.html.replay import TRUTH, Track, replay
+from sandbox.report.html.replay import TRUTH as TRUTH_TRACK
+from sandbox.report.html.replay import Track, replay
 from sandbox.scene.description.world import Settings
 
 TEMPLATE = "comparison.html.j2"
@@ -84,6 +85,8 @@ def verdict_of(row: Row, tolerance: float) -> tuple[str, Shade]:
         return f"diverges at {format_number(row.first_divergence)} s", "bad" if error > 10.0 * tolerance else "fair"
     if phantom:
         return f"{phantom:,} phantom", "fair"
+    if row.is_truth:
+        return TRUTH, "good"
     return ("matches", "good") if error <= NEGLIGIBLE * tolerance else ("within tolerance", "good")
 
 
@@ -93,6 +96,7 @@ def badge_of(row: Row, tolerance: float) -> Markup:
 
 
 VERDICTS: tuple[tuple[str, Shade, str], ...] = (
+    (TRUTH, "good", "the run is the truth itself, so that its errors are 0"),
     ("matches", "good", "error at most a millionth of the tolerance"),
     ("within tolerance", "good", "error within the tolerance while the truth is trusted"),
     (
@@ -213,7 +217,7 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
     names = ", ".join(comparison.trajectories) or "nothing"
     charts = []
     if truth is not None:
-        tracks.append(Track(TRUTH, TRUTH, truth.trajectory))
+        tracks.append(Track(TRUTH_TRACK, TRUTH_TRACK, truth.trajectory))
         label = f"largest position error, m, against time, of {names}"
         charts.append(time_chart(error_chart(comparison), f"{name}-error", label, duration))
     label = f"total energy, J, against time, of {names}"

@@ -6,6 +6,7 @@ import numpy as np
 from markupsafe import Markup
 
 from sandbox.arrays import FloatArray
+from sandbox.columns import TRUTH
 from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.metrics.trajectory_error import errors
@@ -122,8 +123,8 @@ def _rows(comparison: Comparison, anchor: str) -> list[list[Content]]:
                 "" if rows else link,
                 "" if rows else kind,
                 engine_name(row.engine),
-                format_number(error),
-                UNKNOWN if error is None else f"×{format_number(error / comparison.tolerance, 2)}",
+                TRUTH if row.is_truth else format_number(error),
+                UNKNOWN if error is None or row.is_truth else f"×{format_number(error / comparison.tolerance, 2)}",
                 format_number(cost_of(comparison, row)),
                 badge_of(row, comparison.tolerance),
                 _error_sparkline(comparison, row.engine),

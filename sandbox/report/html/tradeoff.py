@@ -1,6 +1,8 @@
 """HTML page of a trade-off: recommendations, diagram, error budget and all settings."""
 
+import math
 from collections.abc import Collection, Sequence
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -8,6 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from markupsafe import Markup
 
+from sandbox.columns import TRUTH
 from sandbox.formatting import UNKNOWN, format_number, format_plural
 from sandbox.measure.compare import Comparison
 from sandbox.measure.tradeoff import Tradeoff
@@ -197,7 +200,8 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     repeats = row.get("repeats")
     median = format_number(row.get("cost_median_ms_per_second"))
     figures = [
-        (metric, f"{format_number(point.error)} {unit}".rstrip() if point.error is not None else UNKNOWN),
+        (metric, f"{_error_cell(point)} {'' if point.error is None or point.is_truth else unit}".rstrip()),
+        *_start_figures(point),
         ("cost", f"{format_number(point.cost)} ms per s" if point.cost is not None else UNKNOWN),
         ("median cost", f"{median} ms per s" if repeats else UNKNOWN),
         ("repeats", str(repeats) if repeats else UNKNOWN),
@@ -213,6 +217,28 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     figures += [("note", message) for message in messages]
     title = next(describe(point, document["metric"], unit))
     return {"title": title, "figures": figures, "text": settings_text(point.settings, point.engine)}
+
+
+def _start_figures(point: WorkPoint) -> list[tuple[str, str]]:
+    """Return the errors of a point from fresh starts; empty if it was not run from any."""
+    found = point.row.get("fresh_starts")
+    if not found:
+        return []
+    return [
+        ("fresh starts", str(found["held"]["trials"])),
+        ("median of these", format_number(found["median_error"])),
+        ("95 % of these", format_number(found["error_95"])),
+    ]
+
+
+def _start_cell(point: WorkPoint, key: str) -> str:
+    """Return a quantile of the errors of a point from fresh starts, and `∞` where too many of its runs failed."""
+    found = point.row.get("fresh_starts")
+    if not found:
+        return UNKNOWN
+    if point.is_truth and found[key] == 0.0:
+        return TRUTH
+    return format_number(math.inf if found[key] is None else found[key])
 
 
 def _frame_text(point: WorkPoint, document: TradeoffMapping) -> str:
@@ -243,6 +269,12 @@ def details(document: TradeoffMapping) -> list[Section]:
         )
         body = concatenated(_front_table(front, document), _long_legend(front, document))
         found.append(Section("The Pareto front", body, lead=lead))
+    if document.get("orders"):
+        lead = (
+            "Power of the substep that the error of a method is proportional to, fitted over three substeps or more. "
+            "Methods whose errors do not fall steadily have none."
+        )
+        found.append(Section("Orders of convergence", _orders(document["orders"]), lead=lead))
     if document.get("split"):
         lead = (
             "Solver: error that more iterations remove. Time step: error that the finest step tried removes. "
@@ -255,6 +287,17 @@ def details(document: TradeoffMapping) -> list[Section]:
     rows = _points_table(points, document), _long_legend(points, document)
     found.append(Section("All settings tried", fragment(TEMPLATE, "all_settings", summary, *rows)))
     return found
+
+
+def _orders(orders: Sequence[TradeoffMapping]) -> Markup:
+    columns: CellColumns[TradeoffMapping] = (
+        (HtmlColumn("engine"), lambda row: engine_name(row["engine"])),
+        (HtmlColumn("method"), lambda row: _changes_text(row["changes"]) or "as the scene has it"),
+        (HtmlColumn("order", True), lambda row: format_number(row["order"])),
+        (HtmlColumn("substeps, s", True), lambda row: f"{row['finest']:.3g} to {row['coarsest']:.3g}"),
+        (HtmlColumn("settings", True), lambda row: str(len(row["points"]))),
+    )
+    return row_table(columns, orders, "Orders of convergence")
 
 
 def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
@@ -303,18 +346,28 @@ def _metric_column(document: TradeoffMapping) -> HtmlColumn:
     return HtmlColumn(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True)
 
 
+def _error_cell(point: WorkPoint) -> str:
+    """Return the error of a point as text, `truth` if its run is the truth itself."""
+    return TRUTH if point.is_truth else format_number(point.error)
+
+
 COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum of the repeats")
 
 
 def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
     """Return a row for each point of the front."""
     at = f" at {document['fps']:g} fps" if document.get("fps") else ""
-    median = HtmlColumn("median", True, "milliseconds per simulated second, median of the repeats")
+    median = HtmlColumn("median ms per s", True, "milliseconds per simulated second, median of the repeats")
     frame = HtmlColumn("ms per frame", True, f"median of the most expensive frame{at}")
     columns: CellColumns[WorkPoint] = (
         (HtmlColumn("engine"), lambda point: engine_name(point.engine)),
         (HtmlColumn("changes"), lambda point: _marked_changes(point, document)),
-        (_metric_column(document), lambda point: format_number(point.error)),
+        (_metric_column(document), _error_cell),
+        (
+            HtmlColumn("median", True, "median of the errors from fresh starts"),
+            partial(_start_cell, key="median_error"),
+        ),
+        (HtmlColumn("95 %", True, "95 % quantile of these errors"), partial(_start_cell, key="error_95")),
         (COST, lambda point: format_number(point.cost)),
         (median, lambda point: format_number(point.row.get("cost_median_ms_per_second"))),
         (frame, lambda point: _frame_cell(point, document)),
@@ -333,7 +386,7 @@ def _points_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Mar
     for point in points:
         cells: list[Content] = [engine_name(point.engine), _marked_changes(point, document)]
         cells.append(badge(point.status, "good" if point.is_drawable else "bad", point.row.get("reason")))
-        cells += [format_number(point.error), format_number(point.cost)]
+        cells += [_error_cell(point), format_number(point.cost)]
         cells += [format_number((point.row.get("metrics") or {}).get(name)) for name in metrics]
         counts = point.row.get("work") or {}
         cells += [f"{counts[name]:,}" if name in counts else UNKNOWN for name in counters]
@@ -365,11 +418,16 @@ def _marked_changes(point: WorkPoint, document: TradeoffMapping) -> Content:
 def _changes(point: WorkPoint) -> str:
     """Return the changes of a point to the scene's own solver, in a line."""
     changes = point.row.get("changes") or {}
+    text = _changes_text(changes) or "the scene's own settings"
+    return f"{text} (the scene's own)" if changes and point.row.get("scene_setting") else text
+
+
+def _changes_text(changes: TradeoffMapping) -> str:
+    """Return changes of settings in a line."""
     words = [
         f"{key} {format_number(value, 4) if isinstance(value, float) else value}" for key, value in changes.items()
     ]
-    text = ", ".join(words).replace("_", " ") or "the scene's own settings"
-    return f"{text} (the scene's own)" if changes and point.row.get("scene_setting") else text
+    return ", ".join(words).replace("_", " ")
 
 
 def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
@@ -386,4 +444,8 @@ def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
 
 
 def _ratio_cell(row: TradeoffMapping) -> str:
-    return f"×{format_number(row['ratio'])}" if row.get("ratio") is not None else UNKNOWN
+    if row.get("ratio") is None:
+        return UNKNOWN
+    low, high = row.get("interval") or (None, None)
+    interval = "" if low is None else f" ({format_number(low, 2)} to {format_number(high, 2)})"
+    return f"×{format_number(row['ratio'], 2)}{interval}"

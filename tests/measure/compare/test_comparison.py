@@ -75,6 +75,31 @@ def test_exact_is_the_truth_if_it_models_the_scene(monkeypatch: pytest.MonkeyPat
     assert compare(scene, ["pymunk"]).truth == "refined"
 
 
+def test_only_the_run_that_is_the_truth_is_marked() -> None:
+    found = compare("bullet", ("exact", "box2d"), sweep={"solver.dt": [0.001, 0.0005]})
+    assert [(row.engine, row.is_truth) for row in found.rows] == [
+        ("exact", True),
+        ("box2d", False),
+        ("exact", True),
+        ("box2d", False),
+    ]
+    assert [row.score.max_position for row in found.rows if row.is_truth] == [0.0, 0.0]
+    formula = compare("two_balls", ("exact",)).rows[0]
+    assert formula.truth == "closed_form" and formula.score.max_position == 0.0
+    assert not formula.is_truth, "an error of 0 against a formula is measured"
+
+
+def test_refined_truth_is_the_run_with_its_settings() -> None:
+    scene = load(find("double_pendulum"), ["world.duration=0.5"])
+    truth = truth_of(scene, scene.solver, 0.05)
+    assert truth is not None and truth.kind == "refined"
+    engine, settings = truth.trajectory.info["engine"], Settings.model_validate(truth.trajectory.info["settings"])
+    assert truth.is_run_of(engine, settings)
+    assert truth.is_run_of(engine, settings.replace(record_every=1))
+    assert not truth.is_run_of(engine, settings.replace(dt=2.0 * settings.dt))
+    assert not truth.is_run_of("pymunk" if engine != "pymunk" else "box2d", settings)
+
+
 def test_exact_stopped_by_its_limit_is_replaced_by_a_refined_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, pymunk=PymunkEngine(), exact=AlteredPymunk("exact"))
     monkeypatch.setattr(truth_module, "EXACT_LIMIT", -1.0)
@@ -205,5 +230,5 @@ def test_given_truth_is_not_computed_again(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr("sandbox.measure.tradeoff.start_trials.find_truth", fail)
     compared = compare(BOUNCE, ("pymunk",), truth=known)
     assert compared.best is known
-    studied = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
+    studied = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1, starts=1)  # others have their own
     assert studied.points[0].error == compared.rows[0].score.max_position

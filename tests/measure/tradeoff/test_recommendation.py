@@ -13,6 +13,7 @@ from sandbox.engines.pymunk_adapter.colliders import new_space
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.tradeoff.configuration import Evaluation
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import Objective, is_dominated, pareto
 from sandbox.measure.tradeoff.recommendation import (
     label,
@@ -22,7 +23,6 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_cheapest,
     recommend_most_accurate,
 )
-from sandbox.measure.tradeoff.result import FreshStarts
 from tests.measure.tradeoff.evaluations_by_hand import point_of
 from tests.runs_by_hand import DROP, scene_of
 
@@ -71,6 +71,9 @@ def test_confirmation_has_quantiles_and_counts_failed_runs() -> None:
     assert (found.held.hits, found.held.trials) == (10, 20)
     assert (found.median_error, found.error_95) == (11.0, None)  # a run of 20 failed: the quantile is unknown
     assert FreshStarts.of(np.arange(1.0, 101.0).tolist(), 95.0).error_95 == 96.0  # 95 of 100 are below it
+    assert FreshStarts.of(np.arange(1.0, 101.0).tolist(), 95.0).error_5 == 5.0  # 4 of 100 are below it
+    assert FreshStarts.of([3.0, 1.0, 2.0], 1.0).error_5 == 1.0  # of few starts the smallest error, and the largest
+    assert FreshStarts.of([3.0, 1.0, 2.0], 1.0).error_95 == 3.0
     assert FreshStarts.of([], 1.0).held.trials == 0
 
 

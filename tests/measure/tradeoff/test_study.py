@@ -22,7 +22,8 @@ from sandbox.measure.tradeoff import start_trials as trials
 from sandbox.measure.tradeoff import timing as cost_module
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.objective import UnknownMetricError
-from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, NOISE_FACTOR
+from sandbox.measure.tradeoff.recommendation import EQUAL_WORK_FACTOR, FRAME_TOLERANCE, NOISE_FACTOR, label
+from sandbox.measure.tradeoff.result import shown_of
 from sandbox.measure.tradeoff.study import setting_warnings
 from sandbox.progress import Progress
 from sandbox.scene.compile.scene import Scene
@@ -100,6 +101,18 @@ def test_recommendation_is_within_the_tolerance_in_an_independent_run() -> None:
     assert (point.counted or 0.0) <= EQUAL_WORK_FACTOR * min(p.counted or 0.0 for p in close)
 
 
+def test_recommendation_leaves_the_margin_unused() -> None:
+    scene = scene_of(DROP)
+    found = study(scene, tolerance=4e-3, margin=0.75)
+    pick = found.within_tolerance.point
+    assert pick.error <= 1e-3
+    between = [point for point in found.points if point.error is not None and 1e-3 < point.error <= 4e-3]
+    assert any(point.counted < pick.counted for point in between), "otherwise the margin changes nothing"
+    assert error_of(scene, found.within_tolerance.point) == found.within_tolerance.point.error
+    assert (found.tolerance, found.margin, found.max_error) == (4e-3, 0.75, 1e-3)
+    assert "within 1 mm (4 mm less a margin of 75 %): " in found.sentences[0]
+
+
 LUCKY = (
     toml("world", gravity=[0.0, 0.0], duration=2.0)
     + toml("solver", dt=0.125)
@@ -141,6 +154,44 @@ def test_scene_that_cannot_vary_has_one_start() -> None:
     found = study(scene_of(DROP), starts=5, spread=0.0, most=1)
     assert found.starts == 1
     assert found.within_tolerance is None or found.within_tolerance.confirmation is None
+
+
+@pytest.mark.fail_slow(60)  # hundreds of runs
+def test_settings_of_the_table_have_the_errors_of_the_same_fresh_starts() -> None:
+    scene = scene_of(LUCKY)
+    found = study(scene, tolerance=0.02, starts=8, effort=20.0, most=8)
+    shown = [point for front in found.fronts().values() for point in shown_of(front)]
+    assert len(shown) > 2
+    starts = Starts(scene)
+    for point in shown:
+        errors = sorted(error_of(starts.start(number), point) for number in range(9, 17))  # after those that decide
+        assert point.fresh_starts.held.trials == 8
+        assert point.fresh_starts.median_error == errors[4]
+        assert (point.fresh_starts.error_5, point.fresh_starts.error_95) == (errors[0], errors[-1])
+    pick = found.within_tolerance
+    assert pick.point.fresh_starts == pick.confirmation
+    assert any(pick.point is each for each in found.points)
+
+
+def test_costs_are_stated_relative_to_the_cheapest_setting() -> None:
+    found = study(scene_of(DROP), "pymunk", "exact", tolerance=4e-3, repeats=5, effort=1.0)
+    cheapest = found.within_tolerance
+    assert cheapest.cost_ratio is None
+    (other,) = [each for each in found.cheapest_by_engine.values() if each.point is not cheapest.point]
+    ratio = other.cost_ratio
+    turns = np.array(other.point.turns) / np.array(cheapest.point.turns)
+    assert len(turns) == 5
+    assert ratio.ratio == pytest.approx(np.median(turns), rel=1e-12)  # rounding
+    low, high = ratio.interval
+    assert turns.min() <= low <= ratio.ratio <= high <= turns.max()
+    assert other.sentence.endswith(f"; {ratio} times the cost of {label(cheapest.point)}")
+    stored = found.document()["cheapest_by_engine"][other.point.engine]["cost_ratio"]
+    assert stored == {"ratio": ratio.ratio, "interval": [low, high]}
+
+
+def test_settings_whose_starts_take_too_much_have_none() -> None:
+    found = study(scene_of(DROP), effort=1e-4, starts=30, most=3)
+    assert all(point.fresh_starts is None for point in found.points)
 
 
 def test_effort_bounds_the_starts() -> None:
@@ -240,6 +291,7 @@ def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> Non
         {"tolerance": 0.0}, {"tolerance": math.nan}, {"tolerance": math.inf}, {"budget": 0.0}, {"budget": math.inf},
         {"tolerance": -1.0, "metric": "missed_contacts"}, {"fps": math.nan}, {"starts": 0}, {"zoom": -1.0},
         {"effort": 0.0}, {"effort": math.inf}, {"time_limit": 0.0}, {"repeats": 0}, {"most": 0},
+        {"margin": -0.1}, {"margin": 1.0}, {"margin": math.nan},
     ],
 )  # fmt: skip
 def test_invalid_argument_is_rejected_before_any_run(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,8 @@ from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.result import FreshStarts, Recommendation, Tradeoff
+from sandbox.measure.tradeoff.fresh_starts import FreshStarts
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
@@ -69,6 +70,7 @@ def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "splits": (),
         "proposals": (),
         "tolerance": 0.02,
+        "margin": 0.0,
         "budget": 0.5,
         "fps": 60.0,
         "within_tolerance": None,
