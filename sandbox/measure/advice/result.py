@@ -8,6 +8,7 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
 from sandbox.measure.compare.metrics import WorstError
+from sandbox.measure.proportion import Proportion
 from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import less_margin
 from sandbox.scene.description.world import Settings
@@ -98,6 +99,9 @@ class ReplayedActions:
     reason: str | None
     missed_contacts: int | None
     """contacts that the engine missed"""
+    over_starts: Proportion | None = None
+    """perturbed starts, with the actions up to a frame later, from which the run is ok and misses no contact; None if the
+    effort allows too few"""
     finer_substeps: int | None = None
     """substeps of a frame in the finer run with the actions, to which this one is compared; None if there was none"""
     departs_at: float | None = None

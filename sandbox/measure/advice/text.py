@@ -173,7 +173,7 @@ def recording_sentences(advice: Advice) -> Iterator[str]:
         outcome = format_plural(each.missed_contacts or 0, "missed contact")
         if each.status != "ok" or each.missed_contacts is None:
             outcome = f"{each.status}{'' if each.reason is None else f': {each.reason}'}"
-        outcome += _departure_text(advice, each)
+        outcome += _departure_text(advice, each) + _over_starts_text(each)
         if each.setting in ("rejected", "tried"):
             end = "; so it is not recommended" if each.setting == "rejected" else ""
             yield f"With the actions, {each.label} has: {outcome}{end}."
@@ -194,15 +194,27 @@ def _departure_text(advice: Advice, replayed: ReplayedActions) -> str:
     )
 
 
+def _over_starts_text(replayed: ReplayedActions) -> str:
+    """Return from how many perturbed starts a replay misses no contact; empty if there were none."""
+    if replayed.over_starts is None:
+        return ""
+    clean = replayed.over_starts
+    low, high = (100.0 * each for each in clean.interval)
+    return (
+        f"; no missed contact in {clean.hits} of {clean.trials} perturbed starts with the actions up to a frame later "
+        f"(95 % interval {low:.0f} to {high:.0f} %)"
+    )
+
+
 def _length(advice: Advice, length: float) -> str:
     """Return a length in px."""
     return f"{pixels_text(length * advice.zoom)} px"
 
 
 def risk_label(risk: Risk) -> str:
-    """Return the odds of a risk: `observed`, `68 %`, or `forecast` if a formula gives no odds."""
-    if risk.is_observed:
-        return "observed"
+    """Return the odds of a risk: `observed in 83 %`, `68 %`, or `forecast` if a formula gives no odds."""
+    if risk.is_observed and risk.odds is not None:
+        return f"observed in {format_percent(risk.odds)}"
     return "forecast" if risk.odds is None else format_percent(risk.odds)
 
 

@@ -160,7 +160,7 @@ def tradeoff(
     deadline = math.inf if time_limit is None else clock_without_compilation() + time_limit
 
     on_progress(Progress("the truth"))
-    drawn = Starts(scene, spread)
+    drawn = Starts(scene, spread, max(base.dt, 1.0 / fps))
     max_error = None if tolerance is None else less_margin(tolerance, margin)
     truth_tolerance = _truth_tolerance(scene, metric, max_error, zoom)
     context = context_of(scene, base, truth_tolerance, zoom, truth)
