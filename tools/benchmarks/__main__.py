@@ -96,7 +96,7 @@ def main() -> int:
         if bench.missing and (reason := bench.missing()):
             skipped.append({"name": bench.name, "reason": reason})
             if not arguments.json:
-                print(f"{bench.name:<28}left out: {reason}", flush=True)
+                print(f"{bench.name:<32}left out: {reason}", flush=True)
             continue
         row = measure(bench, arguments.repeats)
         rows.append(row)
@@ -124,10 +124,10 @@ def format_row(row: dict[str, Any]) -> str:
             f"   target {'>=' if rate else '<='} {row['target']:.3g}{', met' if row['met'] else ', MISSED'}{undecided}"
         )
     return (
-        f"{row['name']:<28}{result}{target}   (median {row['ours']:.4g} / "
+        f"{row['name']:<32}{result}{target}   (median {row['ours']:.4g} / "
         f"{row['peer']:.4g} {unit}, best {row['ours_best']:.4g} / {row['peer_best']:.4g}, "
         f"{row['repeats']} repeats, spread {row['ours_spread']:.0%} / {row['spread']:.0%})\n"
-        f"{'':<28}{row['about']}"
+        f"{'':<32}{row['about']}"
     )
 
 

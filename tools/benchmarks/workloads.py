@@ -11,6 +11,7 @@ import numpy as np
 
 import sandbox
 from sandbox.action import SetParameter
+from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.compiled_stepper import OPTIONAL_KERNELS
 from sandbox.engines.reference.engine import ReferenceEngine
@@ -96,24 +97,34 @@ def balls_on_plane(count: int, steps: int) -> Scene:
     )
 
 
-def shooting(which: Scene, shots: int = 20) -> Timed:
-    """Return a workload of a complete shot to rest with its events, through the public interface; mean seconds."""
+def single_shot(which: Scene) -> Timed:
+    """Return a workload of one complete shot to rest with the list of its events; seconds."""
     table = sandbox.Table(which)
+    return lambda: timed(lambda: table.shoot().events)
 
-    def run_all() -> None:
-        for _ in range(shots):
-            table.shoot()
 
-    return lambda: timed(run_all) / shots
+def shooting(which: Scene, shots: int = 200) -> Timed:
+    """Return a workload of complete shots to rest with their events as arrays; mean seconds."""
+    table = sandbox.Table(which)
+    return lambda: timed(lambda: repeat(table.shoot, shots)) / shots
+
+
+def batch(which: Scene, shots: int = 200) -> Timed:
+    """Return a workload of the same shot many times in one call on one thread, without events; mean seconds."""
+    table, motions = sandbox.Table(which), np.tile(motion_of_first(which), (shots, 1))
+    return lambda: timed(lambda: table.fan_of(motions, which.bodies.names[0])) / shots
 
 
 def fanning(which: Scene, shots: int, threads: int) -> Timed:
     """Return a workload of a fan of shots of increasing strength; shots per second."""
-    table = sandbox.Table(which)
-    cue = which.bodies.names.index("cue")
-    motion = (*which.bodies.velocity[cue], *which.bodies.roll[cue], which.bodies.angular_velocity[cue])
-    motions = np.multiply.outer(np.linspace(0.9, 1.1, shots), motion)
-    return lambda: shots / timed(lambda: table.fan_of(motions, threads=threads), wall_time)
+    table, motions = sandbox.Table(which), np.multiply.outer(np.linspace(0.9, 1.1, shots), motion_of_first(which))
+    return lambda: shots / timed(lambda: table.fan_of(motions, which.bodies.names[0], threads=threads), wall_time)
+
+
+def motion_of_first(which: Scene) -> FloatArray:
+    """Return the velocity and spin (5,) of the first ball, that which is struck."""
+    bodies = which.bodies
+    return np.array([*bodies.velocity[0], *bodies.roll[0], bodies.angular_velocity[0]])
 
 
 def stepping(
