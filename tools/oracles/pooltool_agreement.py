@@ -125,10 +125,8 @@ def main() -> int:
     if arguments.json:
         print(json.dumps([row._asdict() for row in rows]))
         return 0
-    count = len(rows[0].distance)
-    print(
-        f"{'pooltool, ' + str(count) + ' shots':24}{'within 1e-8 m':>16}{'within 1e-5 m':>16}{'worst, m':>12}  events equal"
-    )
+    heading = f"pooltool, {len(rows[0].distance)} shots"
+    print(f"{heading:24}{'within 1e-8 m':>16}{'within 1e-5 m':>16}{'worst, m':>12}  events equal")
     for row in rows:
         within = [sum(distance <= limit for distance in row.distance.values()) for limit in LIMITS]
         worst = max(row.distance, key=row.distance.__getitem__)
