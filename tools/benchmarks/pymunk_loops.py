@@ -133,16 +133,17 @@ class MergedAtOnce:
     def add(self, step: int, touches: Buffer) -> None:
         """Add the arbiters of a step."""
         words = np.frombuffer(touches.int_buf(), np.int64).reshape(-1, 3)
-        _, a, b, values = self.touching(words, np.frombuffer(touches.float_buf()).reshape(-1, 8))
+        _, a, b, sign, table = self.touching(words, np.frombuffer(touches.float_buf()).reshape(-1, 8))
         row = self.row_of[a, b]
         new = np.flatnonzero((row < 0) | (self.last[row] < step - 1))
         row[new] = self.rows + np.arange(len(new))
         begun = self.contacts[self.rows : self.rows + len(new)]
-        begun[:, 0], begun[:, 1], begun[:, 2], begun[:, 3:7] = step, a[new], b[new], values[new, 0:4]
+        begun[:, 0], begun[:, 1], begun[:, 2] = step, a[new], b[new]
+        _write_geometry(begun, sign[new], table[new])
         self.rows += len(new)
         self.row_of[a, b] = row
         self.last[row] = step
-        self.contacts[row, 7:9] += values[:, 4:6]
+        self.contacts[row, 7:9] -= sign * table[:, 0:2]  # pymunk's impulse is that on the first body
 
     def merged(self) -> FloatArray:
         """Return the contacts (C, 9) with the step in place of the time."""
@@ -167,40 +168,43 @@ class MergedAtEnd:
         words = np.frombuffer(b"".join(self.words), np.int64).reshape(-1, 3)
         table = np.frombuffer(b"".join(self.floats)).reshape(-1, 8)
         step = np.repeat(np.arange(len(self.words)), [len(each) // 24 for each in self.words])
-        live, a, b, values = self.touching(words, table)
+        live, a, b, sign, table = self.touching(words, table)
         pair, step = a * self.count + b, step[live]
         order = np.argsort(pair, kind="stable")
-        pair, step, values = pair[order], step[order], values[order]
+        pair, step = pair[order], step[order]
         is_first = np.ones(len(pair), bool)
         is_first[1:] = (pair[1:] != pair[:-1]) | (step[1:] != step[:-1] + 1)
         first = np.flatnonzero(is_first)
         contacts = np.zeros((len(first), 9))
         contacts[:, 0], contacts[:, 1], contacts[:, 2] = step[first], *np.divmod(pair[first], self.count)
-        contacts[:, 3:7] = values[first, 0:4]
-        if len(first):
-            contacts[:, 7:9] = np.add.reduceat(values[:, 4:6], first)
+        _write_geometry(contacts, sign[order[first]], table[order[first]])
+        if len(first):  # pymunk's impulse is that on the first body
+            contacts[:, 7:9] = -np.add.reduceat((sign * table[:, 0:2])[order], first)
         return contacts[np.argsort(step[first], kind="stable")]
 
 
 class _Touching:
-    """Conversion of pymunk's arbiters into pairs of indices, the smaller first, with normal, point and impulse."""
+    """Conversion of pymunk's arbiters into pairs of indices, the smaller first."""
 
     def __init__(self, bodies: list[pymunk.Body]) -> None:
         ids = np.array([body.id for body in bodies])
         self.order = np.argsort(ids)
         self.ids = ids[self.order]
 
-    def __call__(self, words: IntArray, table: FloatArray) -> tuple[np.ndarray, IntArray, IntArray, FloatArray]:
-        """Return which of the arbiters touch, and of these both indices and the values (K, 6)."""
+    def __call__(
+        self, words: IntArray, table: FloatArray
+    ) -> tuple[np.ndarray, IntArray, IntArray, FloatArray, FloatArray]:
+        """Return which of the arbiters touch; of these both indices, −1 (K, 1) if they were swapped, and the table."""
         live = words[:, 2] > 0
-        words, table = words[live], table[live]
+        words = words[live]
         a, b = self.order[np.searchsorted(self.ids, words[:, 0])], self.order[np.searchsorted(self.ids, words[:, 1])]
-        sign = np.where(a < b, 1.0, -1.0)[:, None]
-        values = np.empty((len(words), 6))
-        values[:, 0:2] = sign * table[:, 2:4]
-        values[:, 2:4] = (table[:, 4:6] + table[:, 6:8]) / 2
-        values[:, 4:6] = -sign * table[:, 0:2]  # pymunk's impulse is that on the first body
-        return live, np.minimum(a, b), np.maximum(a, b), values
+        return live, np.minimum(a, b), np.maximum(a, b), np.where(a < b, 1.0, -1.0)[:, None], table[live]
+
+
+def _write_geometry(contacts: FloatArray, sign: FloatArray, table: FloatArray) -> None:
+    """Write normal and point into rows of contacts."""
+    contacts[:, 3:5] = sign * table[:, 2:4]
+    contacts[:, 5:7] = (table[:, 4:6] + table[:, 6:8]) / 2
 
 
 def looping(loop: Loop, scene: Scene, runs: int = 1) -> Callable[[], float]:
