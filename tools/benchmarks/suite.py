@@ -35,6 +35,9 @@ BALL = balls_on_plane(1, 1000)
 SMALL = ((1, 1000), (10, 1000), (100, 500), (1000, 100))
 """Balls on a plane: number and steps."""
 
+RUNS = {1: 5, 10: 5, 100: 1, 1000: 1}
+"""Number of runs that a repeat times, one after the other: runs of some milliseconds are made many at a time."""
+
 SMALL_TARGETS = {
     (10, states_and_contacts): (1.2, 0.2, 0.7),
     (1, attributes): (1.0, 0.5, 0.5),
@@ -120,8 +123,10 @@ BENCHES = (
             f"balls-{count}-{engine}{suffix}",
             f"sandbox.run, audited, of {count:,} ball{'s' * (count > 1)} on a plane, {steps:,} steps, on {engine} / a "
             f"pymunk loop, {kept}",
-            lambda count=count, steps=steps, engine=engine: running(balls_on_plane(count, steps), engine=engine),
-            lambda count=count, steps=steps, loop=loop: looping(loop, balls_on_plane(count, steps)),
+            lambda count=count, steps=steps, engine=engine: running(
+                balls_on_plane(count, steps), engine=engine, runs=RUNS[count]
+            ),
+            lambda count=count, steps=steps, loop=loop: looping(loop, balls_on_plane(count, steps), RUNS[count]),
             target,
             same=BALLS_AGREE[count],
         )

@@ -50,9 +50,9 @@ def scene(name: str, *overrides: str) -> Scene:
     return load(find(name), overrides)
 
 
-def running(which: Scene, audit: bool = True, engine: str = "pymunk") -> Timed:
-    """Return a workload of a complete recorded run; seconds."""
-    return lambda: timed(lambda: run(which, engine, audit=audit))
+def running(which: Scene, audit: bool = True, engine: str = "pymunk", runs: int = 1) -> Timed:
+    """Return a workload of complete recorded runs, one after the other; mean seconds of a run."""
+    return lambda: timed(lambda: repeat(lambda: run(which, engine, audit=audit), runs)) / runs
 
 
 def for_one_step(which: Scene) -> Scene:
