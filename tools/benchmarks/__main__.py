@@ -3,8 +3,9 @@
     python tools/bench.py [NAME…] [--json] [--repeats N]
 
 Each row first checks that both sides compute the same, if they should. After a warm-up the sides take turns, so that
-a noisy machine affects both; the ratio is that of the medians. The rows are in suite.py and games.py. Times are
-in seconds unless the unit says otherwise.
+a noisy machine affects both; the ratio is that of the medians, with a 95 % interval by paired bootstrap. The rows are
+in suite.py and games.py. Times are in seconds unless the unit says otherwise: processor time where one thread works,
+wall time where threads or processes do.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from sandbox.provenance import machine, versions
-from tools.benchmarks.row import Bench
+from tools.benchmarks.row import Bench, ratio
 from tools.benchmarks.suite import BENCHES
 from tools.benchmarks.workloads import Timed
 
@@ -41,17 +42,21 @@ def measure(bench: Bench, repeats: int) -> dict[str, Any]:
         for work, values in turns if k % 2 == 0 else reversed(turns):
             values.append(_without_collection(work))
     our_median, peer_median = statistics.median(our_values), statistics.median(peer_values)
-    compared = our_median - peer_median if bench.above else our_median / peer_median
-    met = None if bench.target is None else our_median >= bench.target if bench.rate else compared <= bench.target
+    result = bench.result(our_values, peer_values)
+    compared = ratio(our_values, peer_values)
+    met = None if bench.target is None else result.value >= bench.target if bench.rate else result.value <= bench.target
     return {
         "name": bench.name,
         "about": bench.about,
-        "ours": our_median - peer_median if bench.above else our_median,
+        "ours": result.value if bench.above else our_median,
         "peer": peer_median,
         "unit": f"{bench.unit} above" if bench.above else bench.unit,
-        "ratio": (our_median - peer_median) / peer_median if bench.above else our_median / peer_median,
+        "ratio": compared.value - bench.above,
+        "ratio_interval": [compared.low - bench.above, compared.high - bench.above],
+        "interval": [result.low, result.high],
         "target": bench.target,
         "met": met,
+        "spans_target": None if bench.target is None else result.spans(bench.target),
         "repeats": repeats,
         "ours_best": min(our_values) - min(peer_values) if bench.above else best(our_values),
         "peer_best": best(peer_values),
@@ -91,7 +96,7 @@ def main() -> int:
         if bench.missing and (reason := bench.missing()):
             skipped.append({"name": bench.name, "reason": reason})
             if not arguments.json:
-                print(f"{bench.name:<24} left out: {reason}", flush=True)
+                print(f"{bench.name:<32}left out: {reason}", flush=True)
             continue
         row = measure(bench, arguments.repeats)
         rows.append(row)
@@ -106,19 +111,29 @@ def main() -> int:
 
 def format_row(row: dict[str, Any]) -> str:
     """Return a row as two lines of text."""
-    verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
-    rate = str(row["unit"]).endswith("/s")
-    target = "" if row["target"] is None else f"   target {'>=' if rate else '<='} {row['target']:.3g}{verdict}"
-    result = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3g} ×"
+    unit, rate = str(row["unit"]).split()[0], str(row["unit"]).endswith("/s")
+    result = f"{row['ratio']:.3g} × ({_interval(row['ratio_interval'])})"
     if rate:
-        result = f"{row['ours']:.3g} /s"
-    unit = str(row["unit"]).split()[0]
+        result = f"{row['ours']:.3g} {unit} ({_interval(row['interval'])}), {result} the peer"
+    elif row["unit"] != unit:
+        result = f"{row['ours']:.3f} {unit} above ({_interval(row['interval'])})"
+    target = ""
+    if row["target"] is not None:
+        undecided = ", but the interval spans it" if row["spans_target"] else ""
+        target = (
+            f"   target {'>=' if rate else '<='} {row['target']:.3g}{', met' if row['met'] else ', MISSED'}{undecided}"
+        )
     return (
-        f"{row['name']:<24}{result:>14}{target}   (median {row['ours']:.4g} / {row['peer']:.4g} {unit}, "
-        f"best {row['ours_best']:.4g} / {row['peer_best']:.4g}, {row['repeats']} repeats, "
-        f"spread {row['ours_spread']:.0%} / {row['spread']:.0%})\n"
-        f"{'':<24}{row['about']}"
+        f"{row['name']:<32}{result}{target}   (median {row['ours']:.4g} / "
+        f"{row['peer']:.4g} {unit}, best {row['ours_best']:.4g} / {row['peer_best']:.4g}, "
+        f"{row['repeats']} repeats, spread {row['ours_spread']:.0%} / {row['spread']:.0%})\n"
+        f"{'':<32}{row['about']}"
     )
+
+
+def _interval(ends: list[float]) -> str:
+    """Return an interval as text."""
+    return "{:.3g} to {:.3g}".format(*ends)
 
 
 if __name__ == "__main__":

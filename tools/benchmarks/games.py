@@ -1,36 +1,64 @@
 """Rows of games: billiard shots against pooltool, pinball, changes of parameters, and shots on threads."""
 
+from functools import partial
+
 from sandbox.scene.files.load import load
 from tools.benchmarks import agreement, drawing, pooltool_shots
 from tools.benchmarks.row import Bench
-from tools.benchmarks.workloads import fanning, playing, running, scene, setting, shooting, simulated, stepping
+from tools.benchmarks.workloads import (
+    batch,
+    fanning,
+    playing,
+    running,
+    scene,
+    setting,
+    shooting,
+    simulated,
+    single_shot,
+    stepping,
+)
+
+CORRECTED = "pooltool with four corrections, and so with the same events"
+TABLES = {name: load(pooltool_shots.path(name)) for name in pooltool_shots.NAMES}
 
 GAMES = (
     *(
         Bench(
-            f"shot-{name.replace('_', '-')}",
-            "a full shot to rest, events kept, exact engine / the same shot by pooltool as it is installed",
-            lambda name=name: shooting(load(pooltool_shots.path(name))),
-            lambda name=name: pooltool_shots.peer(name),
-            1.0 / (300.0 if name == "three_cushions" else 1000.0),
+            f"shot-{name.replace('_', '-')}{suffix}",
+            f"{about}, on exact / {CORRECTED}, one shot",
+            lambda name=name, workload=workload: workload(TABLES[name]),
+            lambda name=name: pooltool_shots.peer(name, corrected=True),
+            target,
             missing=pooltool_shots.missing,
+            same=partial(agreement.shot, name),
         )
-        for name in pooltool_shots.NAMES
+        for name in pooltool_shots.COMPARED
+        for suffix, about, workload, target in (
+            ("", "one shot to rest, with the list of its events", single_shot, None),
+            (
+                "-arrays",
+                "a shot of 200 to rest, one after the other, events as arrays",
+                shooting,
+                1.0 / (300.0 if name == "three_cushions" else 1000.0),
+            ),
+            ("-batch", "a shot of 200 in one call, final positions without events", batch, None),
+        )
     ),
     Bench(
         "run-break",
-        "sandbox.run of the 9-ball break, 2,001 frames, exact engine / pooltool's search for its events, no frames",
-        lambda: running(load(pooltool_shots.path("nine_ball_break")), engine="exact"),
-        lambda: pooltool_shots.peer("nine_ball_break"),
+        f"sandbox.run of the 9-ball break, 2,001 frames, on exact / {CORRECTED}, without frames",
+        lambda: running(TABLES["nine_ball_break"], engine="exact"),
+        lambda: pooltool_shots.peer("nine_ball_break", corrected=True),
         1.0 / 20.0,
         missing=pooltool_shots.missing,
+        same=partial(agreement.shot, "nine_ball_break"),
     ),
     *(
         Bench(
-            f"shot-{name.replace('_', '-')}-corrected",
-            "the same / by pooltool with touching balls and degenerate quartics corrected",
-            lambda name=name: shooting(load(pooltool_shots.path(name))),
-            lambda name=name: pooltool_shots.peer(name, corrected=True),
+            f"shot-{name.replace('_', '-')}-installed",
+            "one shot to rest, with the list of its events, on exact / the shot by pooltool as it is installed",
+            lambda name=name: single_shot(TABLES[name]),
+            lambda name=name: pooltool_shots.peer(name),
             missing=pooltool_shots.missing,
         )
         for name in pooltool_shots.NAMES
@@ -72,10 +100,10 @@ GAMES = (
     Bench(
         "shots-threads",
         "9-ball breaks a second, in a fan on two threads / on one",
-        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 2),
-        lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 1),
+        lambda: fanning(TABLES["nine_ball_break"], 2000, 2),
+        lambda: fanning(TABLES["nine_ball_break"], 2000, 1),
         unit="shots/s",
         rate=True,
-        same=lambda: agreement.threads(load(pooltool_shots.path("nine_ball_break"))),
+        same=lambda: agreement.threads(TABLES["nine_ball_break"]),
     ),
 )

@@ -4,8 +4,8 @@
 
 The scenes in tools/benchmarks/shots have the tables, cushions, jaws, pockets, models and balls of pooltool, so that
 another engine can simulate the same shot. Pooltool runs in a child process with its own home folder, under the Python
-that `POOLTOOL_PYTHON` names, or this one. Its handling of touching balls and degenerate quartics is unchanged unless
-`corrected`; the law of friction between balls is always ours.
+that `POOLTOOL_PYTHON` names, or this one, as it is installed, or `corrected` in the four ways of
+`tools.oracles.pooltool_world`.
 """
 
 import argparse
@@ -19,28 +19,45 @@ import statistics
 import subprocess
 import sys
 import tempfile
-import time
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tools.benchmarks.clock import cpu_time
+
 SHOTS = Path(__file__).resolve().parent / "shots"
 NAMES = ("nine_ball_break", "eight_ball_break", "snooker_break", "three_cushions")
-SPACER = 1e-9
-"""m, by which bodies are separated after a collision if pooltool is corrected."""
+COMPARED = ("nine_ball_break", "eight_ball_break", "three_cushions")
+"""Shots of which corrected pooltool has the same events, in the same order, as the engine `exact`."""
 
 
 class Played(NamedTuple):
     """Result of a simulated shot."""
 
     seconds: float
-    events: int
-    """number of collisions and transitions"""
-    ball_collisions: int
-    """number of events that are collisions of two balls"""
     rest: float
     """time at which all balls are at rest, s"""
+    events: list[list[Any]]
+    """kind and names of the balls and cushions of each event, in the words of `ShotEvent`"""
+
+    @property
+    def ball_collisions(self) -> int:
+        """Return the number of events that are collisions of two balls."""
+        return sum(kind == "ball" for kind, _ in self.events)
+
+
+KINDS = {
+    "ball_ball": "ball",
+    "ball_linear_cushion": "cushion",
+    "ball_circular_cushion": "jaw",
+    "ball_pocket": "pocket",
+    "sliding_rolling": "rolls",
+    "rolling_spinning": "spins",
+    "rolling_stationary": "rests",
+    "spinning_stationary": "rests",
+}
+"""pooltool's kinds of events, and those of `ShotEvent`."""
 
 
 class MissingError(RuntimeError):
@@ -131,17 +148,21 @@ def serve(corrected: bool) -> None:
 
     from tools.oracles import pooltool_world as world
 
-    if corrected:
-        world.correct(SPACER)
+    corrections = tuple(world.CORRECTIONS) if corrected else ()
+    world.correct(corrections)
     for line in sys.stdin:
         document = tomllib.loads(Path(line.strip()).read_text())
-        system, engine = world.system(document), world.engine(document)
-        start_time = time.perf_counter()
+        system, engine = world.system(document), world.engine(document, corrections)
+        start_time = cpu_time()
         pt.simulate(system, engine=engine, inplace=True)
-        seconds = time.perf_counter() - start_time
-        kinds = [str(event.event_type) for event in system.events]
-        events = len(kinds) - kinds.count("none")
-        answers.write(json.dumps([seconds, events, kinds.count("ball_ball"), float(system.t)]) + "\n")
+        seconds = cpu_time() - start_time
+        order = list(system.balls)
+        events = [
+            (KINDS[kind], sorted(event.ids, key=order.index) if kind == "ball_ball" else list(event.ids))
+            for event in system.events
+            if (kind := str(event.event_type)) != "none"
+        ]
+        answers.write(json.dumps([seconds, float(system.t), events]) + "\n")
         answers.flush()
 
 
@@ -156,7 +177,7 @@ def measured(name: str, repeats: int, corrected: bool) -> dict[str, Any]:
         "best": min(times),
         "unit": "s",
         "repeats": repeats,
-        "events": first.events,
+        "events": len(first.events),
         "ball_ball": first.ball_collisions,
         "rest": first.rest,
     }

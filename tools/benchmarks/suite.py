@@ -1,8 +1,11 @@
 """The rows of the benchmarks: engines, pictures and commands, followed by those of games."""
 
-from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers, sweeps
+from functools import partial
+
+from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers, pyramid, sweeps
 from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
+from tools.benchmarks.pymunk_loops import attributes, looped, looping, states, states_and_contacts
 from tools.benchmarks.row import Bench
 from tools.benchmarks.turning import edits, turns
 from tools.benchmarks.workloads import (
@@ -10,6 +13,7 @@ from tools.benchmarks.workloads import (
     command,
     events,
     flying,
+    for_one_step,
     rolling,
     running,
     scene,
@@ -23,28 +27,49 @@ SPARKS = ("world.duration=1.0", "solver.record_every=1")
 PILE = scene("benchmark/pile")
 TOWER = scene("benchmark/tower")
 SETTLED = scene("benchmark/pile", "world.duration=1.0")
-PYRAMID = scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.substeps=4")
 BOUNCE = scene("tutorial/bounce")
 LOW = scene("tutorial/bounce", "ball.ball.position=[0, 0.55]", "world.duration=0.25")
 
 BALL = balls_on_plane(1, 1000)
 
-SMALL = (
-    (1, 1000, 1.0, 0.5, 0.5),
-    (10, 1000, 0.3, 0.15, 0.15),
-    (100, 500, 0.2, 0.4, 0.05),
-    (1000, 100, 0.45, 0.1, 0.1),
+SMALL = ((1, 1000), (10, 1000), (100, 500), (1000, 100))
+"""Balls on a plane: number and steps."""
+
+RUNS = {1: 5, 10: 5, 100: 1, 1000: 1}
+"""Number of runs that a repeat times, one after the other: runs of some milliseconds are made many at a time."""
+
+SMALL_TARGETS = {
+    (10, states_and_contacts): (1.2, 0.2, 0.7),
+    (1, attributes): (1.0, 0.5, 0.5),
+    (10, attributes): (0.3, 0.15, 0.15),
+    (100, attributes): (0.2, 0.4, 0.05),
+    (1000, attributes): (0.45, 0.1, 0.1),
+}
+"""Target ratios of pymunk, exact and reference to a loop, by number of balls."""
+
+PILE_AGREES = partial(agreement.pile, PILE)
+BALLS_AGREE = {count: partial(agreement.balls, balls_on_plane(count, steps)) for count, steps in SMALL}
+"""Checks that rows share."""
+
+LOOPS = (
+    ("", states_and_contacts, "states and contacts"),
+    ("-states", states, "states"),
+    ("-attributes", attributes, "attributes"),
 )
-"""Balls on a plane: number, steps, and target ratios of pymunk, exact and reference."""
+"""Hand-written pymunk loops: suffix of the row, loop, name."""
 
 BENCHES = (
-    Bench(
-        "pile",
-        "sandbox.run on the 1,000-ball pile, not audited / a hand-written pymunk loop that records the same arrays",
-        lambda: running(PILE, audit=False),
-        lambda: peers.pile_loop(PILE),
-        1.05,
-        same=lambda: agreement.pile(PILE),
+    *(
+        Bench(
+            f"pile{suffix}{'-audited' * audit}",
+            f"sandbox.run on the 1,000-ball pile, {'' if audit else 'not '}audited / a pymunk loop, {kept}",
+            lambda audit=audit: running(PILE, audit=audit),
+            lambda loop=loop: looping(loop, PILE),
+            1.05 if loop is states_and_contacts and not audit else None,
+            same=PILE_AGREES,
+        )
+        for suffix, loop, kept in LOOPS
+        for audit in (False, True)
     ),
     Bench(
         "audit",
@@ -55,9 +80,9 @@ BENCHES = (
     ),
     Bench(
         "pile-reference",
-        "sandbox.run on the 1,000-ball pile on the reference, audited / the hand-written pymunk loop",
+        "sandbox.run on the 1,000-ball pile on the reference, audited / a pymunk loop, states and contacts",
         lambda: running(PILE, engine="reference"),
-        lambda: peers.pile_loop(PILE),
+        lambda: looping(states_and_contacts, PILE),
         0.6,
     ),
     Bench(
@@ -77,36 +102,47 @@ BENCHES = (
         missing=box2d_peer.missing,
         same=lambda: agreement.pile_on_box2d(balls_on_plane(1, 100)),
     ),
-    Bench(
-        "pyramid-box2d",
-        "5 s of a pyramid of 55 boxes on box2d / on pymunk with 10 iterations; both with 4 substeps, stepped and read",
-        lambda: stepping(PYRAMID, 300, contacts=False, engine="box2d"),
-        lambda: stepping(
-            scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.iterations=10"), 300, contacts=False
-        ),
-        missing=box2d_peer.missing,
-        same=lambda: agreement.pyramid_stands(PYRAMID, 300),
+    *(
+        Bench(
+            f"pyramid-box2d{suffix}",
+            f"5 s of a pyramid of 55 boxes on box2d, {pyramid.SUBSTEPS} substeps / a pymunk loop, states, "
+            f"{substeps} substep{'s' * (substeps > 1)} × {iterations} iterations{about}",
+            lambda: pyramid.timing(pyramid.SUBSTEPS),
+            lambda substeps=substeps, iterations=iterations: pyramid.timing(substeps, iterations),
+            missing=box2d_peer.missing,
+            same=lambda substeps=substeps, iterations=iterations: pyramid.same(substeps, iterations),
+        )
+        for suffix, (substeps, iterations), about in (
+            ("", pyramid.EQUAL, ", the cheapest that moves no further"),
+            ("-1x10", (1, 10), ""),
+            ("-4x10", (4, 10), ""),
+        )
     ),
     *(
         Bench(
-            f"balls-{count}-{engine}",
+            f"balls-{count}-{engine}{suffix}",
             f"sandbox.run, audited, of {count:,} ball{'s' * (count > 1)} on a plane, {steps:,} steps, on {engine} / a "
-            "pymunk loop that keeps its bodies' attributes",
-            lambda count=count, steps=steps, engine=engine: running(balls_on_plane(count, steps), engine=engine),
-            lambda count=count, steps=steps: peers.attribute_loop(balls_on_plane(count, steps)),
+            f"pymunk loop, {kept}",
+            lambda count=count, steps=steps, engine=engine: running(
+                balls_on_plane(count, steps), engine=engine, runs=RUNS[count]
+            ),
+            lambda count=count, steps=steps, loop=loop: looping(loop, balls_on_plane(count, steps), RUNS[count]),
             target,
-            same=lambda count=count, steps=steps: agreement.balls(balls_on_plane(count, steps)),
+            same=BALLS_AGREE[count],
         )
-        for count, steps, *targets in SMALL
-        for engine, target in zip(("pymunk", "exact", "reference"), targets, strict=True)
+        for count, steps in SMALL
+        for suffix, loop, kept in LOOPS
+        for engine, target in zip(
+            ("pymunk", "exact", "reference"), SMALL_TARGETS.get((count, loop), (None, None, None)), strict=True
+        )
     ),
     *(
         Bench(
             f"ensemble-{engine}",
             f"runs a second of ten balls on a plane for 1,000 steps, in an ensemble on {engine}, one thread / runs of "
-            "the pymunk loop",
+            "a pymunk loop, states",
             lambda engine=engine: varying(balls_on_plane(10, 1000), engine),
-            lambda: peers.looped(balls_on_plane(10, 1000)),
+            lambda: looped(states, balls_on_plane(10, 1000)),
             target,
             "runs/s",
             rate=True,
@@ -130,9 +166,9 @@ BENCHES = (
     *(
         Bench(
             f"run-start-{engine}",
-            f"runs a second of one ball for one step, on {engine} / runs of the pymunk loop",
+            f"runs a second of one ball for one step, on {engine} / runs of a pymunk loop, states and contacts",
             lambda engine=engine: starting(BALL, engine),
-            lambda: peers.started_loops(BALL),
+            lambda: looped(states_and_contacts, for_one_step(BALL), 50),
             1000.0,
             "runs/s",
             rate=True,

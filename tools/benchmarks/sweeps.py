@@ -8,7 +8,6 @@ does not count.
 
 import multiprocessing
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -29,7 +28,9 @@ from sandbox.measure.shots import odds
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, load
 from sandbox.scene.files.shipped_scenes import find
-from tools.benchmarks import agreement, peers
+from tools.benchmarks import agreement
+from tools.benchmarks.clock import wall_time
+from tools.benchmarks.pymunk_loops import states_and_contacts
 from tools.benchmarks.workloads import Timed, balls_on_plane, timed
 
 WORKERS = 2
@@ -65,7 +66,7 @@ def sweeping(milliseconds: int, runs: int) -> Timed:
         times: list[float] = []
         with _planned(scene, runs) as (plan, folder), Store(folder) as store:
             executor = ProcessExecutor(WORKERS)
-            Driver(plan, runs, executor, SUMMARY, store, lambda *_: times.append(time.perf_counter())).run()
+            Driver(plan, runs, executor, SUMMARY, store, lambda *_: times.append(wall_time())).run()
         return _latest(times)
 
     return work
@@ -79,7 +80,7 @@ def pooled(milliseconds: int, runs: int, work_on: Callable[[Scene], object]) -> 
         times: list[float] = []
         with multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
             ends = pool.imap_unordered(work_on, scenes, chunksize=max(50 // milliseconds, 1))
-            times.extend(time.perf_counter() for _ in ends)
+            times.extend(wall_time() for _ in ends)
         return _latest(times)
 
     return work
@@ -87,7 +88,7 @@ def pooled(milliseconds: int, runs: int, work_on: Callable[[Scene], object]) -> 
 
 def loop_ends(scene: Scene) -> FloatArray:
     """Run balls with a hand-written pymunk loop that records frames and contacts; return the last frame, (N, 6)."""
-    return np.asarray(peers.pile_arrays(scene)[0][-1])
+    return np.asarray(states_and_contacts(scene)[0][-1])
 
 
 def run_ends(scene: Scene) -> FloatArray:
@@ -111,7 +112,7 @@ def ensemble_run(engine: str, runs: int) -> Timed:
         found = ensemble(scene, runs, vary={"ball.*.velocity": 0.01}, engine=engine, threads=WORKERS)
         assert found.compiled.all()
 
-    return lambda: timed(compute) / runs
+    return lambda: timed(compute, wall_time) / runs
 
 
 def seed_sweep(engine: str, runs: int, *, keeps_ends: bool) -> Timed:
@@ -125,7 +126,7 @@ def seed_sweep(engine: str, runs: int, *, keeps_ends: bool) -> Timed:
         times: list[float] = []
         with _planned(scene, runs, engine, keeps_ends) as (plan, folder), Store(folder) as store:
             executor = ProcessExecutor(WORKERS)
-            Driver(plan, runs, executor, options, store, lambda *_: times.append(time.perf_counter())).run()
+            Driver(plan, runs, executor, options, store, lambda *_: times.append(wall_time())).run()
         return _latest(times) / (runs * MEASURED)
 
     return work
@@ -138,7 +139,7 @@ def pooled_runs(scene: Scene, engine: str, runs: int) -> Timed:
         times: list[float] = []
         with multiprocessing.get_context("spawn").Pool(WORKERS) as pool:
             ends = pool.imap_unordered(partial(end_on, engine), [scene] * runs, chunksize=5)
-            times.extend(time.perf_counter() for _ in ends)
+            times.extend(wall_time() for _ in ends)
         return _latest(times) / (runs * MEASURED)
 
     return work
@@ -154,7 +155,7 @@ def end_on(engine: str, scene: Scene) -> FloatArray:
 def shot_run(shots: int) -> Timed:
     """Return a workload of billiard shots with errors of the stroke, on `WORKERS` threads; seconds a shot."""
     scene = load(find("9-ball"))
-    return lambda: timed(lambda: odds(scene, count=shots, threads=WORKERS)) / shots
+    return lambda: timed(lambda: odds(scene, count=shots, threads=WORKERS), wall_time) / shots
 
 
 def same_members(engine: str) -> None:
@@ -170,9 +171,7 @@ def storing(milliseconds: int, runs: int) -> Timed:
     def work() -> float:
         times: list[float] = []
         with _planned(scene, runs) as (plan, folder), Store(folder) as store:
-            driver = Driver(
-                plan, runs, InProcessExecutor(), SUMMARY, store, lambda *_: times.append(time.perf_counter())
-            )
+            driver = Driver(plan, runs, InProcessExecutor(), SUMMARY, store, lambda *_: times.append(wall_time()))
             driver.run()
         return _latest(times)
 
@@ -187,7 +186,7 @@ def not_storing(milliseconds: int, runs: int) -> Timed:
         times: list[float] = []
         for job in jobs:
             run_job(job, SUMMARY)
-            times.append(time.perf_counter())
+            times.append(wall_time())
         return _latest(times)
 
     return work

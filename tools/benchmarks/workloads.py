@@ -4,7 +4,6 @@ import math
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 
 import sandbox
 from sandbox.action import SetParameter
+from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.compiled_stepper import OPTIONAL_KERNELS
 from sandbox.engines.reference.engine import ReferenceEngine
@@ -23,6 +23,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from tools.benchmarks import peers
+from tools.benchmarks.clock import cpu_time, wall_time
 
 for _kernel in OPTIONAL_KERNELS:
     _kernel.spent = math.inf  # compiled at once and not after a while: what is measured is the state of later sessions
@@ -37,11 +38,11 @@ def repeat(work: Callable[[], object], times: int) -> None:
         work()
 
 
-def timed(work: Callable[[], object]) -> float:
-    """Return the seconds that a call takes."""
-    start_time = time.perf_counter()
+def timed(work: Callable[[], object], clock: Callable[[], float] = cpu_time) -> float:
+    """Return the seconds that a call takes, by a clock."""
+    start_time = clock()
     work()
-    return time.perf_counter() - start_time
+    return clock() - start_time
 
 
 def scene(name: str, *overrides: str) -> Scene:
@@ -49,14 +50,19 @@ def scene(name: str, *overrides: str) -> Scene:
     return load(find(name), overrides)
 
 
-def running(which: Scene, audit: bool = True, engine: str = "pymunk") -> Timed:
-    """Return a workload of a complete recorded run; seconds."""
-    return lambda: timed(lambda: run(which, engine, audit=audit))
+def running(which: Scene, audit: bool = True, engine: str = "pymunk", runs: int = 1) -> Timed:
+    """Return a workload of complete recorded runs, one after the other; mean seconds of a run."""
+    return lambda: timed(lambda: repeat(lambda: run(which, engine, audit=audit), runs)) / runs
+
+
+def for_one_step(which: Scene) -> Scene:
+    """Return a scene that lasts one step."""
+    return which.model_copy(update={"world": which.world.model_copy(update={"duration": which.solver.dt})})
 
 
 def starting(which: Scene, engine: str, runs: int = 50) -> Timed:
     """Return a workload of runs of a scene for one step; runs per second."""
-    short = which.model_copy(update={"world": which.world.model_copy(update={"duration": which.solver.dt})})
+    short = for_one_step(which)
     return lambda: runs / timed(lambda: [run(short, engine) for _ in range(runs)])
 
 
@@ -91,24 +97,34 @@ def balls_on_plane(count: int, steps: int) -> Scene:
     )
 
 
-def shooting(which: Scene, shots: int = 20) -> Timed:
-    """Return a workload of a complete shot to rest with its events, through the public interface; mean seconds."""
+def single_shot(which: Scene) -> Timed:
+    """Return a workload of one complete shot to rest with the list of its events; seconds."""
     table = sandbox.Table(which)
+    return lambda: timed(lambda: table.shoot().events)
 
-    def run_all() -> None:
-        for _ in range(shots):
-            table.shoot()
 
-    return lambda: timed(run_all) / shots
+def shooting(which: Scene, shots: int = 200) -> Timed:
+    """Return a workload of complete shots to rest with their events as arrays; mean seconds."""
+    table = sandbox.Table(which)
+    return lambda: timed(lambda: repeat(table.shoot, shots)) / shots
+
+
+def batch(which: Scene, shots: int = 200) -> Timed:
+    """Return a workload of the same shot many times in one call on one thread, without events; mean seconds."""
+    table, motions = sandbox.Table(which), np.tile(motion_of_first(which), (shots, 1))
+    return lambda: timed(lambda: table.fan_of(motions, which.bodies.names[0])) / shots
 
 
 def fanning(which: Scene, shots: int, threads: int) -> Timed:
     """Return a workload of a fan of shots of increasing strength; shots per second."""
-    table = sandbox.Table(which)
-    cue = which.bodies.names.index("cue")
-    motion = (*which.bodies.velocity[cue], *which.bodies.roll[cue], which.bodies.angular_velocity[cue])
-    motions = np.multiply.outer(np.linspace(0.9, 1.1, shots), motion)
-    return lambda: shots / timed(lambda: table.fan_of(motions, threads=threads))
+    table, motions = sandbox.Table(which), np.multiply.outer(np.linspace(0.9, 1.1, shots), motion_of_first(which))
+    return lambda: shots / timed(lambda: table.fan_of(motions, which.bodies.names[0], threads=threads), wall_time)
+
+
+def motion_of_first(which: Scene) -> FloatArray:
+    """Return the velocity and spin (5,) of the first ball, that which is struck."""
+    bodies = which.bodies
+    return np.array([*bodies.velocity[0], *bodies.roll[0], bodies.angular_velocity[0]])
 
 
 def stepping(
@@ -188,9 +204,9 @@ def playing(which: Scene) -> Timed:
     """Return a workload of a game with a random player and contacts, without audit; simulated seconds per second."""
 
     def work() -> float:
-        start_time = time.perf_counter()
+        start_time = cpu_time()
         game = sandbox.play_out(which, "random", audit=False)
-        return float(game.trajectory.time[-1]) / (time.perf_counter() - start_time)
+        return float(game.trajectory.time[-1]) / (cpu_time() - start_time)
 
     return work
 
@@ -206,7 +222,7 @@ def command(*arguments: str) -> Timed:
     """Return a workload of a Python process from start to end; seconds. Byte code may be cached, as users have it."""
     line = [sys.executable, *arguments]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True, env=environment))
+    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True, env=environment), wall_time)
 
 
 def events(count: int) -> Timed:
@@ -216,10 +232,10 @@ def events(count: int) -> Timed:
         gas = peers.gas(count, 100.0)
         simulation = start(gas, "exact", gas.solver.replace(dt=160.0 / count))
         simulation.step()
-        start_time, before = time.perf_counter(), simulation.work["events"]
+        start_time, before = cpu_time(), simulation.work["events"]
         while simulation.work["events"] < before + 100_000:
             simulation.step()
-        return (simulation.work["events"] - before) / (time.perf_counter() - start_time)
+        return (simulation.work["events"] - before) / (cpu_time() - start_time)
 
     return work
 

@@ -16,6 +16,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +35,6 @@ from tools.oracles.shot_parts import Document, Shot
 CASES = Path(__file__).resolve().parents[2] / "tests" / "engines" / "exact" / "tabletop" / "cases"
 SHOTS = Path(__file__).resolve().parents[1] / "benchmarks" / "shots"
 
-SPACER = 1e-12
-"""m, by which pooltool separates bodies after a collision, so that they do not collide again at once."""
 TRUSTED = 1e-8
 """m; largest position error of trusted times."""
 SAMPLES = 20
@@ -52,14 +51,26 @@ KINDS = {
 }
 
 
-def simulated(document: Document, spacer: float, shift: float = 0.0) -> list[Event]:
-    """Return pooltool's events of a shot up to the duration of the scene, beginning with the start."""
-    world.correct(spacer)
+def simulated(
+    document: Document,
+    spacer: float = world.SPACER,
+    shift: float = 0.0,
+    corrections: Collection[str] = tuple(world.CORRECTIONS),
+) -> list[Event]:
+    """Return pooltool's events of a shot up to the duration of the scene, beginning with the start.
+
+    Args:
+        document: the scene.
+        spacer: distance that the correction "spacer" sets, m.
+        shift: distance along x by which the first ball is displaced, m.
+        corrections: keys of `pooltool_world.CORRECTIONS`; those of all calls of a process must be the same.
+    """
+    world.correct(corrections, spacer)
     system = world.system(document)
     names = list(system.balls)
     system.balls[names[0]].state.rvw[0, 0] += shift
     end = document["world"]["duration"]
-    done = pt.simulate(system, engine=world.engine(document), t_final=end)
+    done = pt.simulate(system, engine=world.engine(document, corrections), t_final=end)
     events: list[Event] = []
     states = np.array([[state.rvw for state in ball.history] for ball in done.balls.values()])
     states[:, :, 0, 2] = 0.0  # heights are only for drawing
@@ -103,7 +114,7 @@ def evaluated(document: Document) -> tuple[Document, Verdict]:
         ValueError: pooltool deviates from our formulas.
     """
     rules = Rules(document)
-    events = simulated(document, SPACER)
+    events = simulated(document)
     verdict = audit(document, events)
     if verdict.position > 1e-11 or verdict.velocity > 1e-11 or max(verdict.overlap, verdict.separation) > 1e-10:
         raise ValueError(f"{document['title']}: off our formulas: {verdict}")
@@ -113,7 +124,7 @@ def evaluated(document: Document) -> tuple[Document, Verdict]:
     states = sampled(rules, events, times)
     error = np.zeros(len(times))
     trusted = document["world"]["duration"]
-    for spacer, shift, divisor in ((10.0 * SPACER, 0.0, 9.0), (SPACER, 1e-12, 1.0)):
+    for spacer, shift, divisor in ((10.0 * world.SPACER, 0.0, 9.0), (world.SPACER, 1e-12, 1.0)):
         other = simulated(document, spacer, shift)
         deviation = np.abs(sampled(rules, other, times) - states)[:, :, 0].max(axis=(1, 2)) / divisor
         error = np.maximum(error, deviation)
@@ -130,9 +141,9 @@ def evaluated(document: Document) -> tuple[Document, Verdict]:
     stored = {
         "package": "pooltool-billiards",
         "version": pt.__version__,
-        "patches": [*world.PATCHES, f"bodies that met are parted by {SPACER:g} m instead of 1e-06 m"],
+        "patches": [*world.CORRECTIONS.values()],
         "trusted_until": trusted,
-        "position_error": float(f"{max(error[:kept], default=0.0) + SPACER:.1e}"),
+        "position_error": float(f"{max(error[:kept], default=0.0) + world.SPACER:.1e}"),
         "balls": rules.balls,
         "events": [{"time": e.time, "kind": e.kind, "names": [*e.names]} for e in events[1:] if e.time <= trusted],
         "frames": indices[:kept],

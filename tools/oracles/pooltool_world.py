@@ -1,10 +1,12 @@
 """Conversion of scenes to pooltool, so that both engines simulate the same shot, table and models.
 
 Requires `pooltool-billiards`, which writes into the home folder: set `HOME` and `NUMBA_CACHE_DIR` before the import.
-No file of that package is changed; `correct` replaces its faulty functions at run time.
+No file of that package is changed; `correct` replaces functions and a constant at run time, and `engine` the law of
+friction between balls.
 """
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numba
@@ -34,11 +36,16 @@ Document = dict[str, Any]
 NEGLIGIBLE = 1e-24
 """m²/s⁴; square of a relative acceleration of two balls that moves them by 1e-10 m in ten seconds."""
 
-PATCHES = (
-    "no relative acceleration: the quadratic is solved where the quartic's leading coefficient vanishes",
-    "friction between balls is Coulomb's, mu (1 + e)/2 v_n, instead of mu e v_n",
-    "resolve_continually_touching off",
-)
+SPACER = 1e-12
+"""m, by which a corrected pooltool separates bodies after a collision, so that they do not collide again at once."""
+
+CORRECTIONS = {
+    "quadratic": "no relative acceleration: the quadratic is solved where the quartic's leading coefficient vanishes",
+    "friction": "friction between balls is Coulomb's, mu (1 + e)/2 v_n, instead of mu e v_n",
+    "touching": "resolve_continually_touching off",
+    "spacer": f"bodies that met are parted by {SPACER:g} m instead of 1e-06 m",
+}
+"""Name of each correction, and what it changes. The first and third are of faults, the others choices of a model."""
 
 _plain_quartic = quartic.solve
 
@@ -58,11 +65,19 @@ def _roots(a: float, b: float, c: float, d: float, e: float) -> np.ndarray:
     return found
 
 
-def correct(spacer: float) -> None:
-    """Correct known faults, before the first shot of the process; `spacer` separates bodies after a collision, m."""
-    quartic.solve = _roots
-    constants.MIN_DIST = spacer
-    CoreBallBallCollision.resolve_continually_touching = lambda self, ball1, ball2: (ball1, ball2)  # noqa: ARG005
+def correct(corrections: Collection[str] = tuple(CORRECTIONS), spacer: float = SPACER) -> None:
+    """Apply corrections except for "friction", which `engine` applies, before the first shot of the process.
+
+    Args:
+        corrections: keys of `CORRECTIONS`.
+        spacer: distance that the correction "spacer" sets, m.
+    """
+    if "quadratic" in corrections:
+        quartic.solve = _roots
+    if "touching" in corrections:
+        CoreBallBallCollision.resolve_continually_touching = lambda self, ball1, ball2: (ball1, ball2)  # noqa: ARG005
+    if "spacer" in corrections:
+        constants.MIN_DIST = spacer
 
 
 class Coulomb(AlciatoreBallBallFriction):
@@ -82,11 +97,13 @@ class Frictionless(AlciatoreBallBallFriction):
         return 0.0
 
 
-def engine(document: Document, coulomb: bool = True) -> PhysicsEngine:
-    """Return pooltool's physics with the models of a scene; without `coulomb` it keeps its own law of friction."""
+def engine(document: Document, corrections: Collection[str] = tuple(CORRECTIONS)) -> PhysicsEngine:
+    """Return pooltool's physics with the models of a scene, and its own law of friction unless it is corrected."""
     models = document["contact_models"]
     if models["ball_ball"] == "frictional":
-        ball_ball = FrictionalInelastic(friction=Coulomb() if coulomb else AlciatoreBallBallFriction())
+        ball_ball = FrictionalInelastic(
+            friction=Coulomb() if "friction" in corrections else AlciatoreBallBallFriction()
+        )
     elif _restitution(document) == 1.0:
         ball_ball = FrictionlessElastic()
     else:

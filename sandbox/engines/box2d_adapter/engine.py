@@ -96,7 +96,10 @@ class Box2DEngine:
     """
 
     name: str = "box2d"
-    about: str = "Box2D v3: fixed step, substeps with soft contacts, continuous collision, 32-bit numbers"
+    about: str = (
+        "Box2D v3: fixed step, substeps with soft contacts, continuous collision, 32-bit numbers; "
+        "elastic bounces lose height"
+    )
     capabilities: frozenset[Demand] = BALLS | OWN
     knows_impulses: bool = False
     epsilon: float = 2.0**-23
