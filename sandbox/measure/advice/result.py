@@ -100,7 +100,7 @@ class ReplayedActions:
     missed_contacts: int | None
     """contacts that the engine missed"""
     over_starts: Proportion | None = None
-    """perturbed starts, with the actions up to a frame later, from which the run is ok and misses no contact; None if the
+    """perturbed starts, with the actions up to a frame later, from which it is ok and misses no contact; None if the
     effort allows too few"""
     finer_substeps: int | None = None
     """substeps of a frame in the finer run with the actions, to which this one is compared; None if there was none"""
