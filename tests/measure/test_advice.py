@@ -11,11 +11,12 @@ import sandbox
 from sandbox.action import Impulse
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.advice import Advice, advise, scoring, study
+from sandbox.measure.advice import Advice, advise, replays, scoring
 from sandbox.measure.advice.game_code import game_code
 from sandbox.measure.advice.text import fallback_head, target_text
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.metrics.trajectory_error import errors
+from sandbox.measure.starts import Starts
 from sandbox.recording import RecordedGame, Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -260,6 +261,26 @@ def test_recording_is_advised_on_without_its_actions_and_replayed_with_them() ->
     assert again.missed_contacts == 0
 
 
+@pytest.mark.fail_slow(60)  # some hundred runs
+def test_recording_is_replayed_from_perturbed_starts_with_later_actions() -> None:
+    """The bullet is pushed before it can be seen, and then passes the wall or not by the phase of the step."""
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [6.0, 0.0]")
+    push = Impulse(time=0.05, body="bullet", impulse=(14.0, 0.0))  # of 1 kg
+    recording = Recording(scene, "pymunk", scene.solver, (push,), duration=0.2)
+    advice = advise(recording, **{**QUICK, "starts": 30})
+    found = {each.setting: each.over_starts for each in advice.replays}
+    present, recommended = found["present"], found["recommended"]
+    assert present is not None
+    assert 0 < present.hits < present.trials == 30
+    assert recommended is not None
+    assert recommended.hits >= 0.95 * recommended.trials
+    drawn, actions = Starts(scene, step=1.0 / FPS), [push]
+    again = [
+        sandbox.run(drawn.start(k), "pymunk", actions=drawn.actions(actions, k)).missed_contacts for k in range(1, 31)
+    ]
+    assert again.count(0) == present.hits
+
+
 def test_setting_that_departs_sooner_from_finer_steps_with_the_actions_is_not_recommended() -> None:
     """Without its push the tower stands with any number of iterations; with it, the cheapest setting leans first."""
     text = """
@@ -340,7 +361,7 @@ def test_substeps_are_compared_to_at_least_twice_as_many(
     finest: int, count: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A recording whose runs are expensive is compared to fewer substeps."""
-    monkeypatch.setattr(study, "FINER", (finest,))
+    monkeypatch.setattr(replays, "FINER", (finest,))
     present, *tried = advice_on_a_puck().replays
     assert [each.setting for each in tried] == ["tried"] * count
     assert {each.finer_substeps for each in (present, *tried)} == {finest}
@@ -378,7 +399,7 @@ def test_distance_of_a_refined_truth_is_in_the_unit_of_length(zoom: float, unit:
 
 def test_no_setting_that_misses_contacts_with_the_actions_is_recommended(monkeypatch: pytest.MonkeyPatch) -> None:
     """The bullet becomes so fast that no number of substeps that is tried stops it."""
-    monkeypatch.setattr(study, "MAX_DOUBLINGS", 1)
+    monkeypatch.setattr(replays, "MAX_DOUBLINGS", 1)
     scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [0.5, 0.0]")
     push = Impulse(time=0.05, body="bullet", impulse=(9e3, 0.0))  # of 1 kg
     advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2), **QUICK)

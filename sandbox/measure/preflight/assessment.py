@@ -147,7 +147,7 @@ def _merge(
             kept.append(judged)
         elif trial.has_diverged or trial.is_blind_to(each):
             kept.append(by_formula)
-        elif trial.whole or (each.kind == "tunnelling" and not trial.may_pass(each)):
+        elif trial.whole or (each.kind in NAMING_KINDS and not trial.may_pass(each)):
             refuted.append(judged)
         else:
             kept.append(replace(by_formula, seen=occurrence))

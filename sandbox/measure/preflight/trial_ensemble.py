@@ -27,8 +27,9 @@ STARTS_EFFORT = 1.0
 PREPARATION, PREPARATION_OF_BODY = 4e-3, 3e-5
 """s, counted for the preparation of a run from a start, and for each body of it."""
 
-MAX_SPEED_UP = 2.0
-"""Factor by which impacts may make bodies faster in the rest of a scene than in its first part."""
+MAX_SPEED_UP, MAX_SPEED_UP_PAST_PEAK = 2.0, 1.2
+"""Factors by which bodies may become faster in the rest of a scene than in its first part, while speeds grow and after
+they have stopped to do so."""
 
 NAMING_KINDS = frozenset({"tunnelling", "depth"})
 """Kinds for which a trial run names each body at risk with its own speed, and the formulas only bounds."""
@@ -50,8 +51,8 @@ class TrialEnsemble:
     """s, of each run"""
     findings: tuple[tuple[Diagnostic, ...], ...]
     """problems that occurred, by start"""
-    top_speed: float
-    """largest speed of any body, m/s"""
+    top_speeds: tuple[float, float]
+    """largest speed of any body in the first and in the second half of the runs, m/s"""
     unseen: tuple[BoolArray, BoolArray]
     """bodies whose passages through other bodies, and through static objects, the audit does not see, (N,) each"""
     run_cost: float
@@ -86,12 +87,15 @@ class TrialEnsemble:
         """Return whether a body may tunnel in the rest of the scene, as far as its first part shows.
 
         Formulas overestimate speeds by far, of impacts and of bodies that never get where they would be so fast. A
-        predicted speed counts if bodies reached it to within a factor of `MAX_SPEED_UP`, or that of the durations of
-        the scene and the runs: speeds grow with time at most, under constant forces.
+        predicted speed counts if bodies reached it to within a factor: `MAX_SPEED_UP` for impacts; for others, while
+        speeds grow, that of the durations of the scene and the runs, as under constant forces, and at least
+        `MAX_SPEED_UP`; `MAX_SPEED_UP_PAST_PEAK` if no body was faster in the second half of the runs.
         """
+        before, after = self.top_speeds
         longer = 1.0 if predicted.details.get("struck") else self.scene.world.duration / self.duration
+        factor = max(MAX_SPEED_UP, longer) if after > before else MAX_SPEED_UP_PAST_PEAK
         reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
-        return max(MAX_SPEED_UP, longer) * self.top_speed * self.settings.h > reach
+        return factor * max(before, after) * self.settings.h > reach
 
     def is_blind_to(self, predicted: Diagnostic) -> bool:
         """Return whether the audit does not see all passages of the bodies that may tunnel."""
@@ -135,15 +139,15 @@ def run_trials(
     cost, drawn = cost_of(first), Starts(scene, spread, settings.dt)
     others = min(starts - 1, int(STARTS_EFFORT / (cost + preparation_of(scene))))
     others = others if others and drawn.can_vary else 0
-    findings, top_speed, unseen = [tuple(first.findings())], first.top_speed, first.unseen
+    findings, top_speeds, unseen = [tuple(first.findings())], first.top_speeds, first.unseen
     for number in range(1, others + 1):
         trial = run_trial(scene, drawn.start(number), settings, engine, duration)
         if trial is None:
             break
         findings.append(tuple(trial.findings()))
-        top_speed = max(top_speed, trial.top_speed)
+        top_speeds = max(top_speeds[0], trial.top_speeds[0]), max(top_speeds[1], trial.top_speeds[1])
         unseen = unseen[0] | trial.unseen[0], unseen[1] | trial.unseen[1]
-    return TrialEnsemble(scene, settings, engine, drawn, duration, tuple(findings), top_speed, unseen, cost)
+    return TrialEnsemble(scene, settings, engine, drawn, duration, tuple(findings), top_speeds, unseen, cost)
 
 
 def preparation_of(scene: Scene) -> float:

@@ -88,10 +88,11 @@ class TrialRun:
         return str(self.run.info["engine"])
 
     @cached_property
-    def top_speed(self) -> float:
-        """Largest speed of any body, m/s."""
-        velocity = self.run.velocity
-        return float(np.nanmax(np.hypot(velocity[..., 0], velocity[..., 1]), initial=0.0))
+    def top_speeds(self) -> tuple[float, float]:
+        """Largest speed of any body in the first and in the second half of the run, m/s."""
+        speed = np.hypot(self.run.velocity[..., 0], self.run.velocity[..., 1])
+        half = (len(speed) + 1) // 2
+        return float(np.nanmax(speed[:half], initial=0.0)), float(np.nanmax(speed[half:], initial=0.0))
 
     @cached_property
     def unseen(self) -> tuple[BoolArray, BoolArray]:
