@@ -176,8 +176,8 @@ def _over_starts(request: AdviceRequest, point: Evaluation) -> Proportion | None
 
     Counted work bounds the number of starts; None if it allows fewer than `MIN_STARTS`.
     """
-    cost = max(point.counted_seconds, MIN_RUN_COST)
-    count = min(request.starts, math.floor(STARTS_FRACTION * request.effort / cost))
+    affordable = STARTS_FRACTION * request.effort
+    count = min(request.starts, math.floor(affordable / max(point.counted_seconds, affordable / request.starts)))
     if request.starts < 2 or count < MIN_STARTS:
         return None
     drawn, hits, trials = Starts(request.scene, request.spread, request.frame), 0, 0
