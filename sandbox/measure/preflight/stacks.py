@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import IntArray
+from sandbox.formatting import format_plural
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import InitialContacts
 from sandbox.scene.compile.scene import Scene
@@ -127,7 +128,7 @@ def _is_excessive(load: float, law: Law, settings: Settings) -> bool:
 
 
 def _available_text(settings: Settings) -> str:
-    return f"{settings.iterations} iterations every {settings.h:.3g} s"
+    return f"{format_plural(settings.iterations, 'iteration')} every {settings.h:.3g} s"
 
 
 def _remedy(load: float, law: Law, settings: Settings) -> tuple[str, Details]:
