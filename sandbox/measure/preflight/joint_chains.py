@@ -25,8 +25,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.formatting import format_plural
 from sandbox.engines.common.solver_settings import BIAS
+from sandbox.formatting import format_plural
 from sandbox.measure.metrics.invariants import ANGLE_KINDS, joint_scales, starting_errors
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits, required_iterations
 from sandbox.measure.preflight.stiffness import Product, connected_groups, extreme_eigenvalues
@@ -79,7 +79,8 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         }
         shorter = f" or dt <= {floor_3_digits(dt)} s" if dt > 0.0 else ""
         remedy = f"use solver.iterations >= {iterations:,}{shorter} ({needed:.3g} a second)"
-        budget = f"with {format_plural(settings.iterations, 'iteration')} every {settings.h:.3g} s ({available:.3g} a second)"
+        count = format_plural(settings.iterations, "iteration")
+        budget = f"with {count} every {settings.h:.3g} s ({available:.3g} a second)"
         k, ratio = _most_unequal(some, inverse)
         if needed_if_equal <= available * (1.0 + ROUNDING) and ratio >= MIN_MASS_RATIO:
             first, second = bodies.names[int(some.a[k])], bodies.names[int(some.b[k])]
