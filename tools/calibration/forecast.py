@@ -74,6 +74,8 @@ WAYS = ("check", "long scene", "formulas")
 
 BINS = (0.0, 1e-9, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0 + 1e-9)
 """Bounds of the bins of stated odds; the first has those of 0."""
+MIN_DRAWN = 5
+"""A bin with fewer cases is not drawn."""
 RESAMPLES = 2_000
 """Resamples of the cases of a bin, for the interval of its frequency."""
 
@@ -300,7 +302,7 @@ def summary(cases: Sequence[Case]) -> dict[str, Any]:
 
 
 def plot(found: Mapping[str, Any], path: Path) -> None:
-    """Draw the reliability diagram of the first two ways to forecast."""
+    """Draw the reliability diagram of the first two ways to forecast, with the number of cases at each point."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
@@ -308,7 +310,7 @@ def plot(found: Mapping[str, Any], path: Path) -> None:
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
     axes.annotate("stated odds are right", (0.8, 0.72), color="0.45", fontsize=9)
     for way, colour, shift in (("check", "#2b6cb0", -0.006), ("long scene", "#c05621", 0.006)):
-        bins = found[way]["bins"]
+        bins = [each for each in found[way]["bins"] if each.cases >= MIN_DRAWN]
         x = [each.stated + shift for each in bins]
         y = [each.frequency for each in bins]
         reach = [[each.frequency - each.low for each in bins], [each.high - each.frequency for each in bins]]
@@ -319,7 +321,7 @@ def plot(found: Mapping[str, Any], path: Path) -> None:
                           ha="right" if side < 0 else "left", fontsize=8, color=colour)  # fmt: skip
     axes.set(xlabel="stated odds", ylabel="frequency in fresh starts", xlim=(-0.08, 1.08), ylim=(-0.04, 1.04))
     axes.legend(loc="upper left", frameon=False)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=80)
 
 
 def print_summary(found: Mapping[str, Any]) -> None:
