@@ -308,7 +308,7 @@ def plot(found: Mapping[str, Any], path: Path) -> None:
     figure = Figure(figsize=(5.2, 4.2), layout="constrained")
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1)
-    axes.annotate("stated odds are right", (0.8, 0.72), color="0.45", fontsize=9)
+    axes.annotate("line: stated odds are right", (0.58, 0.06), color="0.45", fontsize=9)
     for way, colour, shift in (("check", "#2b6cb0", -0.006), ("long scene", "#c05621", 0.006)):
         bins = [each for each in found[way]["bins"] if each.cases >= MIN_DRAWN]
         x = [each.stated + shift for each in bins]
