@@ -25,6 +25,8 @@ from sandbox.provenance import machine, versions
 from sandbox.scene.compile.scene import Scene
 
 ENGINES = ("pymunk", "box2d", "reference")
+FRAME = 1.0 / 60.0
+"""s, longest dt of a recommended setting, unless the scene has a longer one"""
 SCENES = (
     "bounce",
     "circle_half_plane",
@@ -65,7 +67,7 @@ class Trial:
 
 def held_in(scene: Scene, point: Evaluation, tolerance: float, runs: int) -> Proportion:
     """Return in how many fresh starts a setting is within the tolerance."""
-    starts, hits = Starts(scene), 0
+    starts, hits = Starts(scene, step=max(scene.solver.dt, FRAME)), 0
     for number in range(FIRST, FIRST + runs):
         start = starts.start(number)
         run = sandbox.run(start, point.engine, audit=False, **point.asked.model_dump())
