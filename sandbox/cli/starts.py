@@ -42,11 +42,11 @@ margin_option = click.option(
 
 
 def starts_text(found: Tradeoff) -> str:
-    """Return from which starts settings are measured, and from which the recommended ones are confirmed."""
+    """Return from which starts settings are measured, and how fresh starts differ from that of the scene."""
     others = len(found.searched_starts) - 1
     searched = "starts: that of the scene"
     if others:
         searched += f" and {format_plural(others, 'other')} where settings failed; errors are the worst of these"
     if found.starts < 2:
         return searched
-    return f"{searched}; confirmed from fresh starts with {Starts(found.scene, found.spread)}"
+    return f"{searched}; fresh starts have {Starts(found.scene, found.spread)}"

@@ -14,6 +14,7 @@ from matplotlib.ticker import LogFormatter
 
 from sandbox.columns import TRUTH
 from sandbox.formatting import format_plural
+from sandbox.measure.tradeoff.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.tradeoff.objective import pareto
 from sandbox.report.colours import colour_of
 from sandbox.report.style import FAINT, GRID, INK, add_legend, literal, shortened, write_figure
@@ -70,6 +71,11 @@ class WorkPoint:
         found = self.row.get("fresh_starts") or {}
         low, median, high = (found.get(key) for key in ("error_5", "median_error", "error_95"))
         return None if low is None or median is None or high is None else (low, median, high)
+
+    @property
+    def start_count(self) -> int:
+        """Number of fresh starts from which its errors are known."""
+        return int(((self.row.get("fresh_starts") or {}).get("held") or {}).get("trials") or 0)
 
     @property
     def is_drawable(self) -> bool:
@@ -326,7 +332,11 @@ def _draw_start_errors(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[s
         ends = [max(each, point.floor) for each in (low, high)]
         panel.plot([x, x], ends, color=colour, **WHISKER)
         panel.plot([x], [max(median, point.floor)], color=colour, **{**WHISKER, "ms": 5, "marker": "D", "mfc": "white"})
-    return [("fresh starts: 5 to 95 %, median", Line2D([], [], color=INK, **WHISKER))] if ranges else []
+    if not ranges:
+        return []
+    are_quantiles = all(point.start_count >= MIN_QUANTILE_STARTS for point, _ in ranges)
+    ends_text = "5 to 95 %" if are_quantiles else f"5 to 95 %, of fewer than {MIN_QUANTILE_STARTS} all"
+    return [(f"fresh starts: {ends_text}, median", Line2D([], [], color=INK, **WHISKER))]
 
 
 def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line2D]]:

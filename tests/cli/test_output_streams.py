@@ -182,7 +182,7 @@ def test_warnings_are_folded_between_words(tmp_path: Path) -> None:
     assert max(map(len, out)) <= 80
     begin = next(k for k, line in enumerate(out) if line.startswith("  warning: "))
     folded = " ".join(line.strip() for line in out[begin:])
-    assert "0.1 m per substep, and tunnel through it undetected: odds up to 80 %; dt <= 0.0002 s is safe " in folded
+    assert "0.1 m per substep, and tunnel through it undetected: odds up to 80 %; occurs in " in folded
 
 
 SCRIPT = """

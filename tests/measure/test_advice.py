@@ -281,6 +281,13 @@ def test_recording_is_replayed_from_perturbed_starts_with_later_actions() -> Non
     assert again.count(0) == present.hits
 
 
+def test_recording_is_replayed_from_as_few_starts_as_asked_for() -> None:
+    scene = scene_of(BULLET, "velocity = [20.0, 0.0] -> velocity = [6.0, 0.0]")
+    push = Impulse(time=0.04, body="bullet", impulse=(14.0, 0.0))  # of 1 kg
+    advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=0.2), starts=2, **QUICK)
+    assert [each.over_starts.trials for each in advice.replays if each.over_starts is not None][:1] == [2]
+
+
 def test_setting_that_departs_sooner_from_finer_steps_with_the_actions_is_not_recommended() -> None:
     """Without its push the tower stands with any number of iterations; with it, the cheapest setting leans first."""
     text = """

@@ -139,6 +139,17 @@ def test_errors_from_fresh_starts_are_a_range(document: dict[str, Any]) -> None:
     assert ranges == [[[20.0, 0.005], [20.0, 0.03]]]
 
 
+@pytest.mark.parametrize(("count", "text"), [(20, "5 to 95 %, median"), (7, "5 to 95 %, of fewer than 20 all, median")])
+def test_legend_says_whether_ranges_are_quantiles(document: dict[str, Any], count: int, text: str) -> None:
+    """Of 7 starts, the 5 and 95 % quantiles are the smallest and the largest error."""
+    errors = {"error_5": 0.005, "median_error": 0.02, "error_95": 0.03}
+    document["points"][1]["fresh_starts"] = {"held": {"trials": count}, **errors}
+    figure = draw_tradeoff(document)
+    labels = [each.get_text() for legend in figure.legends for each in legend.get_texts()]
+    labels += [each.get_text() for panel in figure.axes if (own := panel.get_legend()) for each in own.get_texts()]
+    assert f"fresh starts: {text}" in labels
+
+
 def test_order_is_a_label_between_the_finest_points(document: dict[str, Any]) -> None:
     found = {"engine": "pymunk", "order": 1.04, "points": [0, 1]}
     document["orders"] = [found, found]  # a second one at the same place is left out

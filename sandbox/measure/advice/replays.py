@@ -174,11 +174,11 @@ def _replay(
 def _over_starts(request: AdviceRequest, point: Evaluation) -> Proportion | None:
     """Return from how many perturbed starts, with the actions up to a frame later, a setting misses no contact.
 
-    Counted work bounds the number of starts; None if it allows fewer than `MIN_STARTS`.
+    Counted work bounds the number of starts; None if it allows fewer than `MIN_STARTS` and than asked for.
     """
     affordable = STARTS_FRACTION * request.effort
     count = min(request.starts, math.floor(affordable / max(point.counted_seconds, affordable / request.starts)))
-    if request.starts < 2 or count < MIN_STARTS:
+    if request.starts < 2 or count < min(MIN_STARTS, request.starts):
         return None
     drawn, hits, trials = Starts(request.scene, request.spread, request.frame), 0, 0
     for number in range(1, count + 1):

@@ -153,7 +153,10 @@ def truth_sentences(advice: Advice) -> Iterator[str]:
     if len(advice.left_at) > MAX_LEFT:
         yield f"The same holds for {len(advice.left_at) - MAX_LEFT} other bodies."
     if advice.starts_about is not None:
-        yield f"The recommended setting is also tried from starts with {advice.starts_about}."
+        if advice.confirmation is not None and advice.confirmation.held.trials:
+            yield f"The recommended setting is also tried from starts with {advice.starts_about}."
+        elif any(each.over_starts is not None for each in advice.replays):
+            yield f"Perturbed starts have {advice.starts_about}."
 
 
 def recording_sentences(advice: Advice) -> Iterator[str]:

@@ -176,7 +176,7 @@ def _tunnelling(context: PreflightContext) -> Iterator[Diagnostic]:
             ball += ", struck by others,"
         message = (
             f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {displacement:.3g} m per {interval}, and "
-            f"tunnel through it undetected: odds up to {100 * odds:.3g} %"
+            f"tunnel through it undetected: odds up to {100 * odds:.3g} %{' each' if passage.others else ''}"
         )
         details: Details = {
             "ball": passage.ball,

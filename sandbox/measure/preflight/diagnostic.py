@@ -94,11 +94,14 @@ class Diagnostic:
 
     @property
     def odds(self) -> float | None:
-        """Odds that the problem occurs: the fraction of the trial runs that show it, or an upper bound by a formula."""
+        """Odds that the problem occurs: the fraction of the trial runs that show it, or an upper bound by a formula.
+
+        The formula bounds the odds of one body; those of several count as independent.
+        """
         if self.seen is not None and self.is_observed:
             return self.seen.starts.probability
-        odds = self.details.get("odds")
-        return None if odds is None else float(odds)
+        odds, others = self.details.get("odds"), int(self.details.get("other_bodies", 0))
+        return None if odds is None else 1.0 - (1.0 - float(odds)) ** (1 + others)
 
     def _clauses(self) -> Iterator[str]:
         yield self.problem

@@ -119,11 +119,10 @@ def run(
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
     timed_audit = TimedAudit(setup, simulation) if audit else None
 
-    began, compiled = perf_counter(), COMPILE_CLOCK.seconds
+    began = _seconds_without_compilation()
     callbacks = RunCallbacks(on_progress, on_work)
     end = run_loop(scene.world.duration, simulation, stretches, actions, recorder, bout, callbacks)
-    seconds = perf_counter() - began - (timed_audit.seconds if timed_audit else 0.0)
-    seconds -= COMPILE_CLOCK.seconds - compiled
+    seconds = _seconds_without_compilation() - began - (timed_audit.seconds if timed_audit else 0.0)
     work, state_hash = dict(simulation.work), simulation.state_hash()
 
     outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
@@ -238,6 +237,11 @@ def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, 
     }
 
 
+def _seconds_without_compilation() -> float:
+    """Return the time of a clock that stops while code is compiled, s: of the engine as of the audit."""
+    return perf_counter() - COMPILE_CLOCK.seconds
+
+
 class TimedAudit:
     """Audit of a simulation that measures its own time, so that the time of a run is the engine's."""
 
@@ -256,22 +260,22 @@ class TimedAudit:
         self._removed: list[int] = []
         """indices of the bodies that were removed before the last substep"""
         self.seconds = 0.0
-        """s, time spent in the audit"""
+        """s, time spent in the audit, without compilation"""
         simulation.watch(self)
 
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Audit one substep."""
-        began = perf_counter()
+        began = _seconds_without_compilation()
         self._update(len(end))
         self._audit(time, self._without_removed(start, time), end, touching, self._shared_layers())
-        self.seconds += perf_counter() - began
+        self.seconds += _seconds_without_compilation() - began
 
     def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
         """Audit many substeps, as `Audit.observe_path`; bodies that change their layer are not passed in this way."""
-        began = perf_counter()
+        began = _seconds_without_compilation()
         self._update(path.shape[1])
         self._audit.observe_path(times, self._without_removed(path, times[0]), pairs, self._shared_layers())
-        self.seconds += perf_counter() - began
+        self.seconds += _seconds_without_compilation() - began
 
     def _update(self, bodies: int) -> None:
         """Include changes of the scene since the last substep, and bodies that were added."""

@@ -252,6 +252,28 @@ def elastic_ball() -> Scene:
     return scene_of(duration=60.0, plane=[{**FLOOR, "restitution": 1.0}], ball=[ball])
 
 
+def test_small_odds_of_many_bodies_are_a_warning() -> None:
+    """Each of 40 balls tunnels with odds of 2.5 %: one of them does in 1 − 0.975^40 = 64 % of the starts."""
+    speed, radius = 20.0, 20.0 * DT * 0.975 - 0.01  # radius plus half the thickness is 0.975 of a step
+    rows = [3.0 * k for k in range(40)]
+    balls = [
+        {"position": [-speed * (0.4 + 0.00021 * k), y], "velocity": [speed, 0.0], "radius": radius}
+        for k, y in enumerate(rows)
+    ]
+    walls = [{"points": [[0.0, y - 1.0], [0.0, y + 1.0]], "thickness": 0.02} for y in rows]
+    for count, is_warned in ((40, True), (1, False)):
+        scene = scene_of(0.0, 0.6, ball=balls[:count], wall=walls[:count])
+        found = run_preflight(scene, engine="pymunk", cover=0.4, starts=5)  # the trial runs end before the impacts
+        warned, noted = (
+            [each for each in some if each.kind == "tunnelling" and each.details["thing"] in scene.fixed_names]
+            for some in (found.warnings, found.refuted)
+        )
+        assert (len(warned), len(noted)) == ((1, 0) if is_warned else (0, 1))
+        if is_warned:
+            assert warned[0].odds == pytest.approx(1.0 - 0.975**40, abs=0.01)  # speeds and widths are rounded
+            assert "odds up to 2.5 % each" in warned[0].message
+
+
 @pytest.mark.parametrize(
     ("scene", "engine", "loses"),
     [(pendulum(), "pymunk", True), (elastic_ball(), "box2d", True), (elastic_ball(), "reference", False)],

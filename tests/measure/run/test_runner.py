@@ -6,6 +6,7 @@ import pickle
 import re
 from decimal import Decimal
 from fractions import Fraction
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sandbox.action import Action, Force, Impulse, Move, Remove, SetParameter, Spawn
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.registry import UnknownEngineError, start
+from sandbox.measure.missed_contacts.detector import Audit
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.runner import run
 from sandbox.progress import Progress
@@ -362,3 +365,22 @@ def test_run_that_is_not_ok_raises_only_if_asked(
 def test_run_that_is_ok_is_returned_by_raise_if_failed() -> None:
     done = run(flight(1.0), strict=True)
     assert done.raise_if_failed() is done
+
+
+def test_compilation_during_the_audit_is_left_out_of_the_time_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time of a run is that of the engine: what it does in a moment cannot become negative."""
+    original, compiled = Audit.__call__, []
+
+    def compiling(self: Audit, *substep: Any) -> None:
+        if not compiled:
+            COMPILE_CLOCK.begin("test")
+            sleep(0.3)  # s, more than the engine takes
+            COMPILE_CLOCK.end()
+            compiled.append(True)
+        original(self, *substep)
+
+    monkeypatch.setattr(Audit, "__call__", compiling)
+    scene = from_document({"world": {"duration": 0.1}, "ball": [{"position": [0.0, 0.0], "radius": 0.5}]})
+    done = run(scene, "pymunk")
+    assert compiled
+    assert done.info["seconds"] > 0.0
