@@ -15,7 +15,7 @@ Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 def starts_option(use: str) -> Callable[[Decorated], Decorated]:
     """Return the option `--starts`; `use` says in its help what is done from N perturbed starts."""
-    text = f"{use}; fewer where the effort allows no more; 1: only the start of the scene; default: {DEFAULT_STARTS}"
+    text = f"{use}; fewer where they take too much work; 1: only the start of the scene; default: {DEFAULT_STARTS}"
     kind = click.IntRange(1, MAX_STARTS)
     return click.option("--starts", type=kind, default=DEFAULT_STARTS, metavar="N", help=text)
 

@@ -203,6 +203,8 @@ def _over_starts_text(replayed: ReplayedActions) -> str:
         return ""
     clean = replayed.over_starts
     low, high = (100.0 * each for each in clean.interval)
+    if not clean.hits:
+        return f"; missed contacts in all of {clean.trials} perturbed starts with the actions up to a frame later"
     return (
         f"; no missed contact in {clean.hits} of {clean.trials} perturbed starts with the actions up to a frame later "
         f"(95 % interval {low:.0f} to {high:.0f} %)"
