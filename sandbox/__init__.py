@@ -119,6 +119,8 @@ if TYPE_CHECKING:
     )
     from sandbox.measure.preflight.diagnostic import (
         Diagnostic as Diagnostic,
+        Occurrence as Occurrence,
+        TriedRemedy as TriedRemedy,
     )
     from sandbox.measure.proportion import (
         Proportion as Proportion,
@@ -350,7 +352,7 @@ _NAMES = {
     "sandbox.measure.compare.ground_truth": "Truth",
     "sandbox.measure.compare.metrics": "Metric WorstError",
     "sandbox.measure.compare.result": "Comparison Row Score",
-    "sandbox.measure.preflight.diagnostic": "Diagnostic",
+    "sandbox.measure.preflight.diagnostic": "Diagnostic Occurrence TriedRemedy",
     "sandbox.measure.proportion": "Proportion",
     "sandbox.measure.run.ensemble": "Ensemble ensemble",
     "sandbox.measure.run.runner": "run",

@@ -257,9 +257,10 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
     _label_truth(panel, points)
     entries += _draw_start_errors(panel, points)
-    _label_orders(panel, document, points)
     entries += _draw_bounds(panel, document)
     _draw_failures(panel, points, document, entries)
+    panel.autoscale_view()  # labels keep clear of each other on the panel as it will be
+    _label_orders(panel, document, points)
     panel.grid(color=GRID, lw=0.6)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)

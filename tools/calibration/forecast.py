@@ -69,6 +69,9 @@ FIRST_FRESH = 1_000
 MAX_EXACT_FRESH = 3
 """Fresh starts on `exact`, whose failures take long and hardly depend on the start."""
 
+STORED = Path(__file__).resolve().parent / "forecast.json"
+"""Cases of the held-out half, which docs/results/forecast.md states"""
+
 WAYS = ("check", "long scene", "formulas")
 """Ways to forecast; the second with trial runs of half the scene"""
 
@@ -301,6 +304,20 @@ def summary(cases: Sequence[Case]) -> dict[str, Any]:
     return found
 
 
+def write_cases(cases: Iterable[Case], half: str, path: Path) -> None:
+    """Write cases, one a line, with four digits of the odds."""
+    rows = []
+    for each in cases:
+        odds = {way: None if stated is None else round(stated, 4) for way, stated in each.odds.items()}
+        rows.append(json.dumps({**asdict(each), "odds": odds}, separators=(",", ":")))
+    path.write_text(f'{{"half":"{half}","cases":[\n' + ",\n".join(rows) + "\n]}\n", encoding="utf-8")
+
+
+def read_cases(path: Path) -> list[Case]:
+    """Return the cases of a file."""
+    return [Case(**each) for each in json.loads(path.read_text(encoding="utf-8"))["cases"]]
+
+
 def plot(found: Mapping[str, Any], path: Path) -> None:
     """Draw the reliability diagram of the first two ways to forecast, with the number of cases at each point."""
     from matplotlib.figure import Figure
@@ -376,9 +393,7 @@ def main() -> int:
         if each.is_warned("check") and not each.happened:
             print(f"false alarm: {each.trouble} in {each.kind}, seed {each.seed}, on {each.engine}", file=sys.stderr)
     if arguments.json:
-        arguments.json.write_text(
-            json.dumps({"half": arguments.half, "cases": [asdict(each) for each in cases]}, indent=1)
-        )
+        write_cases(cases, arguments.half, arguments.json)
     if arguments.plot:
         plot(scores, arguments.plot)
     return 0

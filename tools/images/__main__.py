@@ -52,6 +52,7 @@ PICTURES = (
         "error against cost: a pendulum",
         plots.plot("tradeoff", "pendulum_90", "--tolerance", "0.01", "--effort", "5"),
     ),
+    Picture("reliability.png", "stated odds of check against frequencies", plots.reliability),
     Picture("bounce-plot.png", "position, velocity and energy of a ball that bounces", plots.plot("run", "bounce")),
     Picture("sweep-lines.png", "contacts over the restitution", plots.sweep("contacts", "scatter.drop.restitution")),
     Picture(

@@ -67,3 +67,10 @@ def save_narrowed(drawn: Path, path: Path, colours: int = COLOURS) -> None:
     image = Image.open(drawn).convert("RGB")
     height = round(image.height * WIDTH / image.width)
     save_png(image.resize((WIDTH, height), Image.Resampling.LANCZOS), path, colours)
+
+
+def reliability(path: Path) -> None:
+    """Draw the reliability diagram of the stored forecasts."""
+    from tools.calibration import forecast
+
+    forecast.plot(forecast.summary(forecast.read_cases(forecast.STORED)), path)

@@ -159,7 +159,7 @@ def _merge(
 def is_rare(found: Diagnostic) -> bool:
     """Return whether the odds of a problem are below `MIN_ODDS`, and the start of the file does not show it."""
     in_file = found.seen is not None and found.seen.in_file
-    return found.odds is not None and found.odds < MIN_ODDS and not in_file
+    return found.odds_of_any is not None and found.odds_of_any < MIN_ODDS and not in_file
 
 
 class _Families:

@@ -94,14 +94,18 @@ class Diagnostic:
 
     @property
     def odds(self) -> float | None:
-        """Odds that the problem occurs: the fraction of the trial runs that show it, or an upper bound by a formula.
-
-        The formula bounds the odds of one body; those of several count as independent.
-        """
+        """Odds that the problem occurs: the fraction of trial runs that show it, or a bound by a formula for one body."""
         if self.seen is not None and self.is_observed:
             return self.seen.starts.probability
-        odds, others = self.details.get("odds"), int(self.details.get("other_bodies", 0))
-        return None if odds is None else 1.0 - (1.0 - float(odds)) ** (1 + others)
+        odds = self.details.get("odds")
+        return None if odds is None else float(odds)
+
+    @property
+    def odds_of_any(self) -> float | None:
+        """Odds that the problem occurs to any of its bodies, whose odds by a formula count as independent."""
+        if self.odds is None or self.is_observed:
+            return self.odds
+        return 1.0 - (1.0 - self.odds) ** (1 + int(self.details.get("other_bodies", 0)))
 
     def _clauses(self) -> Iterator[str]:
         yield self.problem

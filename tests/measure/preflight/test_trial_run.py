@@ -270,7 +270,7 @@ def test_small_odds_of_many_bodies_are_a_warning() -> None:
         )
         assert (len(warned), len(noted)) == ((1, 0) if is_warned else (0, 1))
         if is_warned:
-            assert warned[0].odds == pytest.approx(1.0 - 0.975**40, abs=0.01)  # speeds and widths are rounded
+            assert warned[0].odds_of_any == pytest.approx(1.0 - 0.975**40, abs=0.01)  # speeds and widths are rounded
             assert "odds up to 2.5 % each" in warned[0].message
 
 
