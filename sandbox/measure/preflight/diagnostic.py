@@ -94,7 +94,7 @@ class Diagnostic:
 
     @property
     def odds(self) -> float | None:
-        """Odds that the problem occurs: the fraction of trial runs that show it, or a bound by a formula for one body."""
+        """Odds of the problem: the fraction of trial runs that show it, or a bound by a formula for one body."""
         if self.seen is not None and self.is_observed:
             return self.seen.starts.probability
         odds = self.details.get("odds")
