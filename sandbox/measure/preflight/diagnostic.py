@@ -12,6 +12,9 @@ from sandbox.scene.description.world import Settings
 ROUNDING = 1e-9
 """Relative: a limit that is exceeded by less counts as kept, because both sides are rounded."""
 
+CANDIDATES = {"substeps", "iterations", "safe_dt"}
+"""Details that name a setting as a remedy"""
+
 Detail = float | int | str
 Details = dict[str, Detail]
 
@@ -120,6 +123,8 @@ class Diagnostic:
             by_name = {each.name: [other for other in failed if other.name == each.name] for each in failed}
             texts = (f"solver.{name} = {', '.join(map(str, some))}" for name, some in by_name.items())
             yield f"still so with {' or '.join(texts)}"
+        if not last.holds and self.remedy and not CANDIDATES & self.details.keys():
+            yield self.remedy  # of another kind than the settings that were tried
         if last.holds:
             count = last.starts.trials
             setting = f"solver.{last.name} = {last}"
