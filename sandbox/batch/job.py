@@ -16,9 +16,10 @@ from sandbox.batch.observables import Observable, observed_columns
 from sandbox.batch.run_row import ReplayResult, RunRow, details_of
 from sandbox.batch.store import Store, run_id
 from sandbox.batch.stored_run import StoredRun
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import engine_named
 from sandbox.games.players import PlayerSpec
-from sandbox.measure.run.bounded_run import RunTimeoutError, clock_without_compilation
+from sandbox.measure.run.bounded_run import RunTimeoutError
 from sandbox.measure.run.runner import run, run_without_frames
 from sandbox.progress import Progress
 from sandbox.provenance import versions

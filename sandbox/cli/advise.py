@@ -28,7 +28,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, report_remarks
-from sandbox.cli.starts import RECOMMEND, margin_option, spread_option, starts_option
+from sandbox.cli.starts import margin_option, recommendation_starts_option, spread_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
@@ -182,7 +182,7 @@ class _Options(OutputOptions):
     help="pixels per metre; default: 50, or as --pixels for the recording of a game whose bodies look like pixels",
 )
 @click.option("--pixels", is_flag=True, help="the unit of length is the pixel, as --zoom 1")
-@starts_option(RECOMMEND)
+@recommendation_starts_option
 @spread_option
 @click.option(
     "--effort",

@@ -16,9 +16,9 @@ from sandbox.batch.plan import Plan, PlannedRun
 from sandbox.batch.store import Store
 from sandbox.cli.progress import duration_text
 from sandbox.cli.streams import print_json
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.formatting import format_plural
 from sandbox.jsonable import in_json, to_json
-from sandbox.measure.run.bounded_run import clock_without_compilation
 
 MAX_SAMPLES = 5
 """Runs that are made for the estimate: the first values of all axes, and the last ones of each"""

@@ -1,4 +1,4 @@
-"""Options of `tradeoff` and `advise` that make a recommendation hold elsewhere, and the line about its starts."""
+"""Options of commands that measure from perturbed starts, or recommend settings that hold there, and a line on both."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -20,8 +20,9 @@ def starts_option(use: str) -> Callable[[Decorated], Decorated]:
     return click.option("--starts", type=kind, default=DEFAULT_STARTS, metavar="N", help=text)
 
 
-RECOMMEND = "recommend a setting that is within the tolerance in 95 % of N perturbed starts, and confirm it with N more"
-"""Use of starts by trade-offs and advice"""
+recommendation_starts_option = starts_option(
+    "recommend a setting that is within the tolerance in 95 % of N perturbed starts, and confirm it with N more"
+)
 
 spread_option = click.option(
     "--spread",

@@ -33,7 +33,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import is_recording, read_scene, report_remarks
-from sandbox.cli.starts import RECOMMEND, margin_option, spread_option, starts_option, starts_text
+from sandbox.cli.starts import margin_option, recommendation_starts_option, spread_option, starts_text
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -337,7 +337,7 @@ class _Options(OutputOptions):
     metavar="N",
     help="frames per second that --budget refers to; default: 60",
 )
-@starts_option(RECOMMEND)
+@recommendation_starts_option
 @spread_option
 @click.option("--zoom", type=POSITIVE, metavar="PX", help="pixels per metre, for the metrics in pixels")
 @click.option(

@@ -65,6 +65,12 @@ class Proportion:
         """Upper end of the 95 % confidence interval."""
         return self.interval[1]
 
+    @property
+    def interval_text(self) -> str:
+        """The confidence interval in whole per cent: `(95 % interval 83 to 99 %)`."""
+        low, high = self.interval
+        return f"(95 % interval {100.0 * low:.0f} to {100.0 * high:.0f} %)"
+
     def __str__(self) -> str:
         """Return the probability with its confidence interval, in per cent."""
         if not self.trials:

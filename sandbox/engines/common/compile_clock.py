@@ -57,3 +57,8 @@ class CompileClock:
 
 
 COMPILE_CLOCK = CompileClock()
+
+
+def clock_without_compilation() -> float:
+    """Return the time of a clock that stops while code is compiled, s; only differences are meaningful."""
+    return perf_counter() - COMPILE_CLOCK.seconds

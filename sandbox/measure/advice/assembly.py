@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice.forecast import Risk, formula_forecast
 from sandbox.measure.advice.game_code import GameCode, game_code
@@ -21,7 +22,6 @@ from sandbox.measure.advice.result import (
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
-from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from sandbox.action import Action, Switch
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice.assembly import AdviceMeasurements, evaluation_key
 from sandbox.measure.advice.result import ReplayedActions
@@ -15,14 +16,14 @@ from sandbox.measure.advice.text import setting_text
 from sandbox.measure.compare.metrics import displacement
 from sandbox.measure.metrics.trajectory_error import common_frames
 from sandbox.measure.proportion import Proportion
-from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
+from sandbox.measure.run.bounded_run import bounded_run
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.runner import run
 from sandbox.measure.starts import Starts, allowed_failures
 from sandbox.measure.tradeoff.configuration import Evaluation, SearchSpace, evaluate
 from sandbox.measure.tradeoff.recommendation import by_cost
 from sandbox.measure.tradeoff.search import MIN_RUN_COST, RUN_FRACTION
-from sandbox.measure.tradeoff.start_trials import MIN_STARTS, STARTS_FRACTION
+from sandbox.measure.tradeoff.start_trials import affordable_starts
 from sandbox.progress import Progress
 from sandbox.scene.errors import SettingsError
 from sandbox.trajectory import Trajectory
@@ -176,10 +177,7 @@ def _over_starts(request: AdviceRequest, point: Evaluation) -> Proportion | None
 
     Counted work bounds the number of starts; None if it allows fewer than `MIN_STARTS` and than asked for.
     """
-    affordable = STARTS_FRACTION * request.effort
-    count = min(request.starts, math.floor(affordable / max(point.counted_seconds, affordable / request.starts)))
-    if request.starts < 2 or count < min(MIN_STARTS, request.starts):
-        return None
+    count = affordable_starts(request.starts, request.effort, point.counted_seconds) if request.starts > 1 else 0
     drawn, hits, trials = Starts(request.scene, request.spread, request.frame), 0, 0
     for number in range(1, count + 1):
         if clock_without_compilation() > request.deadline:

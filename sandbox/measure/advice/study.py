@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS, is_space_default
 from sandbox.engines.registry import ENGINES, able, engine_named
 from sandbox.measure.advice.assembly import (
@@ -22,7 +23,7 @@ from sandbox.measure.advice.replays import replay_actions
 from sandbox.measure.advice.result import Advice, FallbackKind
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
 from sandbox.measure.compare.metrics import METRICS
-from sandbox.measure.run.bounded_run import bounded_run, clock_without_compilation
+from sandbox.measure.run.bounded_run import bounded_run
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.sessions import recorded_scene
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS

@@ -202,12 +202,11 @@ def _over_starts_text(replayed: ReplayedActions) -> str:
     if replayed.over_starts is None:
         return ""
     clean = replayed.over_starts
-    low, high = (100.0 * each for each in clean.interval)
     if not clean.hits:
         return f"; missed contacts in all of {clean.trials} perturbed starts with the actions up to a frame later"
     return (
         f"; no missed contact in {clean.hits} of {clean.trials} perturbed starts with the actions up to a frame later "
-        f"(95 % interval {low:.0f} to {high:.0f} %)"
+        f"{clean.interval_text}"
     )
 
 

@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, TypeGuard, TypeVar
 
 import numpy as np
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.jsonable import JsonObject
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.compare.reductions import (
@@ -38,7 +39,7 @@ from sandbox.measure.compare.reductions import (
 from sandbox.measure.metrics.clearance import close_pairs
 from sandbox.measure.metrics.perturbation import TOUCH_TOLERANCE, agreement_time, perturb
 from sandbox.measure.metrics.trajectory_error import common_frames, errors
-from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.scene.compile.scene import Scene

@@ -23,6 +23,7 @@ from sandbox.measure.preflight.trial_ensemble import (
     family_of,
     obstacle_of,
     run_trials,
+    shows,
 )
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS
 from sandbox.scene.compile.scene import Scene
@@ -44,8 +45,6 @@ REFUTABLE = frozenset({"tunnelling", "depth", "chain", "mass_ratio", "stack", "s
 
 FORMULA_KINDS = REFUTABLE | {"entry", "lift", "kick_threshold"}
 """Kinds of diagnostics that predict, from formulas, what may happen; the others state what is so at the start."""
-
-
 MIN_ODDS = 0.05
 """Smallest odds that make a warning; a problem with smaller ones is a note, unless the start of the file shows it."""
 
@@ -203,20 +202,13 @@ class _BodiesAtRisk:
                     starts += [] if number in starts else [number]
 
     def take(self, predicted: Diagnostic) -> Occurrence:
-        """Return how often the problem of a diagnostic occurs, whose bodies are then not listed by themselves.
-
-        A diagnostic that stands for other bodies too is shown by any body that no other one names, and one that stands
-        for other static objects by the body at any of them.
-        """
-        details, static = predicted.details, {*self._trial.scene.fixed_names}
-        obstacle = obstacle_of(predicted, self._trial.scene)
-        alike = {obstacle} | (static if details.get("others") else set())
+        """Return how often the problem of a diagnostic occurs; the bodies that show it are not listed by themselves."""
         starts: set[int] = set()
-        for (kind, thing), bodies in self._found.items():
-            if kind != predicted.kind or thing not in alike:
-                continue
-            names = [*bodies] if details.get("other_bodies") else [str(details["ball"])]
-            starts.update(number for name in names if name in bodies for number in bodies.pop(name)[1])
+        for bodies in self._found.values():
+            for name, (found, numbers) in tuple(bodies.items()):
+                if shows(found, predicted, self._trial.scene):
+                    starts.update(numbers)
+                    del bodies[name]
         return self._trial.occurrence(starts)
 
     def rest(self) -> Iterator[Diagnostic]:

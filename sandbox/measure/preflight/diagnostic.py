@@ -40,10 +40,8 @@ class Occurrence:
         covered = "" if self.until is None else f", in the first {self.until:.3g} s"
         if trials == 1:
             return f"{self.event} in {'the' if hits else 'no'} trial run on {self.engine}{covered}"
-        low, high = (100.0 * each for each in self.starts.interval)
         count = f"{hits:,}" if hits else "none"
-        interval = f"(95 % interval {low:.0f} to {high:.0f} %)"
-        return f"{self.event} in {count} of {trials:,} starts on {self.engine}{covered} {interval}"
+        return f"{self.event} in {count} of {trials:,} starts on {self.engine}{covered} {self.starts.interval_text}"
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from sandbox.measure.preflight.diagnostic import Diagnostic, TriedRemedy, floor_3_digits
-from sandbox.measure.preflight.trial_ensemble import NAMING_KINDS, TrialEnsemble, cost_of, is_among
+from sandbox.measure.preflight.trial_ensemble import NAMING_KINDS, TrialEnsemble, cost_of, is_among, preparation_of
 from sandbox.measure.preflight.trial_run import run_trial
 from sandbox.measure.preflight.tunnelling import ONE_DETECTION_PER_STEP
 from sandbox.measure.proportion import Proportion
@@ -78,7 +78,8 @@ class RemedyTrials:
         ensemble = self.ensemble
         shown = ensemble.starts_with(found)
         order = [*shown, *(k for k in range(len(ensemble.findings)) if k not in shown)]
-        cost, tried, hits = ensemble.run_cost * self._factor(settings) + ensemble.preparation, 0, 0
+        preparation = preparation_of(ensemble.scene)
+        cost, tried, hits = ensemble.run_cost * self._factor(settings) + preparation, 0, 0
         for number in order:
             if cost > self.left or hits:
                 break
@@ -86,7 +87,7 @@ class RemedyTrials:
             trial = run_trial(ensemble.scene, start, settings, ensemble.engine, ensemble.duration)
             if trial is None:
                 break
-            self.left -= cost_of(trial) + ensemble.preparation
+            self.left -= cost_of(trial) + preparation
             tried += 1
             hits += is_among(found, tuple(trial.findings()), ensemble.scene)
         return Proportion(hits, tried)

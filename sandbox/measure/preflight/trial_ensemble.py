@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sandbox.arrays import BoolArray
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.preflight.diagnostic import Diagnostic, Occurrence
-from sandbox.measure.preflight.trial_run import TrialRun, run_trial, trial_duration
+from sandbox.measure.preflight.trial_run import TrialRun, Unseen, run_trial, trial_duration
 from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY, collide_with_all
 from sandbox.measure.proportion import Proportion
 from sandbox.measure.run.bounded_run import counted_cost
@@ -53,8 +52,8 @@ class TrialEnsemble:
     """problems that occurred, by start"""
     top_speeds: tuple[float, float]
     """largest speed of any body in the first and in the second half of the runs, m/s"""
-    unseen: tuple[BoolArray, BoolArray]
-    """bodies whose passages through other bodies, and through static objects, the audit does not see, (N,) each"""
+    unseen: Unseen
+    """bodies whose passages the audit does not see in some run"""
     run_cost: float
     """s, counted work of the run from the start of the file"""
 
@@ -68,11 +67,6 @@ class TrialEnsemble:
         """Whether a run diverged, which hides other problems."""
         return any(each.kind == "diverged" for found in self.findings for each in found)
 
-    @property
-    def preparation(self) -> float:
-        """Work counted for the preparation of a run, s."""
-        return preparation_of(self.scene)
-
     def occurrence(self, starts: Iterable[int], event: str = "occurs") -> Occurrence:
         """Return the frequency of a problem that occurs in some of the starts, by their numbers."""
         numbers = set(starts)
@@ -80,11 +74,11 @@ class TrialEnsemble:
         return Occurrence(self.engine, None if self.whole else self.duration, count, 0 in numbers, event)
 
     def starts_with(self, problem: Diagnostic) -> list[int]:
-        """Return the starts in which the problem of a diagnostic occurs, of any body, or in which the run diverges."""
+        """Return the starts in which the problem of a diagnostic occurs, or the run diverges."""
         return [k for k, found in enumerate(self.findings) if is_among(problem, found, self.scene)]
 
     def may_pass(self, predicted: Diagnostic) -> bool:
-        """Return whether a body may tunnel in the rest of the scene, as far as its first part shows.
+        """Return whether a body may tunnel, or sink too deep, in the rest of the scene, as far as its first part shows.
 
         Formulas overestimate speeds by far, of impacts and of bodies that never get where they would be so fast. A
         predicted speed counts if bodies reached it to within a factor: `MAX_SPEED_UP` for impacts; for others, while
@@ -107,7 +101,8 @@ class TrialEnsemble:
             concerned = collide_with_all(bodies) | (is_static & ~bodies.fixed)
         else:
             concerned = np.asarray(bodies.names) == predicted.details["ball"]
-        return bool((self.unseen[is_static] & concerned).any())
+        unseen = self.unseen.through_static if is_static else self.unseen.through_bodies
+        return bool((unseen & concerned).any())
 
 
 def run_trials(
@@ -146,7 +141,7 @@ def run_trials(
             break
         findings.append(tuple(trial.findings()))
         top_speeds = max(top_speeds[0], trial.top_speeds[0]), max(top_speeds[1], trial.top_speeds[1])
-        unseen = unseen[0] | trial.unseen[0], unseen[1] | trial.unseen[1]
+        unseen = Unseen(*(a | b for a, b in zip(unseen, trial.unseen, strict=True)))
     return TrialEnsemble(scene, settings, engine, drawn, duration, tuple(findings), top_speeds, unseen, cost)
 
 
@@ -162,11 +157,24 @@ def cost_of(trial: TrialRun) -> float:
 
 
 def is_among(problem: Diagnostic, found: Sequence[Diagnostic], scene: Scene) -> bool:
-    """Return whether the problem of a diagnostic is among those of a run, of any body, or the run diverges."""
-    thing, family = obstacle_of(problem, scene), family_of(problem)
-    return any(
-        each.kind == "diverged" or (family_of(each) == family and obstacle_of(each, scene) == thing) for each in found
-    )
+    """Return whether the problem of a diagnostic is among those of a run, or the run diverges."""
+    return any(each.kind == "diverged" or shows(each, problem, scene) for each in found)
+
+
+def shows(found: Diagnostic, problem: Diagnostic, scene: Scene) -> bool:
+    """Return whether what occurred in a run is the problem of a diagnostic.
+
+    A diagnostic that stands for other bodies too is shown by any of them, and one that stands for other static objects
+    by the body at any of these.
+    """
+    if family_of(found) != family_of(problem):
+        return False
+    if found.kind not in NAMING_KINDS:
+        return True
+    details, thing = problem.details, obstacle_of(found, scene)
+    is_own = bool(details.get("other_bodies")) or found.details["ball"] == details["ball"]
+    is_alike = bool(details.get("others")) and thing in scene.fixed_names
+    return is_own and (is_alike or thing == obstacle_of(problem, scene))
 
 
 def family_of(found: Diagnostic) -> str:

@@ -70,6 +70,13 @@ def _stack_of(setup: Setup) -> StackedBodies | None:
     return StackedBodies(stacked, float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0)))
 
 
+class Unseen(NamedTuple):
+    """Bodies whose passages the audit does not see, (N,) each."""
+
+    through_bodies: BoolArray
+    through_static: BoolArray
+
+
 @dataclass(frozen=True)
 class TrialRun:
     """Trial run from one start."""
@@ -95,8 +102,8 @@ class TrialRun:
         return float(np.nanmax(speed[:half], initial=0.0)), float(np.nanmax(speed[half:], initial=0.0))
 
     @cached_property
-    def unseen(self) -> tuple[BoolArray, BoolArray]:
-        """Bodies whose passages through other bodies, and through static objects, the audit does not see, (N,) each.
+    def unseen(self) -> Unseen:
+        """Bodies whose passages the audit does not see.
 
         It does not follow bodies whose centre of mass lies outside of them. Of slender bodies, it follows the ends
         through other bodies, but not between frames in which they turn too far; and not through static objects, which
@@ -108,7 +115,7 @@ class TrialRun:
         is_sparse = run.info["settings"]["record_every"] > 1
         slender = is_slender(bodies)
         sweeping = turn * bodies.radius / self.settings.substeps > bodies.thin
-        return without | (slender & (is_sparse | (turn > MAX_TURN))), without | (slender & sweeping)
+        return Unseen(without | (slender & (is_sparse | (turn > MAX_TURN))), without | (slender & sweeping))
 
     def findings(self) -> Iterator[Diagnostic]:
         """Yield a diagnostic for each problem that occurred, for each body that misses a contact or sinks too deep."""

@@ -7,9 +7,8 @@ results that are found by trying runs: a truth, a trade-off.
 
 import math
 from collections.abc import Mapping
-from time import perf_counter
 
-from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
@@ -148,8 +147,3 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         "on_floor": substeps * (scene.surface is not None),
         "zoned": substeps * bool(scene.zones),
     }
-
-
-def clock_without_compilation() -> float:
-    """Return the time of a clock that stops while code is compiled, s; only differences are meaningful."""
-    return perf_counter() - COMPILE_CLOCK.seconds

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from time import perf_counter
 from typing import Any, Unpack, cast
 
 import numpy as np
 
 from sandbox.action import Action, Spawn, actions_to_json, in_order
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import PairRuns, Refusal, Simulation
 from sandbox.engines.energy_ledger import Cause
@@ -119,10 +118,10 @@ def run(
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
     timed_audit = TimedAudit(setup, simulation) if audit else None
 
-    began = _seconds_without_compilation()
+    began = clock_without_compilation()
     callbacks = RunCallbacks(on_progress, on_work)
     end = run_loop(scene.world.duration, simulation, stretches, actions, recorder, bout, callbacks)
-    seconds = _seconds_without_compilation() - began - (timed_audit.seconds if timed_audit else 0.0)
+    seconds = clock_without_compilation() - began - (timed_audit.seconds if timed_audit else 0.0)
     work, state_hash = dict(simulation.work), simulation.state_hash()
 
     outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
@@ -237,11 +236,6 @@ def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, 
     }
 
 
-def _seconds_without_compilation() -> float:
-    """Return the time of a clock that stops while code is compiled, s: of the engine as of the audit."""
-    return perf_counter() - COMPILE_CLOCK.seconds
-
-
 class TimedAudit:
     """Audit of a simulation that measures its own time, so that the time of a run is the engine's."""
 
@@ -265,17 +259,17 @@ class TimedAudit:
 
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Audit one substep."""
-        began = _seconds_without_compilation()
+        began = clock_without_compilation()
         self._update(len(end))
         self._audit(time, self._without_removed(start, time), end, touching, self._shared_layers())
-        self.seconds += _seconds_without_compilation() - began
+        self.seconds += clock_without_compilation() - began
 
     def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
         """Audit many substeps, as `Audit.observe_path`; bodies that change their layer are not passed in this way."""
-        began = _seconds_without_compilation()
+        began = clock_without_compilation()
         self._update(path.shape[1])
         self._audit.observe_path(times, self._without_removed(path, times[0]), pairs, self._shared_layers())
-        self.seconds += _seconds_without_compilation() - began
+        self.seconds += clock_without_compilation() - began
 
     def _update(self, bodies: int) -> None:
         """Include changes of the scene since the last substep, and bodies that were added."""

@@ -41,5 +41,4 @@ class FreshStarts:
         """Return in how many starts the setting held: `held in 29 of 30 fresh starts (95 % interval 83 to 99 %)`."""
         if not self.held.trials:
             return "not tried from other starts, because their truths and runs take more than the effort"
-        low, high = (100.0 * each for each in self.held.interval)
-        return f"held in {self.held.hits} of {self.held.trials} fresh starts (95 % interval {low:.0f} to {high:.0f} %)"
+        return f"held in {self.held.hits} of {self.held.trials} fresh starts {self.held.interval_text}"

@@ -19,8 +19,8 @@ from dataclasses import dataclass, field, replace
 from itertools import cycle
 from typing import Literal
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.measure.compare.metrics import EvaluationContext
-from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
 from sandbox.measure.tradeoff.objective import is_dominated
 from sandbox.progress import Progress, ProgressCallback

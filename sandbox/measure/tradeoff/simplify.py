@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sandbox.arrays import IntArray
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES
 from sandbox.formatting import format_quantity
 from sandbox.jsonable import in_json
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.measure.compare.metrics import EvaluationContext, Metric
-from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.measure.tradeoff.timing import (
     MIN_TURNS,
     CostRatio,

@@ -9,9 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
-from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation, counted_cost
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.starts import Starts, allowed_failures
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
@@ -30,6 +31,18 @@ MIN_STARTS = 3
 TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
 """Cost of a truth in that of its finest run: before it, dt is halved several times, and a second method and perturbed
 runs confirm it. That took 14 times the finest run for `chain_of_20`."""
+
+
+def affordable_starts(count: int, effort: float, cost: float) -> int:
+    """Return how many of some starts `STARTS_FRACTION` of an effort allows; 0 if it allows fewer than `MIN_STARTS`.
+
+    Args:
+        count: number of starts asked for.
+        effort: counted work, s.
+        cost: counted work of one start, s.
+    """
+    affordable = math.floor(STARTS_FRACTION * effort / cost) if cost > 0.0 else count
+    return min(count, affordable) if affordable >= min(MIN_STARTS, count) else 0
 
 
 def context_of(
@@ -137,9 +150,7 @@ class StartTrials:
         """Return the number of starts from which a configuration is run, or 0: counted work decides, not the clock."""
         if self.count < 2 or clock_without_compilation() >= self.deadline:
             return 0
-        cost = point.counted_seconds + self._truth_cost
-        affordable = math.floor(STARTS_FRACTION * self.effort / cost) if cost > 0.0 else self.count
-        return min(self.count, affordable) if affordable >= min(MIN_STARTS, self.count) else 0
+        return affordable_starts(self.count, self.effort, point.counted_seconds + self._truth_cost)
 
     @cached_property
     def _truth_cost(self) -> float:

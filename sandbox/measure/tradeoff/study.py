@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Unpack
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES, engine_named
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import EvaluationContext
@@ -19,7 +20,6 @@ from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.preflight.checks import warnings
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
 from sandbox.measure.preflight.tunnelling import largest_safe_dt
-from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
 from sandbox.measure.tradeoff.configuration import (

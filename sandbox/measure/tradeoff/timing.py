@@ -16,9 +16,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import start
-from sandbox.measure.run.bounded_run import clock_without_compilation
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.schedule import schedule

@@ -89,6 +89,37 @@ def test_frequency_of_tunnelling_is_that_of_a_random_phase(engine: str, speed: f
     assert found.seen.starts.probability == pytest.approx(1.0 - 0.055 / (speed * DT), abs=0.03)
 
 
+def test_remedy_of_one_bullet_is_not_judged_by_another_one() -> None:
+    """The fast bullet still passes with the step that is short enough for the slow one."""
+    pane = {"name": "pane", "points": [[1.0, -2.0], [1.0, 2.0]], "thickness": 0.01}
+    balls = [
+        {"name": name, "position": [0.0, y], "velocity": [speed, 0.0], "radius": 0.05}
+        for name, y, speed in (("slow", -1.0, 8.0), ("fast", 1.0, 30.0))
+    ]
+    scene = scene_of(0.0, 0.3, wall=[pane], ball=balls)
+    found = {each.details["ball"]: each for each in run_preflight(scene, engine="pymunk").warnings}
+    for name, speed in (("slow", 8.0), ("fast", 30.0)):
+        assert found[name].tried is not None
+        (remedy,) = found[name].tried
+        assert remedy.holds
+        assert 0.95 * 0.055 / speed < remedy.value < 0.055 / speed
+
+
+def test_remedy_of_walls_alike_holds_at_each_of_them() -> None:
+    """One forecast stands for three walls, of which the ball passes only one or two."""
+    walls = [{"name": f"w{k}", "points": [[1.0 + k, -2.0], [1.0 + k, 2.0]], "thickness": 0.01} for k in range(3)]
+    ball = {"name": "bullet", "position": [0.0, 0.0], "velocity": [12.0, 0.0], "radius": 0.05}
+    scene = scene_of(0.0, 0.5, wall=walls, ball=[ball])
+    (found,) = run_preflight(scene, engine="pymunk").warnings
+    assert found.details["others"] == 2
+    assert found.tried is not None
+    remedy = found.tried[-1]
+    assert remedy.holds
+    for number in range(remedy.starts.trials):
+        start = Starts(scene, step=DT).start(number)
+        assert run(start, "pymunk", **{remedy.name: remedy.value}).missed_contacts == 0
+
+
 def test_named_remedy_of_a_bullet_holds_in_the_starts_named() -> None:
     scene = bullet(12.0)
     (found,) = run_preflight(scene, engine="pymunk").warnings
