@@ -178,8 +178,15 @@ if TYPE_CHECKING:
     from sandbox.measure.tradeoff.convergence import (
         ConvergenceOrder as ConvergenceOrder,
     )
-    from sandbox.measure.tradeoff.fresh_starts import (
+    from sandbox.measure.fresh_starts import (
         FreshStarts as FreshStarts,
+    )
+    from sandbox.measure.compare.end_statistics import (
+        EndStatistic as EndStatistic,
+        EndStatistics as EndStatistics,
+    )
+    from sandbox.measure.paired_samples import (
+        PairedDifference as PairedDifference,
     )
     from sandbox.measure.tradeoff.result import (
         Conclusion as Conclusion,
@@ -368,7 +375,9 @@ _NAMES = {
     "sandbox.measure.tradeoff.error_budget": "ErrorBudget",
     "sandbox.measure.starts": "Starts",
     "sandbox.measure.tradeoff.convergence": "ConvergenceOrder",
-    "sandbox.measure.tradeoff.fresh_starts": "FreshStarts",
+    "sandbox.measure.fresh_starts": "FreshStarts",
+    "sandbox.measure.compare.end_statistics": "EndStatistic EndStatistics",
+    "sandbox.measure.paired_samples": "PairedDifference",
     "sandbox.measure.tradeoff.timing": "CostRatio",
     "sandbox.measure.tradeoff.result": "Conclusion Recommendation Tradeoff",
     "sandbox.measure.tradeoff.simplify": "Simplification",

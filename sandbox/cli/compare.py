@@ -33,6 +33,7 @@ from sandbox.cli.options import (
 )
 from sandbox.cli.progress import status_line
 from sandbox.cli.recordings import read_scene, report_remarks
+from sandbox.cli.starts import spread_option, starts_option
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import (
     add_columns,
@@ -53,6 +54,7 @@ from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.compare.result import short_key, value_text
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.run_warnings import joint_order_limit
+from sandbox.measure.starts import Starts
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError, combinations
 
@@ -66,6 +68,7 @@ LEGEND = (
     "contacts: also in the truth; truth only, run only: in one of the two alone; -v: more columns",
 )
 """Short meanings of the columns."""
+END_LEGEND = "≠: differs from the truth in distribution (exchange test, 5 %), by more than the tolerance"
 NAMES = {
     "engine": "the physics engine",
     "dt": "time step of a frame, s",
@@ -112,6 +115,31 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
         print_legend(heads_of(table), NAMES | meanings)
     for line in _lines_below_table(comparison, why, refusals, not verbose):
         print_line(line)
+    _print_end_statistics(comparison)
+
+
+def _print_end_statistics(comparison: Comparison) -> None:
+    """Print a table of the observables of the end over perturbed starts, of the truth and of each row."""
+    rows = [(row.name, row.end_statistics) for row in comparison.rows if row.end_statistics is not None]
+    names = dict.fromkeys(each.name for _, ends in rows for each in ends.statistics if not each.is_constant)
+    if not names or not comparison.same_scene:
+        return
+    table = new_table()
+    add_columns(table, ["end, mean ± deviation"])
+    add_columns(table, ["truth", *(name for name, _ in rows)], "right")
+    for name in names:
+        found = [next((each for each in ends.statistics if each.name == name), None) for _, ends in rows]
+        known = next(each for each in found if each is not None)
+        table.add_row(
+            name.replace("_", " ") + (f", {known.unit}" if known.unit else ""),
+            known.truth_text,
+            *("–" if each is None else each.text for each in found),
+        )
+    print_table(table, keys=1)
+    print_line(
+        f"{END_LEGEND}; from {format_plural(max(ends.starts for _, ends in rows), 'start')} with "
+        f"{Starts(comparison.scene, comparison.spread)}"
+    )
 
 
 def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
@@ -201,6 +229,8 @@ class _Options(OutputOptions):
     overrides: tuple[str, ...]
     sweeps: tuple[str, ...]
     tolerance: float | None
+    starts: int
+    spread: float
     why: bool
     out: Path | None
     minimise: str | None
@@ -232,6 +262,11 @@ class _Request(NamedTuple):
     metavar="M",
     help="position error at which a run counts as diverged, m; default: 1 % of the smallest ball's radius",
 )
+@starts_option(
+    "also run from N perturbed starts: errors over them, or where positions are unpredictable, statistics of the end",
+    default=1,
+)
+@spread_option
 @click.option(
     "--why",
     is_flag=True,
@@ -269,7 +304,13 @@ def compare_command(options: _Options) -> int:
             status_line(options.is_silent) as progress,
         ):
             comparison = compare_variants(
-                request.variants, request.engines, tolerance=options.tolerance, why=options.why, on_progress=progress
+                request.variants,
+                request.engines,
+                tolerance=options.tolerance,
+                why=options.why,
+                starts=options.starts,
+                spread=options.spread,
+                on_progress=progress,
             )
     if comparison is None:
         return exit_with_errors(faults, options.as_json, scene=options.scene, truth=None, engines=[])

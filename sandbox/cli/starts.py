@@ -13,11 +13,10 @@ from sandbox.measure.tradeoff.result import Tradeoff
 Decorated = TypeVar("Decorated", bound=Callable[..., Any])
 
 
-def starts_option(use: str) -> Callable[[Decorated], Decorated]:
+def starts_option(use: str, default: int = DEFAULT_STARTS) -> Callable[[Decorated], Decorated]:
     """Return the option `--starts`; `use` says in its help what is done from N perturbed starts."""
-    text = f"{use}; fewer where they take too much work; 1: only the start of the scene; default: {DEFAULT_STARTS}"
-    kind = click.IntRange(1, MAX_STARTS)
-    return click.option("--starts", type=kind, default=DEFAULT_STARTS, metavar="N", help=text)
+    text = f"{use}; fewer where they take too much work; 1: only the start of the scene; default: {default}"
+    return click.option("--starts", type=click.IntRange(1, MAX_STARTS), default=default, metavar="N", help=text)
 
 
 recommendation_starts_option = starts_option(

@@ -50,11 +50,12 @@ from sandbox.echo import shorten
 from sandbox.engines.registry import ENGINES, USUAL
 from sandbox.formatting import UNKNOWN, format_quantity
 from sandbox.measure.compare import compare
+from sandbox.measure.compare.columns import END_ABOUT, ends_text
 from sandbox.measure.compare.metrics import METRICS
+from sandbox.measure.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.tradeoff.configuration import Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
 from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
 from sandbox.measure.tradeoff.result import Tradeoff, shown_of
@@ -103,6 +104,7 @@ def _columns(found: Tradeoff) -> list[Column[Evaluation]]:
         ),
         Column(f"95 %{unit}", "95 % quantile of these errors", _start_error("error_95"), is_optional=True),
         Column("starts", "number of these starts", _start_count, "count", is_optional=True, is_detail=True),
+        Column("end differs in", END_ABOUT, lambda point: ends_text(point.end_statistics), "text", is_optional=True),
         Column("ms/s minimum", cost.format("smallest"), lambda point: point.cost, "time"),
         Column("ms/s median", cost.format("median"), lambda point: point.cost_median, "time", is_detail=True),
     ]
@@ -129,6 +131,8 @@ def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
     print_line(f"{name}: {found.error_about}")
     if found.margin_about:
         print_line(found.margin_about)
+    if found.ends_about:
+        print_line(found.ends_about)
     print_line(_about(found))
     print_line(starts_text(found))
     if rows:

@@ -14,7 +14,7 @@ from matplotlib.ticker import LogFormatter
 
 from sandbox.columns import TRUTH
 from sandbox.formatting import format_plural
-from sandbox.measure.tradeoff.fresh_starts import MIN_QUANTILE_STARTS
+from sandbox.measure.fresh_starts import MIN_QUANTILE_STARTS
 from sandbox.measure.tradeoff.objective import pareto
 from sandbox.report.colours import colour_of
 from sandbox.report.style import FAINT, GRID, INK, add_legend, literal, shortened, write_figure

@@ -279,6 +279,19 @@ def solve_joints_once(
 
 
 @bare_kernel
+def solve_joints(
+    rows: VelocityConstraints,
+    iterations: int,
+    velocity: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+) -> None:
+    """Solve all rows `iterations` times; the other arguments are those of `solve_joints_once`."""
+    for _ in range(iterations):
+        solve_joints_once(rows, velocity, inverse_mass, inverse_moment)
+
+
+@bare_kernel
 def joint_work(rows: VelocityConstraints, joints: JointData, velocity: FloatArray) -> tuple[float, float]:
     """Return the work of the accumulated impulses of all rows but motors, and that of motors, J.
 

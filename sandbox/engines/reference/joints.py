@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.joint_data import (
     CONSTRAINTS,
@@ -41,7 +41,7 @@ from sandbox.engines.reference.joint_rows import (
     joint_work,
     make_velocity_constraints,
     prepare,
-    solve_joints_once,
+    solve_joints,
     warm_start_joints,
     write_joint_impulses,
 )
@@ -122,6 +122,7 @@ class JointSolver:
         """joints of the rows"""
         if self.method == "relaxation":
             self.constraints = self.constraints.joined(stretch_limits(self._springs, self._max_stretch))
+        self._acts_both_ways: BoolArray = ~np.isin(self.constraints.kind, LIMITS)
         self.rows: VelocityConstraints = make_velocity_constraints(self.constraints)
         self.rows.impulse[:] = memory[self._is_second(), self.constraints.joint]
         self._impulse = np.zeros((len(self.joints), 2))
@@ -166,15 +167,13 @@ class JointSolver:
         """Apply the impulses of the last step to velocities (N, 3)."""
         warm_start_joints(self.rows, velocity, self.inverse_mass, self.inverse_moment)
 
-    def solve_once(self, velocity: FloatArray) -> None:
-        """Solve every row once; velocities (N, 3) are changed."""
-        solve_joints_once(self.rows, velocity, self.inverse_mass, self.inverse_moment)
-
     def solve(self, velocity: FloatArray) -> None:
         """Solve the prepared rows alone, without contacts; velocities (N, 3) are changed."""
         self.warm_start(velocity)
-        for _ in range(self._iterations):
-            self.solve_once(velocity)
+        self._iterate(velocity)
+
+    def _iterate(self, velocity: FloatArray) -> None:
+        solve_joints(self.rows, self._iterations, velocity, self.inverse_mass, self.inverse_moment)
 
     def project(self, start: State, moved: State, h: float) -> None:
         """Correct positions, and change velocities accordingly.
@@ -202,13 +201,12 @@ class JointSolver:
         impulse, bound, h = self.rows.impulse.copy(), self.rows.bound, self.h
         # No bias: positions are already corrected. A row with an impulse is active, at whichever limit.
         prepare(self.rows, self.constraints, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
-        either = ~np.isin(self.constraints.kind, LIMITS)
+        either = self._acts_both_ways
         bound[:, 0] = np.where(either | (impulse[:, 0] < 0.0), -h * self.constraints.max_force, 0.0)
         bound[:, 1] = np.where(either | (impulse[:, 0] > 0.0), h * self.constraints.max_force, 0.0)
         self.rows.impulse[:] = impulse  # applied already, but part of the accumulated impulse
         self.rows.target[self.constraints.kind != MOTOR] = 0.0
-        for _ in range(self._iterations):
-            self.solve_once(moved[1])
+        self._iterate(moved[1])
 
     def work(self, velocity: FloatArray) -> tuple[float, float]:
         """Return the work of the impulses of joints but motors, and that of motors, J.

@@ -22,11 +22,11 @@ from sandbox.measure.advice.result import (
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.starts import Starts
 from sandbox.measure.tradeoff.configuration import (
     Evaluation,
 )
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.recommendation import (
     format_value,
 )

@@ -8,8 +8,8 @@ from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
 from sandbox.measure.compare.metrics import WorstError
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.proportion import Proportion
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import less_margin
 from sandbox.scene.description.world import Settings
 

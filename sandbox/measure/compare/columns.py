@@ -1,9 +1,11 @@
 """Columns of a comparison."""
 
+import math
 from collections.abc import Callable
 from dataclasses import fields
 
 from sandbox.columns import TRUTH, Column
+from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.compare.result import Row, Score
 
@@ -23,6 +25,30 @@ def _error(name: str) -> Column[Row]:
 
 def _count(kind: str) -> Callable[[Row], int | None]:
     return lambda row: row.count(kind)
+
+
+def _start_error(quantile: str) -> Callable[[Row], float | None]:
+    """Return the value of a column of errors from perturbed starts; infinite where too many runs failed."""
+
+    def value(row: Row) -> float | None:
+        if row.start_errors is None or not row.start_errors.held.trials:
+            return None
+        error: float | None = getattr(row.start_errors, quantile)
+        return math.inf if error is None else error
+
+    return value
+
+
+END_ABOUT = "observables of the end whose distribution over perturbed starts differs from that of the truth"
+
+
+def ends_text(ends: EndStatistics | None) -> str | None:
+    """Return the observables of the end that differ from those of the truth over perturbed starts."""
+    if ends is None:
+        return None
+    if ends.failed:
+        return f"{ends.failed} failed"
+    return ", ".join(f"{each.name.replace('_', ' ')}" for each in ends.differing) or "nothing"
 
 
 def _divergence(row: Row) -> float | str | None:
@@ -49,6 +75,13 @@ COLUMNS: tuple[Column[Row], ...] = (
         "change",
         is_detail=True,
     ),
+    Column(
+        "median, m", "median of the max errors from perturbed starts", _start_error("median_error"), is_optional=True
+    ),
+    Column(
+        "95 %, m", "95 % quantile of the max errors from perturbed starts", _start_error("error_95"), is_optional=True
+    ),
+    Column("end differs in", END_ABOUT, lambda row: ends_text(row.end_statistics), "text", True),
     Column("contacts", "contacts that the truth has too", _count("matched"), "count"),
     Column("truth only", "contacts of the truth that the run does not have", _count("missed"), "count"),
     Column("run only", "contacts of the run that the truth does not have", _count("phantom"), "count"),

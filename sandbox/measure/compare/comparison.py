@@ -11,6 +11,7 @@ import numpy as np
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named
 from sandbox.measure.compare.attribution import one_at_a_time, verdict
 from sandbox.measure.compare.contact_matching import match_contacts
+from sandbox.measure.compare.end_statistics import end_ensemble
 from sandbox.measure.compare.ground_truth import Truth, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.compare.result import (
@@ -25,10 +26,12 @@ from sandbox.measure.compare.result import (
     truth_settings,
     variants_of,
 )
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.metrics.invariants import energy_drift, momentum_drift
 from sandbox.measure.metrics.trajectory_error import default_tolerance
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.runner import run
+from sandbox.measure.starts import DEFAULT_SPREAD, MAX_STARTS, Starts, check_spread
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings, SettingsChanges
@@ -37,6 +40,8 @@ from sandbox.schedule import with_whole_steps
 from sandbox.signals import defer_interrupt
 from sandbox.trajectory import Trajectory
 
+START_EFFORT = 60.0
+"""Counted work that the runs of the truth's method from other starts may take, s"""
 MAX_REPEATED_SECONDS = 5.0
 """s: a run no longer than this is timed a second time, because the first may have loaded compiled code from disk."""
 NEGLIGIBLE = 1e-6
@@ -51,6 +56,8 @@ def compare(
     tolerance: float | None = None,
     why: bool = False,
     truth: Truth | None = None,
+    starts: int = 1,
+    spread: float = DEFAULT_SPREAD,
     on_progress: ProgressCallback | None = None,
     **settings: Unpack[SettingsChanges],
 ) -> Comparison:
@@ -60,6 +67,10 @@ def compare(
     converges, up to the time to which a second method confirms it. Errors, contacts and divergence are measured up to
     `trusted_until`, drifts of energy and momentum over the whole run. A duration that is not a whole number of steps is
     taken to the next one, so that all runs end at the same time.
+
+    With several `starts`, each row also has its errors over perturbed starts (`Starts`), each against a truth of its
+    own; or, if positions are unpredictable before the end, the statistics of the end against those of the truth's
+    method (`EndStatistics`).
 
         sandbox.compare(scene, sweep={"solver.integrator": ["explicit_euler", "velocity_verlet", "rk4"]})
 
@@ -74,6 +85,9 @@ def compare(
         why: rerun each engine whose error is not negligible with other settings, and report the changes that lower the
             error.
         truth: truth of this scene, with its frames and the tolerance, if already known; not with a sweep.
+        starts: number of perturbed starts, besides that in the scene; 1: none. There are fewer if the runs of the
+            truth's method would take more than `START_EFFORT`.
+        spread: largest change of a start, as a fraction: 0.01 moves bodies by up to 1 % of the smallest half width.
         on_progress: progress callback; its message describes each stage.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
@@ -84,7 +98,7 @@ def compare(
         UnknownEngineError: no engine has one of the names.
         TooLargeError: the frames of all runs would not fit into memory together.
         ValueError: the tolerance is not positive and finite; or a sweep is empty, too large, or has a key that
-            `settings` sets too.
+            `settings` sets too; or `starts` or `spread` is out of range.
         SceneError: a swept key or value is invalid.
         SettingsError: a setting is invalid.
 
@@ -108,6 +122,8 @@ def compare(
         tolerance=tolerance,
         why=why,
         truth=truth,
+        starts=starts,
+        spread=spread,
         on_progress=on_progress,
         **({} if sweep else settings),
     )
@@ -120,6 +136,8 @@ def compare_variants(
     tolerance: float | None = None,
     why: bool = False,
     truth: Truth | None = None,
+    starts: int = 1,
+    spread: float = DEFAULT_SPREAD,
     on_progress: ProgressCallback | None = None,
     **settings: Unpack[SettingsChanges],
 ) -> Comparison:
@@ -131,15 +149,20 @@ def compare_variants(
         tolerance: tolerance of positions, m.
         why: explain the errors.
         truth: truth of the first variant.
+        starts: number of perturbed starts; 1: none.
+        spread: largest change of a start, as a fraction.
         on_progress: progress callback; its message describes each stage.
         settings: changes to `[solver]`.
 
     Raises:
         UnknownEngineError: no engine has one of the names.
         TooLargeError: the frames of all runs would not fit into memory together.
-        ValueError: the tolerance is not positive and finite.
+        ValueError: the tolerance is not positive and finite; `starts` or `spread` is out of range.
         SettingsError: a setting is invalid.
     """
+    if not 1 <= starts <= MAX_STARTS:
+        raise ValueError(f"starts: must be from 1 to {MAX_STARTS:,}, is {starts}")
+    check_spread(spread)
     engines = [engines] if isinstance(engines, str) else engines
     for name in engines or ():
         engine_named(name)
@@ -167,10 +190,13 @@ def compare_variants(
     try:
         for variant, own, names in plan:
             scoring.score_variant(variant, own, names)
+        if starts > 1:
+            for variant, own, _ in plan:
+                scoring.score_starts(variant, own, Starts(variant.scene, spread, own.dt), starts)
     except KeyboardInterrupt:
         if not scoring.rows:
             raise
-        interrupted = len(scoring.rows) < count
+        interrupted = starts > 1 or len(scoring.rows) < count
     answer = truths[_truth_key(first, wanted[0])]
     best, doubt = (answer, None) if isinstance(answer, Truth) else (None, answer)
     return Comparison(
@@ -183,6 +209,8 @@ def compare_variants(
         interrupted=interrupted,
         truths=scoring.row_truths,
         same_scene=same_scene,
+        starts=starts,
+        spread=spread,
     )
 
 
@@ -216,6 +244,48 @@ class _Scoring:
                 self.row_truths[row.name] = truth
                 if len(run.time):
                     self.runs[row.name] = run
+
+    def score_starts(self, variant: Variant, settings: Settings, starts: Starts, count: int) -> None:
+        """Run each engine that reached its end from a number of perturbed starts too."""
+        truth = self._truth(variant.scene, settings)
+        if truth is None or not starts.can_vary:
+            return
+        context = EvaluationContext(variant.scene, truth)
+        is_chaotic = truth.trusted_until < variant.scene.world.duration
+        found = end_ensemble(context, starts, settings, count, START_EFFORT, self.tolerance) if is_chaotic else None
+        truths: dict[int, EvaluationContext] = {}
+        for k, row in enumerate(self.rows):
+            if row.set != variant.set or row.status != "ok" or (is_chaotic and found is None):
+                continue
+            self.report(Progress(f"{row.name}: from other starts"))
+            if found is not None:
+                ensemble, affordable = found
+                ends = ensemble.compare(row.engine, settings, range(1, affordable + 1))
+                self.rows[k] = replace(row, end_statistics=ends)
+            else:
+                errors = [self._error(row.engine, settings, starts, n, truths) for n in range(1, count + 1)]
+                known = [error for error in errors if not math.isnan(error)]
+                self.rows[k] = replace(row, start_errors=FreshStarts.of(known, self.tolerance))
+
+    def _error(
+        self, engine: str, settings: Settings, starts: Starts, number: int, known: dict[int, EvaluationContext]
+    ) -> float:
+        """Return the largest position error from a start, m; infinite if the run fails, nan if it has no truth.
+
+        Args:
+            engine: name of the engine.
+            settings: its settings.
+            starts: perturbed starts.
+            number: of the start.
+            known: scenes and truths of the starts so far; the new one is added.
+        """
+        if number not in known:
+            scene = starts.start(number)
+            truth = find_truth(scene, truth_settings(settings, self.all_settings), self.tolerance)
+            known[number] = EvaluationContext(scene, truth if isinstance(truth, Truth) else None)
+        found = run(known[number].scene, engine, audit=False, **settings.model_dump())
+        error = Score.of(found, known[number]).max_position if found.status == "ok" else math.inf
+        return math.nan if error is None else error
 
     def _truth(self, scene: Scene, settings: Settings) -> Truth | None:
         key = _truth_key(scene, settings)

@@ -10,8 +10,11 @@ from sandbox.html_repr import HtmlRepr
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.attribution import SettingEffect
 from sandbox.measure.compare.contact_matching import ContactMatch, MatchKind
+from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
+from sandbox.measure.fresh_starts import FreshStarts
+from sandbox.measure.starts import DEFAULT_SPREAD
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
@@ -148,6 +151,10 @@ class Row:
     """effect of other settings on the error"""
     verdict: str | None = None
     """conclusion from `why`, as one sentence"""
+    start_errors: FreshStarts | None = None
+    """largest position errors from perturbed starts, m; None without other starts, or if the motion is chaotic"""
+    end_statistics: EndStatistics | None = None
+    """statistics of the end over perturbed starts; None without other starts, or if positions are predictable"""
 
     json_properties: ClassVar = (
         "matched_contacts",
@@ -280,6 +287,10 @@ class Comparison(StudyAgainstTruth):
     `best`"""
     same_scene: bool = field(default=True, metadata=in_json(omit=True))
     """whether all rows have the same scene: a sweep changes only its `[solver]`"""
+    starts: int = 1
+    """number of perturbed starts that were asked for; 1: none"""
+    spread: float = DEFAULT_SPREAD
+    """largest change of a start, as a fraction (`Starts`)"""
 
     json_head: ClassVar = (
         ("scene", "title"),

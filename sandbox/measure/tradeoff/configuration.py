@@ -13,11 +13,12 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.jsonable import finite, in_json
+from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext, WorstError, measure_all, worst_error
 from sandbox.measure.compare.self_convergence import preferred_settings
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objections import ErrorLimits, find_objections
 from sandbox.measure.tradeoff.timing import Timing
 from sandbox.scene.compile.contacts import contact_matrix
@@ -295,6 +296,9 @@ class Evaluation:
     """whether the error is 0 because the run is the truth itself, from all starts"""
     fresh_starts: FreshStarts | None = None
     """errors from perturbed starts, of the points of a front that are shown; None if they are not known"""
+    end_statistics: EndStatistics | None = None
+    """statistics of the end over fresh starts, of recommended settings and those of the scene, if positions are
+    unpredictable before the end; None if they are not known"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))

@@ -22,6 +22,10 @@ AUDIT_METRICS = frozenset({"missed_contacts", "passes"})
 """Metrics that only an audited run has."""
 
 
+REQUESTED = "it was requested"
+"""Reason for a metric that the caller chose"""
+
+
 def less_margin(tolerance: float, margin: float) -> float:
     """Return a tolerance without the fraction of it that is left as a margin."""
     return (1.0 - margin) * tolerance
@@ -44,7 +48,7 @@ class Objective(NamedTuple):
     """frames per second of the budget"""
     max_dt: float = math.inf
     """s, longest dt of a recommended configuration: between its steps the error is unknown"""
-    reason: str = "it was requested"
+    reason: str = REQUESTED
     """reason for the choice of the metric, as a clause"""
     margin: float = 0.0
     """fraction of the tolerance that a recommended setting leaves unused"""
@@ -89,7 +93,7 @@ def complete_objective(
     margin: float = 0.0,
 ) -> Objective:
     """Return an objective that passed `check_objective`, with defaults for the values not given."""
-    chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), "it was requested")
+    chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), REQUESTED)
     if tolerance is None:
         tolerance = default_metric_tolerance(chosen, default_tolerance(context.scene))
     return Objective(chosen, tolerance, budget, fps, reason=reason, margin=margin)

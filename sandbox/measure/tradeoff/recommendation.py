@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 
 from sandbox.engines.pymunk_adapter.engine import is_space_default, space_attributes
 from sandbox.formatting import format_quantity
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.configuration import Evaluation
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import Objective
 from sandbox.measure.tradeoff.result import Recommendation
 from sandbox.scene.description.world import Settings

@@ -9,15 +9,16 @@ from typing import Any, ClassVar, NamedTuple
 from sandbox.echo import short_repr
 from sandbox.formatting import format_quantity
 from sandbox.jsonable import in_json, to_json
+from sandbox.measure.compare.end_statistics import MIN_END_STARTS
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import Metric
 from sandbox.measure.compare.result import StudyAgainstTruth
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.convergence import ConvergenceOrder, convergence_orders
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
-from sandbox.measure.tradeoff.objective import less_margin, pareto
+from sandbox.measure.tradeoff.objective import REQUESTED, less_margin, pareto
 from sandbox.measure.tradeoff.search import Limit
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.measure.tradeoff.timing import CostRatio
@@ -110,6 +111,8 @@ class Tradeoff(StudyAgainstTruth):
     """number of perturbed starts with which settings are confirmed, if the effort allows; 1: none"""
     spread: float
     """largest change of a start, as a fraction (`Starts`)"""
+    end_starts: int
+    """number of perturbed starts whose ends are compared with those of the truth's method; 0: none"""
     searched_starts: tuple[int, ...]
     """numbers of the starts over which errors are the largest: 0, that of the scene, and those from which the settings
     found before failed"""
@@ -221,6 +224,25 @@ class Tradeoff(StudyAgainstTruth):
     def margin_about(self) -> str | None:
         """Effect of the margin, as one sentence; None without one."""
         return f"tolerance: recommended settings keep to {self._limit_text()}" if self.margin else None
+
+    @property
+    def ends_about(self) -> str | None:
+        """How the time is judged in which positions are unpredictable, as one sentence; None if there is none.
+
+        With a metric that was requested, only that metric counts.
+        """
+        is_requested = self.metric_reason == REQUESTED
+        if self.best is None or self.best.trusted_until >= self.duration or is_requested:
+            return None
+        after = f"after {self.best.trusted_until:.3g} s positions are unpredictable"
+        if not self.end_starts:
+            is_few = self.starts < MIN_END_STARTS
+            cause = f"that takes {MIN_END_STARTS} starts" if is_few else "runs of the truth's method exceed the effort"
+            return f"{after}, and ends of runs were not compared: {cause}"
+        return (
+            f"{after}: recommended settings have ends that do not differ from those of the truth's method "
+            f"({self.best.trajectory.info['engine']}) over {self.end_starts} perturbed starts"
+        )
 
     @property
     def sentences(self) -> list[str]:

@@ -10,13 +10,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from sandbox.engines.common.compile_clock import clock_without_compilation
+from sandbox.measure.compare.end_statistics import MIN_END_STARTS, EndEnsemble, EndStatistics
 from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.starts import Starts, allowed_failures
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import AUDIT_METRICS, Objective
 from sandbox.measure.tradeoff.search import RUN_FRACTION
 from sandbox.scene.compile.scene import Scene
@@ -26,6 +27,9 @@ STARTS_FRACTION = 0.3
 """Fraction of the effort for the starts that decide on one setting, and for those that confirm it."""
 FRONT_FRACTION = 0.5
 """Fraction of the effort for the starts from which the shown points of the fronts are run, all together."""
+ENDS_FRACTION = 1.0
+"""Fraction of the effort for the runs of the truth's method whose ends decide, for those whose ends are shown, and for
+those of the settings in either"""
 MIN_STARTS = 3
 """Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
 TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
@@ -78,12 +82,51 @@ class StartTrials:
     effort: float
     deadline: float
     """time of `clock_without_compilation` after which no setting is tried, s"""
+    ends: EndEnsemble | None = None
+    """ends of a scene that is unpredictable before its end; None if they are not compared"""
+    end_count: int = 0
+    """number of starts whose ends decide, and of those whose ends are shown"""
+    _ends: dict[tuple[Configuration, bool], EndStatistics | None] = field(default_factory=dict)
+    """statistics of the ends of configurations, over the starts that decide or over fresh ones"""
+    _ends_spent: dict[bool, float] = field(default_factory=lambda: {False: 0.0, True: 0.0})
+    """s, counted work of the runs of these configurations, over the starts that decide and over fresh ones"""
     _contexts: dict[int, EvaluationContext] = field(default_factory=dict)
     """by the numbers of the starts"""
     _errors: dict[tuple[Configuration, int], float] = field(default_factory=dict)
     """errors of configurations, by the numbers of the starts"""
 
     def holds(self, point: Evaluation) -> bool:
+        """Return whether a configuration is within the tolerance in 95 % of the starts that decide, and ends alike.
+
+        Its ends do not differ from the truth's, if they are compared and the effort allows it.
+        """
+        if not self._is_within_tolerance(point):
+            return False
+        if self.ends is None:
+            return True
+        ends = self.end_statistics(point, fresh=False)
+        return ends is None or ends.is_alike
+
+    def end_statistics(self, point: Evaluation, fresh: bool) -> EndStatistics | None:
+        """Return the statistics of the ends of a configuration; None if they are not compared, or take too much effort.
+
+        Args:
+            point: the configuration.
+            fresh: from starts that do not decide.
+        """
+        key = point.configuration, fresh
+        if self.ends is not None and key not in self._ends:
+            first, cost = self.count if fresh else 0, point.counted_seconds
+            left = ENDS_FRACTION * self.effort - self._ends_spent[fresh]
+            count = min(self.end_count, math.floor(left / cost)) if cost > 0.0 else self.end_count
+            if count < MIN_END_STARTS or clock_without_compilation() >= self.deadline:
+                return None
+            self._ends_spent[fresh] += count * cost
+            numbers = range(first + 1, first + 1 + count)
+            self._ends[key] = self.ends.compare(point.engine, point.asked, numbers, cost)
+        return self._ends.get(key)
+
+    def _is_within_tolerance(self, point: Evaluation) -> bool:
         """Return whether a configuration is within the tolerance in 95 % of the starts that decide.
 
         It stops at the first start that makes that impossible.
@@ -132,7 +175,7 @@ class StartTrials:
         for engine in self.space.engines:
             own = [each for each in evaluations if each.engine == engine and each.meets(self.objective.max_error)]
             own.sort(key=lambda each: each.counted_seconds)
-            if own and not any(map(self.holds, own)):
+            if own and not any(map(self._is_within_tolerance, own)):
                 tried = {n: error for (setting, n), error in self._errors.items() if setting == own[0].configuration}
                 return next(n for n, error in tried.items() if error > self.objective.max_error)
         return None

@@ -14,6 +14,7 @@ from typing import Unpack
 
 from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.registry import ENGINES, engine_named
+from sandbox.measure.compare.end_statistics import end_ensemble
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.metrics.trajectory_error import default_tolerance
@@ -49,7 +50,7 @@ from sandbox.measure.tradeoff.recommendation import (
 from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of, shown_of
 from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
 from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
-from sandbox.measure.tradeoff.start_trials import StartTrials, context_of
+from sandbox.measure.tradeoff.start_trials import ENDS_FRACTION, StartTrials, context_of
 from sandbox.measure.tradeoff.timing import CostRatio, TimedRun, Timing, time_in_turns
 from sandbox.progress import Progress, ProgressCallback, ignore_progress
 from sandbox.provenance import machine, versions
@@ -108,7 +109,8 @@ def tradeoff(
         engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
             point with the reason.
         metric: metric of the error (`metrics.METRICS`); default: the largest distance from the truth if the truth is
-            trusted to the end, otherwise an invariant of the scene.
+            trusted to the end. Otherwise it is an invariant of the scene, and a recommended setting also has ends that
+            do not differ from those of the truth's method over the starts (`EndStatistics`), as far as `effort` allows.
         tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
             no missed contact.
         margin: fraction of the tolerance that a recommended setting has to leave unused: with 0.2 its error is at most
@@ -174,11 +176,16 @@ def tradeoff(
     able = tuple(name for name in names if not _refusal(scene, name, base))
     space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
     count = starts if drawn.can_vary else 1
+    ends = None
+    if metric is None:
+        ends = end_ensemble(context, drawn, base, count, ENDS_FRACTION * effort, truth_tolerance)
     study = _Study(
         space=space,
         context=context,
         objective=objective,
-        trials=StartTrials(space, context, objective, drawn, count, truth_tolerance, effort, deadline),
+        trials=StartTrials(
+            space, context, objective, drawn, count, truth_tolerance, effort, deadline, *(ends or (None, 0))
+        ),
         effort=effort,
         deadline=deadline,
         on_progress=on_progress,
@@ -317,6 +324,9 @@ class _Study:
         if repeats and self.is_explained and clock_without_compilation() < self.deadline:
             self.on_progress(Progress("running the settings of the table from other starts"))
             points = self._with_fresh_starts(points, list(filter(None, picks)))
+        if repeats and self.is_explained and self.trials.ends is not None:
+            self.on_progress(Progress("comparing the ends of runs from other starts"))
+            points = self._with_end_statistics(points, list(filter(None, picks)))
         context = self.context
         return Tradeoff(
             scene=self.space.scene,
@@ -343,6 +353,7 @@ class _Study:
             nearest_to_budget=self._completed(near_budget, points),
             starts=self.trials.count,
             spread=self.trials.starts.spread,
+            end_starts=self.trials.end_count,
             searched_starts=(0, *self.counterexamples),
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
@@ -426,6 +437,16 @@ class _Study:
         found |= {p.point.configuration: p.confirmation for p in picks if p.confirmation and p.confirmation.held.trials}
         return [replace(each, fresh_starts=found.get(each.configuration)) for each in points]
 
+    def _with_end_statistics(self, points: Sequence[Evaluation], picks: Sequence[Recommendation]) -> list[Evaluation]:
+        """Return the points, those with the scene's settings and the recommended ones with statistics of the end."""
+        chosen = {pick.point.configuration for pick in picks}
+        return [
+            replace(each, end_statistics=self.trials.end_statistics(each, fresh=True))
+            if each.status == "ok" and (each.is_own or each.configuration in chosen)
+            else each
+            for each in points
+        ]
+
     def _completed(
         self, chosen: Recommendation | None, points: Sequence[Evaluation], cheapest: Recommendation | None = None
     ) -> Recommendation | None:
@@ -440,13 +461,17 @@ class _Study:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
         point = next(each for each in points if each.configuration == chosen.point.configuration)
-        completed = replace(chosen, point=point, warnings=tuple(found))
+        sentence = chosen.sentence
+        if self.trials.ends is not None and self.is_explained:
+            unknown = "its ends were not compared, because their runs take more than the effort"
+            sentence += f"; {point.end_statistics or unknown}"
+        completed = replace(chosen, sentence=sentence, point=point, warnings=tuple(found))
         if cheapest is None or cheapest.point.configuration == point.configuration:
             return completed
         ratio = CostRatio.of(point.turns, cheapest.point.turns)
         if ratio is None:
             return completed
-        sentence = f"{chosen.sentence}; {ratio} times the cost of {label(cheapest.point)}"
+        sentence = f"{completed.sentence}; {ratio} times the cost of {label(cheapest.point)}"
         return replace(completed, sentence=sentence, cost_ratio=ratio)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import start
+from sandbox.measure.paired_samples import student_quantile
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.schedule import schedule
@@ -50,8 +51,6 @@ MIN_TURNS = 5
 """Of fewer turns there is no interval: the least and the largest of 4 ratios enclose the true one in 87 % only."""
 RESAMPLES = 4000
 """Bootstrap samples of an interval; its ends then vary by a few per cent of its width."""
-Z_975 = 1.959963984540054
-"""97.5 % quantile of the normal distribution"""
 
 
 @dataclass(frozen=True)
@@ -93,11 +92,10 @@ def _expanded_tail(count: int) -> float:
     """Return the probability beyond each end of an expanded percentile interval of 95 % from a number of values.
 
     It is that of a normal variable beyond √(n/(n−1)) times the quantile of Student's distribution with n − 1 degrees of
-    freedom, here from the first terms of its expansion about the normal quantile.
+    freedom.
     """
-    z, freedom = Z_975, count - 1
-    student = z + (z**3 + z) / (4 * freedom) + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * freedom**2)
-    return 0.5 * math.erfc(math.sqrt(count / freedom) * student / math.sqrt(2.0))
+    freedom = count - 1
+    return 0.5 * math.erfc(math.sqrt(count / freedom) * student_quantile(freedom) / math.sqrt(2.0))
 
 
 class TimedRun(NamedTuple):

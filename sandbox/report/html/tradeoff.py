@@ -220,15 +220,19 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
 
 
 def _start_figures(point: WorkPoint) -> list[tuple[str, str]]:
-    """Return the errors of a point from fresh starts; empty if it was not run from any."""
-    found = point.row.get("fresh_starts")
-    if not found:
-        return []
-    return [
-        ("fresh starts", str(found["held"]["trials"])),
-        ("median of these", format_number(found["median_error"])),
-        ("95 % of these", format_number(found["error_95"])),
-    ]
+    """Return the errors of a point from fresh starts and what differs in its ends; empty without such starts."""
+    figures: list[tuple[str, str]] = []
+    if found := point.row.get("fresh_starts"):
+        figures += [
+            ("fresh starts", str(found["held"]["trials"])),
+            ("median of these", format_number(found["median_error"])),
+            ("95 % of these", format_number(found["error_95"])),
+        ]
+    if ends := point.row.get("end_statistics"):
+        differing = [each["name"].replace("_", " ") for each in ends["statistics"] if each["differs"]]
+        failed = [f"{ends['failed']} failed"] if ends["failed"] else []
+        figures.append((f"ends of {ends['starts']} starts differ in", ", ".join([*failed, *differing]) or "nothing"))
+    return figures
 
 
 def _start_cell(point: WorkPoint, key: str) -> str:

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from sandbox.engines.pymunk_adapter.colliders import new_space
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.compare.metrics import METRICS
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.configuration import Evaluation
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.objective import Objective, is_dominated, pareto
 from sandbox.measure.tradeoff.recommendation import (
     label,

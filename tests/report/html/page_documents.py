@@ -9,11 +9,11 @@ from sandbox.measure.extremes import Extremes, ExtremesPlan
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.outcome import Outcome, Sample
 from sandbox.measure.extremes.scenarios import AXES
+from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.preflight.diagnostic import Diagnostic
 from sandbox.measure.run.runner import run
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation
 from sandbox.measure.tradeoff.error_budget import ErrorBudget
-from sandbox.measure.tradeoff.fresh_starts import FreshStarts
 from sandbox.measure.tradeoff.result import Recommendation, Tradeoff
 from sandbox.measure.tradeoff.simplify import Simplification
 from sandbox.scene.description.world import Settings
@@ -81,6 +81,7 @@ def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "nearest_to_budget": None,
         "starts": 30,
         "spread": 0.01,
+        "end_starts": 0,
         "searched_starts": (0,),
         "untried": 0,
         "effort": 1.0,
