@@ -232,7 +232,7 @@ MIN_MEMORY = 1024
     "--against",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="compare the boundaries with those stored in FILE (an extremes.json)",
+    help="compare the boundaries with those stored in FILE, an extremes.json of the same --starts, --spread and --set",
 )
 @json_option
 @quiet_option("print no tables and no progress")
@@ -247,7 +247,7 @@ def extremes_command(options: _Options) -> int:
     stored = None
     if options.against is not None:
         with collect_errors(faults, "--against", (StoredError,)):
-            stored = read(options.against)
+            stored = read(options.against, plan)
     with collect_errors(faults):
         require_folder(options.out)
     if options.out is not None and not faults:
