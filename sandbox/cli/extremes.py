@@ -208,8 +208,8 @@ MIN_MEMORY = 1024
     "--starts",
     type=click.IntRange(1, MAX_STARTS),
     metavar="N",
-    help="run each level of an axis from N perturbed starts, every second one of boxes rotated as a whole; 95 % of them "
-    "must pass; fewer where runs cost much; "
+    help="run each level of an axis from N perturbed starts, every second one of boxes rotated as a whole, of which 95 "
+    "% must pass; fewer where runs cost much; "
     f"1: only the start of the scene; default: {LEVEL_STARTS}, with --quick {MIN_STARTS}",
 )
 @spread_option
