@@ -258,9 +258,11 @@ def _print(scene: Scene, document: CheckDocument, quiet: bool, verbose: bool) ->
 def _trial_text(scene: Scene, trial: TrialCoverage) -> str:
     """Return the engine of the trial runs, how much of the scene they cover, and their starts."""
     covered = "" if trial.whole else f", for {trial.duration:.3g} s of {scene.world.duration:g} s"
+    fewer = "" if trial.limited_by is None else f" of {trial.asked:,} starts, as {trial.limited_by}"
     if trial.starts == 1:
-        return f"one trial run on {trial.engine}{covered}"
-    return f"trial runs on {trial.engine}{covered}, from {trial.starts:,} starts: {Starts(scene, trial.spread)}"
+        return f"one trial run on {trial.engine}{covered}{f', from 1{fewer}' if fewer else ''}"
+    varied = Starts(scene, trial.spread)
+    return f"trial runs on {trial.engine}{covered}, from {trial.starts:,}{fewer or ' starts'}: {varied}"
 
 
 def _step_text(scene: Scene, document: CheckDocument) -> str:

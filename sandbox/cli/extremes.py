@@ -208,7 +208,8 @@ MIN_MEMORY = 1024
     "--starts",
     type=click.IntRange(1, MAX_STARTS),
     metavar="N",
-    help="run each level of an axis from N perturbed starts, of which 95 % must pass; fewer where runs cost much; "
+    help="run each level of an axis from N perturbed starts, every second one of boxes rotated as a whole, of which 95 "
+    "% must pass; fewer where runs cost much; "
     f"1: only the start of the scene; default: {LEVEL_STARTS}, with --quick {MIN_STARTS}",
 )
 @spread_option
@@ -232,7 +233,7 @@ MIN_MEMORY = 1024
     "--against",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="compare the boundaries with those stored in FILE (an extremes.json)",
+    help="compare the boundaries with those stored in FILE, an extremes.json of the same --starts, --spread and --set",
 )
 @json_option
 @quiet_option("print no tables and no progress")
@@ -247,7 +248,7 @@ def extremes_command(options: _Options) -> int:
     stored = None
     if options.against is not None:
         with collect_errors(faults, "--against", (StoredError,)):
-            stored = read(options.against)
+            stored = read(options.against, plan)
     with collect_errors(faults):
         require_folder(options.out)
     if options.out is not None and not faults:

@@ -66,6 +66,11 @@ class WorkPoint:
         return bool(self.row.get("is_truth"))  # documents of earlier versions lack it
 
     @property
+    def is_timed(self) -> bool:
+        """Whether its cost was timed in turns with others; otherwise it is an estimate from its counted work."""
+        return bool(self.row.get("repeats"))
+
+    @property
     def start_errors(self) -> tuple[float, float, float] | None:
         """Quantiles of the errors from fresh starts, 5, 50 and 95 %; None if they are unknown or infinite."""
         found = self.row.get("fresh_starts") or {}
@@ -191,7 +196,7 @@ def describe(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
         error = "0, the truth itself" if point.is_truth else f"{point.error:.3g} {unit}".rstrip()
         yield f"{metric.replace('_', ' ')} {error}"
     if point.cost is not None:
-        yield f"{point.cost:.3g} ms per simulated second"
+        yield f"{point.cost:.3g} ms per simulated second{'' if point.is_timed else ', not timed'}"
     if point.status != "ok":
         yield f"{point.status}: {point.row.get('reason') or 'no reason given'}"
 
@@ -206,6 +211,8 @@ FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, 
 """A ring around each point, so that a front of one point is visible too."""
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
 MARGIN: dict[str, Any] = {**BOUND, "ls": (0, (5.0, 2.5))}
+HOLLOW: dict[str, Any] = {"mfc": "white", "mew": 1.1, "ms": 5.5}
+"""A point that was not timed."""
 WHISKER: dict[str, Any] = {"lw": 1.6, "marker": "_", "ms": 7, "mew": 1.6, "zorder": 2.5}
 """Range of the errors of a point from fresh starts, below the point."""
 LABEL_WIDTH, LABEL_HEIGHT = 0.1, 0.045
@@ -235,8 +242,9 @@ def plot_tradeoff(document: TradeoffMapping, path: str | Path) -> Path:
 def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
     """Return error against milliseconds per simulated second, log–log: a line through the best settings of each method.
 
-    The Pareto front of all methods is bold. A dashed line is the error limit of an engine, however small its step.
-    Failures are crosses: at the top where only their error is unknown, at the right where their cost is.
+    The Pareto front of all methods is bold. Settings that were not timed are hollow. A dashed line is the error limit
+    of an engine, however small its step. Failures are crosses: at the top where only their error is unknown, at the
+    right where their cost is.
 
     Args:
         document: document that `sandbox tradeoff --json` prints.
@@ -255,6 +263,10 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
     if front:
         panel.plot(*zip(*(point.position for point in front), strict=True), **FRONT)
         entries.append(("Pareto front", Line2D([], [], **FRONT)))
+    timed = {point.is_timed for point in points if point.is_drawable}
+    if False in timed:
+        cost = "cost estimated from counted work" if True in timed else "time of the recorded run"
+        entries.append((f"not timed: {cost}", Line2D([], [], color=INK, marker="o", lw=0, **HOLLOW)))
     _label_truth(panel, points)
     entries += _draw_start_errors(panel, points)
     entries += _draw_bounds(panel, document)
@@ -283,15 +295,19 @@ def _draw_methods(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, L
         best = pareto((point.position for point in method_points), itemgetter(0), itemgetter(1))
         panel.plot(*zip(*best, strict=True), color=colour, lw=0.9, alpha=0.45)
         style: dict[str, Any] = {"color": colour, "lw": 0, "marker": marker, "ms": 6.5, "mec": "white", "mew": 0.6}
+        hollow = style | HOLLOW | {"mec": colour}
         for point in method_points:  # each is a separate line, so that a page can refer to it
             x, y = point.position
-            panel.plot([x], [y], **style, zorder=3, gid=f"{POINT}{point.index}")
+            panel.plot([x], [y], **(style if point.is_timed else hollow), zorder=3, gid=f"{POINT}{point.index}")
         label = f"{engine}: {method}" if method else engine
         entries.append((label, Line2D([], [], color=colour, marker=marker, lw=0.9, ms=6.5)))
     if len(entries) <= MAX_METHODS:
         return entries
     return [  # a legend of all methods would take the space of the plot
-        (f"{engine}: {count} methods", Line2D([], [], color=colour_of(engine), marker="o", lw=0.9, ms=6.5))
+        (
+            f"{engine}: {format_plural(count, 'method')}",
+            Line2D([], [], color=colour_of(engine), marker="o", lw=0.9, ms=6.5),
+        )
         for engine, count in counts.items()
     ]
 

@@ -1,5 +1,6 @@
 """`sandbox check`: faults, demands, engines, warnings."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -131,7 +132,8 @@ def test_trial_run_names_the_balls_that_pass_through(tmp_path: Path, capfd: pyte
     for k, (name, speed) in enumerate((("slow", 9.0), ("middle", 25.0), ("fast", 60.0))):
         text += f'[[ball]]\nname = "{name}"\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n'
     _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text), "--starts", "1")
-    assert document["trial"] == {"engine": "pymunk", "duration": 1.0, "whole": True, "starts": 1, "spread": 0.01}
+    covered = {"engine": "pymunk", "duration": 1.0, "whole": True, "starts": 1, "spread": 0.01}
+    assert document["trial"] == {**covered, "asked": 1, "limited_by": None}
     passed = [(w["ball"], w["thing"]) for w in document["warnings"] if w.get("seen", {}).get("starts", {}).get("hits")]
     result = run(load(write_scene(tmp_path, text)))
     assert passed == [(result.names[a], "w") for a, _ in result.missed_pair.tolist()]
@@ -181,6 +183,21 @@ def test_trial_run_uses_the_chosen_engine(tmp_path: Path, capfd: pytest.CaptureF
     assert document["trial"] is None
     status, _, err = lines_of(capfd, "check", scene, "--engine", "none")
     assert (status, len(err)) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("ball", "--starts", "20"), r"trial runs on pymunk, from 20 starts: "),
+        (("ball", "--starts", "10000"), r"trial runs on pymunk, from \d+ of 10,000 starts, as more would exceed the "),
+        (("pendulum_90", "--spread", "0%"), r"one trial run on pymunk, from 1 of 30 starts, as no start differs from "),
+        (("pendulum_90", "--starts", "1"), r"one trial run on pymunk$"),
+    ],
+)
+def test_first_line_says_how_many_starts_ran_of_how_many(capfd, words, text):
+    status, out, _ = lines_of(capfd, "check", *words)
+    assert status == 0
+    assert re.match(text, out[1].strip())
 
 
 def test_failure_in_one_scene_does_not_affect_other_scenes(tmp_path, capfd, monkeypatch):

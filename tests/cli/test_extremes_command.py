@@ -96,6 +96,26 @@ def test_faults_are_reported_one_per_line_before_any_run(capfd: pytest.CaptureFi
     assert errors[3] == f"--out: {file}: is not a folder"
 
 
+@pytest.mark.parametrize(
+    ("words", "difference"),
+    [
+        (("--starts", "20"), "--starts 5, not --starts 20"),
+        (("--spread", "5%"), "--spread 0.01, not --spread 0.05"),
+        (("--set", "solver.iterations=3"), "no --set, not --set 'solver.iterations=3'"),
+    ],
+)
+def test_boundaries_of_other_starts_or_scenes_are_not_compared(capfd, tmp_path, words, difference):
+    own = ("extremes", "--axes", "speed", "--engines", "exact", "--quick", "--workers", "1")
+    assert lines_of(capfd, *own, "--out", str(tmp_path))[0] == 0
+    stored = str(tmp_path / "extremes.json")
+    status, out, errors = lines_of(capfd, *own, "--against", stored)
+    assert (status, errors) == (0, [])
+    assert out[-1] == "no boundary has moved"
+    status, document, (line,) = json_of(capfd, *own, *words, "--against", stored)
+    assert (status, document["cells"]) == (2, [])
+    assert line == f"--against: {stored}: cannot be compared: it was measured with {difference}"
+
+
 @pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_interrupted_extremes_keep_finished_cells() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import sandbox
 from sandbox.action import Impulse
+from sandbox.arrays import FloatArray
 from sandbox.engines.pymunk_adapter.engine import SPACE_DEFAULTS
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.advice import Advice, advise, replays, scoring
@@ -288,16 +289,18 @@ def test_recording_is_replayed_from_as_few_starts_as_asked_for() -> None:
     assert [each.over_starts.trials for each in advice.replays if each.over_starts is not None][:1] == [2]
 
 
-def test_setting_that_departs_sooner_from_finer_steps_with_the_actions_is_not_recommended() -> None:
-    """Without its push the tower stands with any number of iterations; with it, the cheapest setting leans first."""
-    text = """
+PUSHED_TOWER = """
 world = { gravity = [0.0, -10.0], duration = 1.0 }
 solver = { dt = 0.016666666666666666, iterations = 30 }
 plane = [{ name = "floor", point = [0.0, 0.0], normal = [0.0, 1.0], friction = 1.0 }]
 stack = [{ name = "box", base = [0.0, 0.0], size = [0.5, 0.5], columns = 1, rows = 5, friction = 0.5 }]
 ball = [{ name = "ball", position = [-2.0, 1.2], velocity = [0.0, 0.0], radius = 0.2, fixed_rotation = true }]
 """
-    scene = scene_of(text)
+
+
+def test_setting_that_departs_sooner_from_finer_steps_with_the_actions_is_not_recommended() -> None:
+    """Without its push the tower stands with any number of iterations; with it, the cheapest setting leans first."""
+    scene = scene_of(PUSHED_TOWER)
     push = Impulse(time=0.1, body="ball", impulse=(8.0, 0.0))
     advice = advise(Recording(scene, "pymunk", scene.solver, (push,), duration=1.0), tolerance=0.01, **QUICK)
     assert not advice.is_still_without_actions
@@ -315,6 +318,38 @@ ball = [{ name = "ball", position = [-2.0, 1.2], velocity = [0.0, 0.0], radius =
     distance = ((own - finer) ** 2).sum(axis=2) ** 0.5
     assert present.farthest == pytest.approx(distance.max(), rel=1e-12)
     assert present.departs_at == pytest.approx((distance > 0.01).any(axis=1).argmax() / FPS, rel=1e-9)
+
+
+@pytest.mark.fail_slow(60)  # some hundred runs
+def test_departures_from_finer_steps_are_compared_over_starts() -> None:
+    """Each setting departs from the run of eight substeps with the same start and the same later push."""
+    scene, push = scene_of(PUSHED_TOWER), Impulse(time=0.1, body="ball", impulse=(8.0, 0.0))
+    recording = Recording(scene, "pymunk", scene.solver, (push,), duration=1.0)
+    advice = advise(recording, tolerance=0.04, starts=10, effort=2.0, repeats=1)
+    present, chosen = advice.replays
+    assert (present.setting, chosen.setting) == ("present", "recommended")
+    assert (present.finer_substeps, chosen.finer_substeps) == (8, 8)
+    assert present.sooner_over_starts is None
+    assert chosen.sooner_over_starts is not None
+    drawn = Starts(scene, step=1.0 / FPS)
+
+    def run_from(number: int, settings: Settings) -> FloatArray:
+        actions = drawn.actions([push], number)
+        return sandbox.run(drawn.start(number), "pymunk", actions=actions, **settings.model_dump()).position
+
+    sooner = 0
+    for number in range(1, 11):
+        finer = run_from(number, scene.solver.replace(substeps=8))
+        times = []
+        for settings in (advice.present.asked, advice.recommended.asked):
+            beyond = (((run_from(number, settings) - finer) ** 2).sum(axis=2) ** 0.5 > 0.04).any(axis=1)
+            times.append(beyond.argmax() if beyond.any() else math.inf)
+        sooner += times[1] < 0.8 * times[0]
+    assert (chosen.sooner_over_starts.hits, chosen.sooner_over_starts.trials) == (sooner, 10)
+    # From the start of the recording it departs sooner, too; but that is one start of eleven.
+    assert chosen.departs_at is not None
+    assert present.departs_at is not None
+    assert chosen.departs_at < 0.8 * present.departs_at
 
 
 def test_recommended_setting_is_compared_to_finer_steps_than_its_own() -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from sandbox.measure.extremes.boundary import Boundary
 from sandbox.measure.extremes.outcome import VERDICTS, Outcome, Sample
@@ -101,6 +102,7 @@ def point(engine: str, dt: float, error: float | None, cost: float | None, statu
         "error": error,
         "is_truth": engine == "exact",
         "cost_ms_per_second": cost,
+        "repeats": 3,
         "status": status,
         "reason": None if status == "ok" else "it ran away",
     }
@@ -139,15 +141,30 @@ def test_errors_from_fresh_starts_are_a_range(document: dict[str, Any]) -> None:
     assert ranges == [[[20.0, 0.005], [20.0, 0.03]]]
 
 
+def legend_of(figure: Figure) -> list[str]:
+    """Return the texts of the legends of a figure and of its panels."""
+    own = [found for panel in figure.axes if (found := panel.get_legend()) is not None]
+    return [each.get_text() for legend in (*figure.legends, *own) for each in legend.get_texts()]
+
+
+def test_settings_that_were_not_timed_are_hollow(document: dict[str, Any]) -> None:
+    timed = draw_tradeoff(document)
+    assert not any(text.startswith("not timed") for text in legend_of(timed))
+    document["points"][1]["repeats"] = 0
+    figure = draw_tradeoff(document)
+    (panel,) = figure.axes
+    drawn = {float(line.get_xdata()[0]): line for line in panel.lines if (line.get_gid() or "").startswith("point:")}
+    hollow = {cost for cost, line in drawn.items() if line.get_markerfacecolor() == "white"}
+    assert hollow == {20.0}
+    assert "not timed: cost estimated from counted work" in legend_of(figure)
+
+
 @pytest.mark.parametrize(("count", "text"), [(20, "5 to 95 %, median"), (7, "5 to 95 %, of fewer than 20 all, median")])
 def test_legend_says_whether_ranges_are_quantiles(document: dict[str, Any], count: int, text: str) -> None:
     """Of 7 starts, the 5 and 95 % quantiles are the smallest and the largest error."""
     errors = {"error_5": 0.005, "median_error": 0.02, "error_95": 0.03}
     document["points"][1]["fresh_starts"] = {"held": {"trials": count}, **errors}
-    figure = draw_tradeoff(document)
-    labels = [each.get_text() for legend in figure.legends for each in legend.get_texts()]
-    labels += [each.get_text() for panel in figure.axes if (own := panel.get_legend()) for each in own.get_texts()]
-    assert f"fresh starts: {text}" in labels
+    assert f"fresh starts: {text}" in legend_of(draw_tradeoff(document))
 
 
 def test_order_is_a_label_between_the_finest_points(document: dict[str, Any]) -> None:

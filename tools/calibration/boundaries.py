@@ -41,11 +41,11 @@ def main() -> int:
         print("interrupted: nothing is stored or compared", file=sys.stderr)
         return 130
     if arguments.store:
-        kept = read(STORED) if STORED.exists() and set(names) != set(AXES) else []
+        kept = read(STORED, plan) if STORED.exists() and set(names) != set(AXES) else []
         store(result, STORED, [each for each in kept if each["axis"] not in names])
         print(f"{len(result.limits)} boundaries written: {STORED}")
         return 0
-    found = changes(read(STORED), result.limits)
+    found = changes(read(STORED, plan), result.limits)
     for change in found:
         print(change)
     print(json.dumps({"compared": len(result.limits), "moved": len(found), "seconds": round(result.seconds)}))

@@ -110,6 +110,9 @@ class ReplayedActions:
     """that body"""
     farthest: float | None = None
     """m, largest distance of a body from the finer run"""
+    sooner_over_starts: Proportion | None = None
+    """of the perturbed starts, those in which it departs from a finer run within less than 80 % of the time of
+    the present setting; None for the present one, and if the effort allows too few"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -198,16 +198,15 @@ def _departure_text(advice: Advice, replayed: ReplayedActions) -> str:
 
 
 def _over_starts_text(replayed: ReplayedActions) -> str:
-    """Return from how many perturbed starts a replay misses no contact; empty if there were none."""
-    if replayed.over_starts is None:
-        return ""
-    clean = replayed.over_starts
-    if not clean.hits:
-        return f"; missed contacts in all of {clean.trials} perturbed starts with the actions up to a frame later"
-    return (
-        f"; no missed contact in {clean.hits} of {clean.trials} perturbed starts with the actions up to a frame later "
-        f"{clean.interval_text}"
-    )
+    """Return from how many perturbed starts a replay misses no contact, and departs soon; empty without starts."""
+    clean, sooner, text = replayed.over_starts, replayed.sooner_over_starts, ""
+    if clean is not None:
+        starts = f"of {clean.trials} perturbed starts with the actions up to a frame later"
+        text = f"; no missed contact in {clean.hits} {starts} {clean.interval_text}"
+        text = text if clean.hits else f"; missed contacts in all {starts}"
+    if sooner is not None:
+        text += f"; it departs sooner than the present setting in {sooner.hits} of {sooner.trials} such starts"
+    return text
 
 
 def _length(advice: Advice, length: float) -> str:

@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from sandbox.atomic_write import atomic_write
 from sandbox.echo import short_repr
 from sandbox.measure.extremes.boundary import TOLERANCE, Boundary
-from sandbox.measure.extremes.runner import Extremes
+from sandbox.measure.extremes.runner import Extremes, ExtremesPlan
 from sandbox.measure.extremes.scenarios import AXES
 from sandbox.resource_limits import read_limited
 from sandbox.scene.files.document import check_text
@@ -19,7 +19,7 @@ from sandbox.scene.files.document import check_text
 SLACK = 2.0
 """Multiple of the tolerance by which a boundary may differ: the old and the new one each have this tolerance."""
 
-STORED_KEYS = ("tolerance", "starts", "spread", "timeout", "memory", "versions", "machine")
+STORED_KEYS = ("tolerance", "set", "starts", "spread", "timeout", "memory", "versions", "machine")
 """Keys of the document that are stored with the boundaries."""
 
 MAX_BYTES = 64 * 2**20
@@ -28,7 +28,7 @@ StoredBoundaries = Sequence[Mapping[str, Any]]
 
 
 class StoredError(ValueError):
-    """The file contains no boundaries."""
+    """The file contains no boundaries, or those of a plan with other scenes or starts."""
 
 
 @dataclass(frozen=True)
@@ -78,11 +78,16 @@ def store(result: Extremes, path: str | Path, others: StoredBoundaries = ()) -> 
     return path
 
 
-def read(path: str | Path) -> list[dict[str, Any]]:
+def read(path: str | Path, plan: ExtremesPlan | None = None) -> list[dict[str, Any]]:
     """Return the boundaries of a file that `store` wrote, or of an `extremes.json`.
 
+    Args:
+        path: the file.
+        plan: plan whose boundaries are to be compared with them; its starts and changes of the scenes must be those of
+            the file. Its limits of time and memory may differ, as results that depend on them differ between machines.
+
     Raises:
-        StoredError: the file cannot be read or contains no boundaries.
+        StoredError: the file cannot be read, contains no boundaries, or has those of another plan.
     """
     try:
         text = read_limited(Path(path), MAX_BYTES).decode("utf-8")
@@ -100,7 +105,29 @@ def read(path: str | Path) -> list[dict[str, Any]]:
             raise StoredError(f"{path}: the bounds of {short_repr(each['axis'])} are not two levels")
         if not all(level is None or _is_number(level) for level in (each["limit"], each["first_failure"], *bounds)):
             raise StoredError(f"{path}: a limit of {short_repr(each['axis'])} is not a number")
+    differences = [] if plan is None else list(_differences(document, plan))
+    if differences:
+        raise StoredError(f"{path}: cannot be compared: {'; '.join(differences)}")
     return limits
+
+
+def _differences(document: Mapping[str, Any], plan: ExtremesPlan) -> Iterator[str]:
+    """Yield each option by which the boundaries of a document are those of other scenes or starts than a plan's.
+
+    Files of earlier versions lack some of them: without `set` there was none; unknown starts are not compared.
+    """
+    own = {"set": list(plan.overrides), "starts": plan.starts, "spread": plan.spread}
+    stored = {"set": document.get("set", [])} | {key: document.get(key, own[key]) for key in ("starts", "spread")}
+    for key, value in own.items():
+        if stored[key] != value:
+            yield f"it was measured with {_option_text(key, stored[key])}, not {_option_text(key, value)}"
+
+
+def _option_text(key: str, value: Any) -> str:
+    """Return an option as it is typed; `--set` may be repeated or absent."""
+    if key != "set" or not isinstance(value, list):
+        return f"--{key} {short_repr(value)}"
+    return " ".join(f"--set {short_repr(each)}" for each in value) if value else "no --set"
 
 
 def _is_limit(document: dict[str, Any]) -> bool:

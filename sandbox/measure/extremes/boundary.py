@@ -7,7 +7,14 @@ from typing import Any
 
 from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale
 from sandbox.measure.extremes.outcome import Outcome, PairSample, Sample, Task
-from sandbox.measure.extremes.survival import RunStart, StartSampling, Survival, survival, survival_bounds
+from sandbox.measure.extremes.survival import (
+    RunStart,
+    StartSampling,
+    Survival,
+    is_below_held,
+    survival,
+    survival_bounds,
+)
 from sandbox.measure.proportion import Proportion
 
 TOLERANCE = 0.01
@@ -58,8 +65,7 @@ class Boundary:
     unit: str = ""
     bounds: tuple[float | None, float | None] | None = None
     """levels between which survival falls below 95 %, see `survival_bounds`: the hardest up to which every start
-    survived, and the easiest beyond the limit at which the interval of the fraction lies below 95 %; None if the engine
-    refused every level"""
+    survived, and the easiest beyond the limit whose survival is below 95 %; None if the engine refused every level"""
     limit_survived: Proportion | None = None
     """starts that survived at the limit; None without a limit"""
     failure_survived: Proportion | None = None
@@ -85,7 +91,8 @@ def run_axis(
     """Run an axis on an engine configuration, level by level, and find its boundary.
 
     Refused levels do not count: a boundary lies between a level that passed and one that failed. A level that fails is
-    run until that is certain; at the boundary, and at levels of which some starts survive, all starts are run.
+    run until that is certain; then at the first failure, and at levels that are not certainly below 95 % or of which
+    some starts survive, all starts are run.
 
     Args:
         axis: the axis.
@@ -128,8 +135,8 @@ def run_axis(
         passes = None if is_slow or not bisect else lambda level: run_level(level).passed
         bracket = find_boundary(known, passes, axis.scale)
         for level, found in tuple(survivals.items()):
-            has_survivors = level in levels and found.survived is not None and found.survived.hits > 0
-            if found.remaining and (has_survivors or level == bracket.first_failure):
+            is_certain = found.survived is not None and found.survived.hits == 0 and is_below_held(found.survived)
+            if found.remaining and (not is_certain or level == bracket.first_failure):
                 keep(level, found.run(run_start(level), to_end=True))
         reason, rule = "no level failed", None
         if bracket.first_failure is not None:

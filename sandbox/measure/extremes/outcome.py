@@ -34,7 +34,7 @@ class Task:
     overrides: tuple[str, ...] = ()
     """`KEY=VALUE`, changes to the scene"""
     start: int = 0
-    """number of the start, as in `Starts`; 0: that of the scene"""
+    """number of the start, as in `Starts`, some rotated as a whole (`orientation`); 0: that of the scene"""
     spread: float = 0.0
     """spread of the starts"""
 

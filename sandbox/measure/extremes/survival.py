@@ -124,6 +124,27 @@ def survival(run_start: RunStart, sampling: StartSampling) -> Survival:
     return found if found.trials else Survival(first, (first,))
 
 
+MAX_ERROR = 0.025
+"""Largest probability that a level with a survival of exactly 95 % counts as one below 95 %."""
+
+
+def is_below_held(survived: Proportion) -> bool:
+    """Return whether a survival is below 95 %: if it were 95 %, so many failures would be rarer than `MAX_ERROR`.
+
+    This is the exact binomial test, whose interval C. J. Clopper and E. S. Pearson, The use of confidence or fiducial
+    limits, Biometrika 26 (1934) 404-413, state; Wilson's excludes a survival of 95 % in 8 to 10 % of such levels. It
+    also holds for a level that stopped at its last failure: f failures occur by the n-th trial as often as f or more in
+    n trials.
+    """
+    n, failures = survived.trials, survived.trials - survived.hits
+    logs = math.log(1.0 - HELD_FRACTION), math.log(HELD_FRACTION)
+    fewer = sum(
+        math.exp(math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1) + k * logs[0] + (n - k) * logs[1])
+        for k in range(failures)
+    )
+    return 1.0 - fewer < MAX_ERROR
+
+
 def survival_bounds(
     survived: Mapping[float, Proportion | None], limit: float | None, levels: Sequence[float]
 ) -> tuple[float | None, float | None]:
@@ -136,7 +157,8 @@ def survival_bounds(
 
     Returns:
         The hardest level, up to the limit, with no failure there or at an easier one, None if there is none; and the
-        easiest level beyond the limit whose 95 % interval of survival lies below 95 %, None if there is none.
+        easiest level beyond the limit whose survival is below 95 % (`is_below_held`), or that fails and is run from one
+        start only, None if there is none.
     """
     low, high, is_beyond, has_failures = None, None, limit is None, False
     for level in sorted(survived, reverse=levels[-1] < levels[0]):
@@ -144,7 +166,7 @@ def survival_bounds(
         if found is None:
             continue
         has_failures |= found.hits < found.trials
-        if is_beyond and high is None and found.high < HELD_FRACTION:
+        if is_beyond and high is None and (is_below_held(found) or (found.hits, found.trials) == (0, 1)):
             high = level
         if not is_beyond and not has_failures:
             low = level

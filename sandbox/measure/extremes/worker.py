@@ -16,6 +16,7 @@ from typing import Any, TextIO
 from sandbox.engines.registry import engine_named
 from sandbox.jsonable import JsonObject
 from sandbox.measure.extremes.checks import RunUnderTest, classify
+from sandbox.measure.extremes.orientation import orientation, rotated, rotated_run
 from sandbox.measure.extremes.outcome import Outcome, Task
 from sandbox.measure.extremes.scenarios import SCENARIOS
 from sandbox.measure.preflight import warnings
@@ -78,7 +79,8 @@ def evaluate_task(task: Task) -> Outcome:
 
     A scene, setting or run that the scene format, the settings or the engine refuse is `refused`. The start of the
     scene is run twice: if the second run does not end in the same state, bit for bit, the rule `repeat` is broken.
-    Other starts are run once, without the preflight checks, which look at the scene.
+    Other starts are run once, without the preflight checks, which look at the scene. Some are run rotated as a whole
+    (`orientation`), and their runs are rotated back.
     """
     scenario = SCENARIOS[task.case]
     began = perf_counter()
@@ -93,15 +95,18 @@ def evaluate_task(task: Task) -> Outcome:
         scene = Starts(scene, task.spread).start(task.start)
     else:
         predicted = tuple(dict.fromkeys(each.kind for each in warnings(scene, settings, task.engine)))
+    angle = orientation(scene, task.start)
+    placed = rotated(scene, angle) if angle else scene
     engine = engine_named(task.engine)
-    missing = engine.missing(scene, settings)
+    missing = engine.missing(placed, settings)
     if missing:
         return Outcome("refused", "; ".join(missing), predicted=predicted, solver=settings.model_dump(mode="json"))
-    resolved, cost = engine.resolve(scene, settings), None
+    resolved, cost = engine.resolve(placed, settings), None
     solver = resolved.model_dump(mode="json")
     try:
-        first_run = run(scene, task.engine, audit=False, **settings.model_dump())
-        cost = counted_cost(scene, task.engine, resolved, first_run.info["steps"], first_run.info["work"])
+        first_run = run(placed, task.engine, audit=False, **settings.model_dump())
+        cost = counted_cost(placed, task.engine, resolved, first_run.info["steps"], first_run.info["work"])
+        first_run = rotated_run(first_run, scene, -angle) if angle else first_run
         outcome = classify(RunUnderTest(scenario, scene, resolved, first_run))
         if outcome.verdict != "failed" and not task.start:
             second_run = run(scene, task.engine, audit=False, **settings.model_dump())

@@ -19,6 +19,7 @@ from sandbox.measure.preflight.predictability import event_warning
 from sandbox.measure.preflight.remedies import RemedyTrials
 from sandbox.measure.preflight.trial_ensemble import (
     NAMING_KINDS,
+    STARTS_EFFORT,
     TrialEnsemble,
     family_of,
     obstacle_of,
@@ -61,6 +62,10 @@ class TrialCoverage(NamedTuple):
     """number of starts, that of the file among them"""
     spread: float
     """largest change of a start, as a fraction"""
+    asked: int
+    """number of starts asked for"""
+    limited_by: str | None
+    """why there are fewer starts; None if there are as many"""
 
 
 class PreflightResult(NamedTuple):
@@ -105,7 +110,7 @@ def run_preflight(
     if cover <= 0.0:
         return PreflightResult(diagnostics, [], None)
     if engine == "exact":
-        return _with_events(diagnostics, scene, settings, cover)
+        return _with_events(diagnostics, scene, settings, cover, starts)
     names = [engine] if engine is not None else [name for name in STEPPING_ENGINES if name in ENGINES]
     if engine is None and scene.surface is not None:
         names = []  # a surface is a compiled kernel on every engine, whose first use takes half a minute
@@ -117,9 +122,18 @@ def run_preflight(
     found, refuted = _merge(diagnostics, concerned, trial)
     remedies = RemedyTrials(trial)
     found = [remedies.with_tried(each) if each.is_observed else each for each in found]
-    return PreflightResult(
-        found, refuted, TrialCoverage(trial.engine, trial.duration, trial.whole, len(trial.findings), spread)
-    )
+    return PreflightResult(found, refuted, _coverage(trial, starts))
+
+
+def _coverage(trial: TrialEnsemble, asked: int) -> TrialCoverage:
+    """Return what trial runs cover, and why there are fewer of them than asked for."""
+    count, reason = len(trial.findings), None
+    if count < asked:
+        reason = f"more would exceed the counted work of {STARTS_EFFORT:g} s"
+        if count < trial.affordable:
+            varies = trial.starts.can_vary
+            reason = f"{trial.engine} cannot run another start" if varies else "no start differs from that of the file"
+    return TrialCoverage(trial.engine, trial.duration, trial.whole, count, trial.starts.spread, asked, reason)
 
 
 def _merge(
@@ -240,13 +254,16 @@ def _note(refuted: Diagnostic) -> Diagnostic:
     return Diagnostic(refuted.kind, message, refuted.details, refuted.remedy)
 
 
-def _with_events(diagnostics: list[Diagnostic], scene: Scene, settings: Settings, cover: float) -> PreflightResult:
+def _with_events(
+    diagnostics: list[Diagnostic], scene: Scene, settings: Settings, cover: float, asked: int
+) -> PreflightResult:
     """Return the diagnostics with the rate of events of a trial run on `exact`."""
     tried = run_exact_trial(scene, settings, cover) if len(scene.bodies) else None
     if tried is None:
         return PreflightResult(diagnostics, [], None)
     rate, duration, whole = tried
-    coverage = TrialCoverage("exact", duration, whole, 1, 0.0)
+    reason = "events are counted from the start of the file" if asked > 1 else None
+    coverage = TrialCoverage("exact", duration, whole, 1, 0.0, asked, reason)
     others = [each for each in diagnostics if each.kind != "event_rate"]
     if (warning := event_warning(rate, len(scene.bodies))) is not None:
         return PreflightResult([*others, warning], [], coverage)

@@ -63,6 +63,11 @@ class TrialEnsemble:
         return self.duration == self.scene.world.duration
 
     @property
+    def affordable(self) -> int:
+        """Number of starts that `STARTS_EFFORT` allows, that of the file among them."""
+        return 1 + affordable_others(self.scene, self.run_cost)
+
+    @property
     def has_diverged(self) -> bool:
         """Whether a run diverged, which hides other problems."""
         return any(each.kind == "diverged" for found in self.findings for each in found)
@@ -132,7 +137,7 @@ def run_trials(
     if first is None:
         return None
     cost, drawn = cost_of(first), Starts(scene, spread, settings.dt)
-    others = min(starts - 1, int(STARTS_EFFORT / (cost + preparation_of(scene))))
+    others = min(starts - 1, affordable_others(scene, cost))
     others = others if others and drawn.can_vary else 0
     findings, top_speeds, unseen = [tuple(first.findings())], first.top_speeds, first.unseen
     for number in range(1, others + 1):
@@ -143,6 +148,11 @@ def run_trials(
         top_speeds = max(top_speeds[0], trial.top_speeds[0]), max(top_speeds[1], trial.top_speeds[1])
         unseen = Unseen(*(a | b for a, b in zip(unseen, trial.unseen, strict=True)))
     return TrialEnsemble(scene, settings, engine, drawn, duration, tuple(findings), top_speeds, unseen, cost)
+
+
+def affordable_others(scene: Scene, run_cost: float) -> int:
+    """Return the number of starts other than that of the file that `STARTS_EFFORT` allows, by the cost of a run, s."""
+    return int(STARTS_EFFORT / (run_cost + preparation_of(scene)))
 
 
 def preparation_of(scene: Scene) -> float:

@@ -191,17 +191,20 @@ def _groups(
     names: tuple[str, ...], number: IntArray, reach: FloatArray, speed: FloatArray, thing: str
 ) -> list[TunnellingRisk]:
     """Return a risk for each group of similar bodies, the shortest safe substep first, at most `MAX_PER_OBJECT`."""
-    with np.errstate(divide="ignore", over="ignore"):  # bodies at rest never tunnel
-        order = np.argsort(reach / speed, kind="stable")
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        safe = np.where(speed > 0.0, reach / speed, np.inf)  # bodies at rest never tunnel
+    order = np.argsort(safe, kind="stable")
+    safe = safe[order]
+    never = int(np.searchsorted(safe, np.inf))
     found: list[TunnellingRisk] = []
-    for k in order.tolist():
-        each = TunnellingRisk(names[number[k]], thing, float(speed[k]), float(reach[k]))
-        if found and (each.safe_h <= SAME_RISK_RATIO * found[-1].safe_h or not math.isfinite(each.safe_h)):
-            found[-1] = replace(found[-1], others=found[-1].others + 1)
-        elif len(found) == MAX_PER_OBJECT:
-            break
-        else:
-            found.append(each)
+    first = 0
+    while first < len(order) and len(found) < MAX_PER_OBJECT and (first < never or not found):
+        beyond = int(np.searchsorted(safe, SAME_RISK_RATIO * safe[first], side="right"))
+        beyond = len(order) if beyond == never else beyond  # bodies that never tunnel belong to the last group
+        k = order[first]
+        risk = TunnellingRisk(names[number[k]], thing, float(speed[k]), float(reach[k]), others=beyond - first - 1)
+        found.append(risk)
+        first = beyond
     return found
 
 

@@ -99,7 +99,7 @@ def nearest_to_budget(points: Sequence[Evaluation], objective: Objective) -> Rec
 def by_cost(points: Sequence[Evaluation]) -> list[Evaluation]:
     """Return evaluations from the cheapest on: by time, and by counted work where times are within the noise.
 
-    Evaluations that were timed separately come first: the times of the others include recording and audit.
+    Evaluations that were timed separately come first: the costs of the others are estimates.
     """
     timed = [p for p in points if p.repeats]
     engines = [

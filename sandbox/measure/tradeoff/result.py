@@ -317,7 +317,7 @@ def shown_of(front: Sequence[Evaluation]) -> list[Evaluation]:
 def front_of(points: Sequence[Evaluation]) -> list[Evaluation]:
     """Return the Pareto front, cheapest first.
 
-    If some points were timed separately, only these are used: the time of the others includes recording and audit.
+    If some points were timed separately, only these are used: the costs of the others are estimates.
     """
     usable = [point for point in points if point.is_usable]
     timed = [point for point in usable if point.repeats]

@@ -27,6 +27,7 @@ from sandbox.measure.tradeoff.configuration import (
     Evaluation,
     SearchSpace,
     refused_evaluation,
+    with_estimated_costs,
 )
 from sandbox.measure.tradeoff.error_budget import ErrorBudget, error_budget
 from sandbox.measure.tradeoff.objective import (
@@ -369,7 +370,7 @@ class _Study:
     def _timed(self, evaluations: Sequence[Evaluation], repeats: int) -> list[Evaluation]:
         """Return the evaluations with costs: those near the front of their engine are timed in turns.
 
-        For the others, the time of the recorded run is accurate enough. The scene's own settings are always timed.
+        The costs of the others are estimated. The scene's own settings are always timed.
         """
         duration = self.space.scene.world.duration
         timings = {
@@ -388,7 +389,7 @@ class _Study:
                     timings.pop(each.configuration, None)
                 else:
                     timings[each.configuration] = timing
-        return [each.with_timing(timings.get(each.configuration)) for each in evaluations]
+        return with_estimated_costs([each.with_timing(timings.get(each.configuration)) for each in evaluations])
 
     def _near_front(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
         """Return the successful evaluations that are near the front of their engine, or have the scene's settings."""

@@ -198,11 +198,12 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     unit, metric = document.get("unit") or "", document["metric"].replace("_", " ")
     row = point.row
     repeats = row.get("repeats")
+    estimated = "" if repeats else ", not timed"
     median = format_number(row.get("cost_median_ms_per_second"))
     figures = [
         (metric, f"{_error_cell(point)} {'' if point.error is None or point.is_truth else unit}".rstrip()),
         *_start_figures(point),
-        ("cost", f"{format_number(point.cost)} ms per s" if point.cost is not None else UNKNOWN),
+        ("cost", UNKNOWN if point.cost is None else f"{format_number(point.cost)} ms per s{estimated}"),
         ("median cost", f"{median} ms per s" if repeats else UNKNOWN),
         ("repeats", str(repeats) if repeats else UNKNOWN),
         ("time per frame", _frame_text(point, document)),
@@ -355,7 +356,12 @@ def _error_cell(point: WorkPoint) -> str:
     return TRUTH if point.is_truth else format_number(point.error)
 
 
-COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum of the repeats")
+COST = HtmlColumn(
+    "ms per s",
+    True,
+    "milliseconds per simulated second, minimum of the repeats; without repeats estimated from the counted work",
+)
+REPEATS = HtmlColumn("repeats", True, "timings in turns")
 
 
 def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
@@ -375,7 +381,7 @@ def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Mark
         (COST, lambda point: format_number(point.cost)),
         (median, lambda point: format_number(point.row.get("cost_median_ms_per_second"))),
         (frame, lambda point: _frame_cell(point, document)),
-        (HtmlColumn("repeats", True), lambda point: str(point.row.get("repeats", UNKNOWN))),
+        (REPEATS, lambda point: str(point.row.get("repeats", UNKNOWN))),
     )
     return row_table(columns, points, "The Pareto front")
 
@@ -384,13 +390,20 @@ def _points_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Mar
     """Return a row for each point, with every metric and counter that any of them has."""
     metrics = [key for key in _keys(points, "metrics") if key != document["metric"]]
     counters = _keys(points, "work")
-    columns = [HtmlColumn("engine"), HtmlColumn("changes"), HtmlColumn("verdict"), _metric_column(document), COST]
+    columns = [
+        HtmlColumn("engine"),
+        HtmlColumn("changes"),
+        HtmlColumn("verdict"),
+        _metric_column(document),
+        COST,
+        REPEATS,
+    ]
     columns += [HtmlColumn(name.replace("_", " "), True) for name in (*metrics, *counters)]
     rows = []
     for point in points:
         cells: list[Content] = [engine_name(point.engine), _marked_changes(point, document)]
         cells.append(badge(point.status, "good" if point.is_drawable else "bad", point.row.get("reason")))
-        cells += [_error_cell(point), format_number(point.cost)]
+        cells += [_error_cell(point), format_number(point.cost), str(point.row.get("repeats", UNKNOWN))]
         cells += [format_number((point.row.get("metrics") or {}).get(name)) for name in metrics]
         counts = point.row.get("work") or {}
         cells += [f"{counts[name]:,}" if name in counts else UNKNOWN for name in counters]

@@ -1,5 +1,6 @@
 """Survival of levels: phases of a bullet, early stopping, verdicts of several starts, bounds of boundaries, costs."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,7 +13,14 @@ from sandbox.measure.extremes.experiment import EngineSetup
 from sandbox.measure.extremes.outcome import Outcome, Sample, Task, survived_tenths
 from sandbox.measure.extremes.runner import ExtremesPlan, with_costs
 from sandbox.measure.extremes.scenarios import AXES
-from sandbox.measure.extremes.survival import MAX_COST, StartSampling, Survival, survival, survival_bounds
+from sandbox.measure.extremes.survival import (
+    MAX_COST,
+    StartSampling,
+    Survival,
+    is_below_held,
+    survival,
+    survival_bounds,
+)
 from sandbox.measure.extremes.worker import evaluate_task
 from sandbox.measure.proportion import Proportion, wilson_interval
 
@@ -188,6 +196,16 @@ def test_impossible_starts_of_a_plan_raise(starts: int, spread: float, words: st
         ExtremesPlan(starts=starts, spread=spread)
 
 
+def test_level_with_a_survival_of_95_percent_rarely_counts_as_one_below() -> None:
+    """Odds by exact enumeration of the outcomes, for every number of starts that a level may have."""
+    for trials in (1, 5, 12, 20, 60, 200):
+        below = [k for k in range(trials + 1) if is_below_held(Proportion(k, trials))]
+        assert sum(math.comb(trials, k) * 0.95**k * 0.05 ** (trials - k) for k in below) < 0.025
+    # So many failures are the fewest with odds below 2.5 %: P(X >= 4 | 20) = 1.6 %, P(X >= 3 | 20) = 7.5 %.
+    assert [is_below_held(Proportion(hits, 20)) for hits in (16, 17)] == [True, False]
+    assert is_below_held(Proportion(9300, 10_000))  # its terms are beyond the range of a float
+
+
 ALL, MOST, FEW, TWO = Proportion(20, 20), Proportion(19, 20), Proportion(10, 20), Proportion(0, 2)
 
 
@@ -201,6 +219,8 @@ ALL, MOST, FEW, TWO = Proportion(20, 20), Proportion(19, 20), Proportion(10, 20)
         ({1.0: Proportion(18, 20), 2.0: ALL, 3.0: TWO}, None, (None, 3.0)),
         ({1.0: None, 2.0: ALL, 3.0: TWO}, 2.0, (2.0, 3.0)),
         ({1.0: ALL, 2.0: TWO, 3.0: ALL}, 1.0, (1.0, 2.0)),
+        ({1.0: ALL, 2.0: Proportion(17, 20), 3.0: Proportion(16, 20)}, 1.0, (1.0, 3.0)),  # 17 of 20 may be 95 %
+        ({1.0: Proportion(1, 1), 2.0: Proportion(0, 1)}, 1.0, (1.0, 2.0)),  # the only start decides
     ],
 )
 def test_bounds_are_the_levels_at_which_survival_is_certain(survived, limit, bounds):

@@ -138,10 +138,11 @@ def test_work_bounds_the_starts_and_one_start_is_the_scene_as_it_is() -> None:
     crowd = run_preflight(scene_of(plane=[FLOOR], ball=balls), engine="pymunk").tried
     assert crowd is not None
     assert 1 < crowd.starts < 15
+    assert (crowd.asked, crowd.limited_by) == (30, "more would exceed the counted work of 1 s")
     assert not crowd.whole
     alone = run_preflight(bullet(12.0), engine="pymunk", starts=1)
     assert alone.tried is not None
-    assert alone.tried.starts == 1
+    assert (alone.tried.starts, alone.tried.asked, alone.tried.limited_by) == (1, 1, None)
     passed = run(bullet(12.0), "pymunk").missed_contacts
     assert [each.is_observed for each in alone.warnings] == [True] * passed
 

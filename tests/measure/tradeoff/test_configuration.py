@@ -1,5 +1,6 @@
 """Configurations: their neighbours and limits, and frames at times of the truth."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -7,9 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.tradeoff.configuration import MAX_REFINEMENT, MIN_REFINEMENT, MIN_STEPS, Configuration, SearchSpace
+from sandbox.measure.tradeoff.configuration import (
+    MAX_REFINEMENT,
+    MIN_REFINEMENT,
+    MIN_STEPS,
+    Configuration,
+    Evaluation,
+    SearchSpace,
+    with_estimated_costs,
+)
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
+from tests.measure.tradeoff.evaluations_by_hand import point_of
 from tests.runs_by_hand import BALLS, DROP, SWING, scene_of
 
 REFINEMENTS = st.sampled_from([Fraction(2) ** k for k in range(-4, 9)])
@@ -116,3 +126,16 @@ def test_configurations_out_of_range_are_invalid() -> None:
         assert not space.is_valid(configuration)
     tiny = space_of(dt=1e-8)
     assert not tiny.is_valid(Configuration("pymunk", Fraction(16)))  # dt below its minimum
+
+
+def test_setting_that_was_not_timed_costs_as_much_for_its_work_as_the_nearest_timed_one() -> None:
+    def point(cost: float, counted: float, repeats: int, engine: str = "reference") -> Evaluation:
+        return replace(point_of(cost, 0.1, engine, counted, repeats), counted_seconds=1e-3 * counted)
+
+    timed = [point(30.0, 10.0, 5), point(200.0, 100.0, 5), point(1.0, 50.0, 5, "pymunk")]
+    recorded = [point(0.4, 20.0, 0), point(0.4, 80.0, 0), point(0.4, 20.0, 0, "box2d")]
+    found = with_estimated_costs([*timed, *recorded])
+    assert found[:3] == timed
+    assert [each.cost for each in found[3:5]] == pytest.approx([60.0, 160.0], rel=1e-12)  # rounding
+    assert [each.cost_median for each in found[3:5]] == pytest.approx([60.0, 160.0], rel=1e-12)
+    assert found[5].cost == 0.4  # no setting of its engine was timed
