@@ -20,6 +20,7 @@ from sandbox.measure.advice.result import (
     ReplayedActions,
 )
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore
+from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.ground_truth import Truth
 from sandbox.measure.compare.metrics import METRICS, EvaluationContext
 from sandbox.measure.fresh_starts import FreshStarts
@@ -47,6 +48,7 @@ class AdviceMeasurements:
     recommended: Evaluation | None = None
     fallback: Evaluation | None = None
     fallback_kind: FallbackKind | None = None
+    ends: EndStatistics | None = None
     knob_start: KnobStart | None = None
     knobs: list[Evaluation] = field(default_factory=list)
     others: dict[str, Evaluation] = field(default_factory=dict)
@@ -124,6 +126,7 @@ def assemble_advice(request: AdviceRequest, score: AdviceScore, measured: Advice
         starts_about=str(Starts(scene, request.spread)) if found is not None and found.starts > 1 else None,
         fallback=fallback,
         fallback_kind=measured.fallback_kind,
+        ends=measured.ends,
         remaining_risks=_remaining_risks(request, chosen),
         knob_start=measured.knob_start,
         knob_setting=None if measured.start is None else _measured_setting(measured.start, score, measured, request),

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.advice.forecast import Risk
 from sandbox.measure.advice.game_code import GameCode
+from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.metrics import WorstError
 from sandbox.measure.fresh_starts import FreshStarts
 from sandbox.measure.proportion import Proportion
@@ -179,6 +180,9 @@ class Advice:
     fallback_kind: FallbackKind | None
     """choice of the fallback: the cheapest that keeps the `invariant`, the most accurate within the `budget`, the most
     accurate of all (`accuracy`), or the cheapest within the tolerance, which misses contacts with the `actions`"""
+    ends: EndStatistics | None
+    """statistics of the end of the recommended setting, or of a fallback that keeps the `invariant`, over fresh starts;
+    None if positions are predictable, or they are not known"""
     remaining_risks: tuple[Risk, ...]
     """forecast for the recommended setting, or for the fallback without one"""
     knob_start: KnobStart | None

@@ -22,11 +22,12 @@ from sandbox.measure.advice.forecast import forecast, game_notes
 from sandbox.measure.advice.replays import replay_actions
 from sandbox.measure.advice.result import Advice, FallbackKind
 from sandbox.measure.advice.scoring import SAME_STEP, AdviceRequest, AdviceScore, find_score
+from sandbox.measure.compare.end_statistics import end_ensemble
 from sandbox.measure.compare.metrics import METRICS
 from sandbox.measure.run.bounded_run import bounded_run
 from sandbox.measure.run.recorder import require_memory
 from sandbox.measure.run.sessions import recorded_scene
-from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS
+from sandbox.measure.starts import DEFAULT_SPREAD, DEFAULT_STARTS, Starts
 from sandbox.measure.tradeoff.configuration import (
     MIN_STEPS,
     Configuration,
@@ -43,6 +44,7 @@ from sandbox.measure.tradeoff.recommendation import (
     recommend_most_accurate,
 )
 from sandbox.measure.tradeoff.search import MIN_RUN_COST, RUN_FRACTION
+from sandbox.measure.tradeoff.start_trials import ENDS_FRACTION, StartTrials
 from sandbox.measure.tradeoff.study import (
     DEFAULT_EFFORT,
     DEFAULT_REPEATS,
@@ -233,21 +235,48 @@ def _search(request: AdviceRequest, score: AdviceScore, measured: AdviceMeasurem
                 measured.others[name] = best.point
             continue
         measured.recommended = None if cheapest is None else cheapest.point
-        measured.fallback, measured.fallback_kind = _fallback(points, objective, score, cheapest is not None)
+        if cheapest is not None and not _has_actions(request):  # with actions, replays may choose another one
+            measured.ends = cheapest.point.end_statistics
+        trials = None if cheapest is not None else _end_trials(request, score, objective)
+        measured.fallback, measured.fallback_kind = _fallback(points, objective, score, trials)
+        if measured.fallback_kind == "invariant" and measured.fallback is not None and trials is not None:
+            measured.ends = trials.end_statistics(measured.fallback, fresh=True)
+
+
+def _has_actions(request: AdviceRequest) -> bool:
+    return request.recording is not None and bool(request.recording.actions)
+
+
+def _end_trials(request: AdviceRequest, score: AdviceScore, objective: Objective) -> StartTrials:
+    """Return the trials that compare the ends of settings over perturbed starts; none for a recording with actions."""
+    scene, base = request.scene, request.loop
+    drawn = Starts(scene, request.spread, max(base.dt, request.frame))
+    count = request.starts if drawn.can_vary and not _has_actions(request) else 1
+    ends = end_ensemble(score.context, drawn, base, count, ENDS_FRACTION * request.effort, request.length)
+    space = SearchSpace(scene, base, (request.engine,), request.frame, has_fixed_dt=True)
+    known = space, score.context, objective, drawn, count, request.length, request.effort, request.deadline
+    return StartTrials(*known, *(ends or (None, 0)))
 
 
 def _fallback(
-    points: Sequence[Evaluation], objective: Objective, score: AdviceScore, has_cheapest: bool
+    points: Sequence[Evaluation], objective: Objective, score: AdviceScore, trials: StartTrials | None
 ) -> tuple[Evaluation | None, FallbackKind | None]:
     """Return another setting, in case that the recommended one is missing or over the budget.
 
-    In a chaotic scene without a setting within the tolerance it is the cheapest that keeps the invariant, because
-    position errors there are as large with any setting.
+    In a chaotic scene without a setting within the tolerance it is the cheapest that keeps the invariant and ends like
+    the truth, because position errors there are as large with any setting.
+
+    Args:
+        points: settings that were tried.
+        objective: metric, tolerance and budget.
+        score: truth and invariant.
+        trials: compare the ends of settings; None if a setting is recommended.
     """
-    if not has_cheapest and score.invariant is not None and score.invariant_tolerance is not None:
+    has_cheapest = trials is None
+    if trials is not None and score.invariant is not None and score.invariant_tolerance is not None:
         by_invariant = [replace(point, error=point.metrics.get(score.invariant)) for point in points]
         other = objective._replace(metric=METRICS[score.invariant], tolerance=score.invariant_tolerance)
-        kept = recommend_cheapest(by_invariant, other, lambda _: True, lambda _: None)
+        kept = recommend_cheapest(by_invariant, other, trials.ends_like_the_truth, lambda _: None)
         is_affordable = kept is not None and (
             objective.budget is None or kept.point.frame_time(objective.fps) <= objective.budget
         )

@@ -84,6 +84,8 @@ def figures_text(advice: Advice, setting: MeasuredSetting) -> str:
         parts.append(f"the largest is that of {setting.worst.body!r} at {setting.worst.time:.3g} s, ({x:.4g}, {y:.4g})")
     if advice.invariant is not None and setting.invariant is not None:
         parts.append(f"{advice.invariant} to the end {setting.invariant:.3g}")
+    if advice.ends is not None and setting is advice.chosen:
+        parts.append(str(advice.ends))
     return "; ".join([*parts, *cost_parts(advice, setting)])
 
 

@@ -229,9 +229,9 @@ class Tradeoff(StudyAgainstTruth):
     def ends_about(self) -> str | None:
         """How the time is judged in which positions are unpredictable, as one sentence; None if there is none.
 
-        With a metric that was requested, only that metric counts.
+        An invariant that was requested counts alone.
         """
-        is_requested = self.metric_reason == REQUESTED
+        is_requested = self.metric_reason == REQUESTED and not self.metric.is_difference
         if self.best is None or self.best.trusted_until >= self.duration or is_requested:
             return None
         after = f"after {self.best.trusted_until:.3g} s positions are unpredictable"

@@ -100,10 +100,10 @@ class StartTrials:
 
         Its ends do not differ from the truth's, if they are compared and the effort allows it.
         """
-        if not self._is_within_tolerance(point):
-            return False
-        if self.ends is None:
-            return True
+        return self._is_within_tolerance(point) and self.ends_like_the_truth(point)
+
+    def ends_like_the_truth(self, point: Evaluation) -> bool:
+        """Return whether no difference of the ends is known, over the starts that decide."""
         ends = self.end_statistics(point, fresh=False)
         return ends is None or ends.is_alike
 

@@ -110,8 +110,9 @@ def tradeoff(
         engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
             point with the reason.
         metric: metric of the error (`metrics.METRICS`); default: the largest distance from the truth if the truth is
-            trusted to the end. Otherwise it is an invariant of the scene, and a recommended setting also has ends that
-            do not differ from those of the truth's method over the starts (`EndStatistics`), as far as `effort` allows.
+            trusted to the end, otherwise an invariant of the scene. If the truth is not trusted to the end, a
+            recommended setting also has ends that do not differ from those of the truth's method over the starts
+            (`EndStatistics`), as far as `effort` allows, unless an invariant was requested.
         tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
             no missed contact.
         margin: fraction of the tolerance that a recommended setting has to leave unused: with 0.2 its error is at most
@@ -178,7 +179,7 @@ def tradeoff(
     space = SearchSpace(scene, base, able, 1.0 / fps, has_fixed_dt)
     count = starts if drawn.can_vary else 1
     ends = None
-    if metric is None:
+    if metric is None or metric_named(metric).is_difference:  # these say nothing of the time after the horizon
         ends = end_ensemble(context, drawn, base, count, ENDS_FRACTION * effort, truth_tolerance)
     study = _Study(
         space=space,
@@ -325,7 +326,7 @@ class _Study:
         if repeats and self.is_explained and clock_without_compilation() < self.deadline:
             self.on_progress(Progress("running the settings of the table from other starts"))
             points = self._with_fresh_starts(points, list(filter(None, picks)))
-        if repeats and self.is_explained and self.trials.ends is not None:
+        if repeats and self.trials.ends is not None:
             self.on_progress(Progress("comparing the ends of runs from other starts"))
             points = self._with_end_statistics(points, list(filter(None, picks)))
         context = self.context
@@ -439,11 +440,11 @@ class _Study:
         return [replace(each, fresh_starts=found.get(each.configuration)) for each in points]
 
     def _with_end_statistics(self, points: Sequence[Evaluation], picks: Sequence[Recommendation]) -> list[Evaluation]:
-        """Return the points, those with the scene's settings and the recommended ones with statistics of the end."""
+        """Return the points, the recommended ones and, if explained, the scene's own with statistics of the end."""
         chosen = {pick.point.configuration for pick in picks}
         return [
             replace(each, end_statistics=self.trials.end_statistics(each, fresh=True))
-            if each.status == "ok" and (each.is_own or each.configuration in chosen)
+            if each.status == "ok" and ((each.is_own and self.is_explained) or each.configuration in chosen)
             else each
             for each in points
         ]
