@@ -121,7 +121,7 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
 def _print_end_statistics(comparison: Comparison) -> None:
     """Print a table of the observables of the end over perturbed starts, of the truth and of each row."""
     rows = [(row.name, row.end_statistics) for row in comparison.rows if row.end_statistics is not None]
-    names = dict.fromkeys(each.name for _, ends in rows for each in ends.statistics if not each.is_constant)
+    names = dict.fromkeys(each.name for _, ends in rows for each in ends.statistics if not each.compared.is_constant)
     if not names or not comparison.same_scene:
         return
     table = new_table()

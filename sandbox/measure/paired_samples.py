@@ -61,6 +61,11 @@ class PairedDifference:
     p_value: float
     """probability of a Kolmogorov–Smirnov distance as large as that of the samples if the distributions are equal"""
 
+    @property
+    def is_constant(self) -> bool:
+        """Whether all values of both samples are equal, such as counts of 0."""
+        return self.deviation == self.other_deviation == self.difference == 0.0
+
     @classmethod
     def of(cls, values: Sequence[float] | FloatArray, others: Sequence[float] | FloatArray) -> Self:
         """Compare two samples.

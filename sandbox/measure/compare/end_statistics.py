@@ -8,7 +8,8 @@ differences that nobody can see do not count.
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -30,6 +31,10 @@ MIN_END_STARTS = 8
 """Fewest starts of a comparison: with fewer, an exchange test can find no difference among several measures."""
 MAX_P_VALUE = 0.05
 """Probability, adjusted for the number of measures, below which distributions differ"""
+EARLY_STARTS = 10
+"""Starts after which a setting may be known to differ"""
+EARLY_P_VALUE = 0.01
+"""Adjusted probability for that: such an early look adds at most 1 % to the settings that are rejected by chance"""
 MAX_COARSENING = 4
 """Largest factor by which the step of the truth's method is lengthened so that its runs cost less. Distributions
 converge with the step far sooner than positions do."""
@@ -56,11 +61,6 @@ class EndStatistic:
     """p-value, adjusted for the number of measures"""
 
     json_properties: ClassVar = ("differs",)
-
-    @property
-    def is_constant(self) -> bool:
-        """Whether all values of both are equal, such as 0 broken joints."""
-        return self.compared.deviation == self.compared.other_deviation == self.compared.difference == 0.0
 
     @property
     def text(self) -> str:
@@ -166,7 +166,9 @@ class EndEnsemble:
         context = EvaluationContext(self.starts.scene, None)
         return tuple(each for each in END_MEASURES if each.applies(context))
 
-    def compare(self, engine: str, settings: Settings, numbers: range, cost: float = math.inf) -> EndStatistics | None:
+    def compare(
+        self, engine: str, settings: Settings, numbers: range, cost: float = math.inf, *, stops_early: bool = False
+    ) -> EndStatistics | None:
         """Compare the ends of a setting with those of the truth's method; None if too few runs of the latter succeed.
 
         Args:
@@ -174,29 +176,51 @@ class EndEnsemble:
             settings: the setting.
             numbers: of the starts.
             cost: expected counted cost of one run, s; one that costs far more is stopped and counts as failed.
+            stops_early: stop once a run failed, or after `EARLY_STARTS` starts if these show a clear difference.
         """
-        expected = [(number, self._reference_end(number)) for number in numbers]
-        known = [(number, values) for number, values in expected if values is not None]
-        if len(known) < MIN_END_STARTS:
+        found = EndStatistics(0, 0, ())
+        both: list[tuple[FloatArray, FloatArray]] = []
+        for number in numbers:
+            expected = self._reference_end(number)
+            if expected is None:
+                continue
+            own = self._end(engine, settings, number, COST_MARGIN * cost)
+            both += [] if own is None else [(own, expected)]
+            found = replace(found, starts=found.starts + 1, failed=found.failed + (own is None))
+            if stops_early and (found.failed or (found.starts == EARLY_STARTS and self._differs_early(both))):
+                break
+        if found.starts < MIN_END_STARTS and not found.failed:
             return None
-        found = [self._end(engine, settings, number, COST_MARGIN * cost) for number, _ in known]
-        both = [(own, other) for own, (_, other) in zip(found, known, strict=True) if own is not None]
-        failed = len(known) - len(both)
-        own, other = (np.array([pair[side] for pair in both]) for side in (0, 1))
-        return EndStatistics(len(known), failed, self._statistics(own, other) if len(both) >= MIN_END_STARTS else ())
+        return replace(found, statistics=self._statistics(both))
 
-    def _statistics(self, own: FloatArray, other: FloatArray) -> tuple[EndStatistic, ...]:
-        """Return the statistics of the measures, (n, k) each, of which enough are defined."""
+    def _differs_early(self, both: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
+        """Return whether the first starts show a difference that more starts would hardly take back."""
+        return any(each.differs and each.adjusted_p_value <= EARLY_P_VALUE for each in self._statistics(both))
+
+    def _statistics(self, both: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[EndStatistic, ...]:
+        """Return the statistics of the measures of which enough are defined.
+
+        Args:
+            both: measures of the setting and of the truth's method from each start, (k,) each.
+        """
+        if len(both) < MIN_END_STARTS:
+            return ()
+        own, other = (np.array([pair[side] for pair in both]) for side in (0, 1))
         compared: list[tuple[EndMeasure, PairedDifference]] = []
         for k, measure in enumerate(self.measures):
             defined = ~(np.isnan(own[:, k]) | np.isnan(other[:, k]))
             if defined.sum() >= MIN_END_STARTS:
                 compared.append((measure, PairedDifference.of(own[defined, k], other[defined, k])))
         tolerances = {"m": self.tolerance, "m/s": self.tolerance / SETTLING_TIME, "": 0.0}
-        adjusted = adjusted_p_values([each.p_value for _, each in compared])
+        # A measure whose values are all equal cannot differ and does not count as a test (R. E. Tarone, A modified
+        # Bonferroni method for discrete data, Biometrics 46 (1990) 515-522).
+        tested = [each.p_value for _, each in compared if not each.is_constant]
+        adjusted = iter(adjusted_p_values(tested))
         return tuple(
-            EndStatistic(each.name, each.unit, each.about, found, tolerances[each.unit], p_value)
-            for (each, found), p_value in zip(compared, adjusted, strict=True)
+            EndStatistic(
+                each.name, each.unit, each.about, own, tolerances[each.unit], 1.0 if own.is_constant else next(adjusted)
+            )
+            for each, own in compared
         )
 
     def _reference_end(self, number: int) -> FloatArray | None:

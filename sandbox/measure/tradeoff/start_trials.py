@@ -28,8 +28,9 @@ STARTS_FRACTION = 0.3
 FRONT_FRACTION = 0.5
 """Fraction of the effort for the starts from which the shown points of the fronts are run, all together."""
 ENDS_FRACTION = 1.0
-"""Fraction of the effort for the runs of the truth's method whose ends decide, for those whose ends are shown, and for
-those of the settings in either"""
+"""Fraction of the effort for the runs of the truth's method whose ends decide, and for those whose ends are shown"""
+SETTINGS_ENDS_FRACTION = 0.5
+"""Fraction of the effort for the runs of the settings that are compared with either"""
 MIN_STARTS = 3
 """Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
 TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
@@ -117,13 +118,13 @@ class StartTrials:
         key = point.configuration, fresh
         if self.ends is not None and key not in self._ends:
             first, cost = self.count if fresh else 0, point.counted_seconds
-            left = ENDS_FRACTION * self.effort - self._ends_spent[fresh]
+            left = SETTINGS_ENDS_FRACTION * self.effort - self._ends_spent[fresh]
             count = min(self.end_count, math.floor(left / cost)) if cost > 0.0 else self.end_count
             if count < MIN_END_STARTS or clock_without_compilation() >= self.deadline:
                 return None
             self._ends_spent[fresh] += count * cost
             numbers = range(first + 1, first + 1 + count)
-            self._ends[key] = self.ends.compare(point.engine, point.asked, numbers, cost)
+            self._ends[key] = self.ends.compare(point.engine, point.asked, numbers, cost, stops_early=not fresh)
         return self._ends.get(key)
 
     def _is_within_tolerance(self, point: Evaluation) -> bool:

@@ -79,7 +79,7 @@ def test_engine_that_loses_energy_ends_slower_than_the_truth_and_another_one_doe
     assert str(slower).startswith("its ends differ from the truth's over 24 starts: speed −")
     itself = ensemble.compare("exact", ensemble.settings, range(1, count + 1))
     assert itself is not None
-    assert all(each.is_constant or each.compared.difference == 0.0 for each in itself.statistics)
+    assert all(each.compared.is_constant or each.compared.difference == 0.0 for each in itself.statistics)
 
 
 @pytest.mark.fail_slow(120)  # two searches, and runs from other starts
