@@ -49,12 +49,11 @@ from sandbox.cli.tables import (
 from sandbox.columns import TRUTH, Column, shown
 from sandbox.formatting import format_plural
 from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
-from sandbox.measure.compare.columns import COLUMNS, ONE_SIDED
+from sandbox.measure.compare.columns import COLUMNS, END_LEGEND, ONE_SIDED, end_table
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.compare.result import short_key, value_text
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.run.run_warnings import joint_order_limit
-from sandbox.measure.starts import Starts
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError, combinations
 
@@ -68,7 +67,6 @@ LEGEND = (
     "contacts: also in the truth; truth only, run only: in one of the two alone; -v: more columns",
 )
 """Short meanings of the columns."""
-END_LEGEND = "≠: differs from the truth in distribution (exchange test, 5 %), by more than the tolerance"
 NAMES = {
     "engine": "the physics engine",
     "dt": "time step of a frame, s",
@@ -115,31 +113,20 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
         print_legend(heads_of(table), NAMES | meanings)
     for line in _lines_below_table(comparison, why, refusals, not verbose):
         print_line(line)
-    _print_end_statistics(comparison)
+    _print_ends(comparison)
 
 
-def _print_end_statistics(comparison: Comparison) -> None:
-    """Print a table of the observables of the end over perturbed starts, of the truth and of each row."""
-    rows = [(row.name, row.end_statistics) for row in comparison.rows if row.end_statistics is not None]
-    names = dict.fromkeys(each.name for _, ends in rows for each in ends.statistics if not each.compared.is_constant)
-    if not names or not comparison.same_scene:
-        return
-    table = new_table()
-    add_columns(table, ["end, mean ± deviation"])
-    add_columns(table, ["truth", *(name for name, _ in rows)], "right")
-    for name in names:
-        found = [next((each for each in ends.statistics if each.name == name), None) for _, ends in rows]
-        known = next(each for each in found if each is not None)
-        table.add_row(
-            name.replace("_", " ") + (f", {known.unit}" if known.unit else ""),
-            known.truth_text,
-            *("–" if each is None else each.text for each in found),
-        )
-    print_table(table, keys=1)
-    print_line(
-        f"{END_LEGEND}; from {format_plural(max(ends.starts for _, ends in rows), 'start')} with "
-        f"{Starts(comparison.scene, comparison.spread)}"
-    )
+def _print_ends(comparison: Comparison) -> None:
+    """Print the measures of the end over perturbed starts, of the truth and of each row, if they were compared."""
+    heads, rows = end_table(comparison)
+    if rows:
+        table = new_table()
+        add_columns(table, heads[:1])
+        add_columns(table, heads[1:], "right")
+        for row in rows:
+            table.add_row(*row)
+        print_table(table, keys=2)
+        print_line(END_LEGEND)
 
 
 def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
@@ -155,6 +142,8 @@ def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend
     if legend and after:
         counts = ", ".join(f"{name} {count:,}" for name, count in after.items())
         lines.append(f"contacts after one of their bodies has diverged, which are not matched: {counts}")
+    if comparison.starts_about is not None:
+        lines.append(comparison.starts_about)
     lines += [*_accuracy_lines(comparison), *_joint_order(comparison)]
     for row in comparison.rows:
         if refusals and row.status == "refused":
@@ -263,7 +252,7 @@ class _Request(NamedTuple):
     help="position error at which a run counts as diverged, m; default: 1 % of the smallest ball's radius",
 )
 @starts_option(
-    "also run from N perturbed starts: errors over them, or where positions are unpredictable, statistics of the end",
+    "also run from N perturbed starts: errors over them, or where the truth ends early, statistics of the ends",
     default=1,
 )
 @spread_option

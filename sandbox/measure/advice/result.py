@@ -182,7 +182,7 @@ class Advice:
     accurate of all (`accuracy`), or the cheapest within the tolerance, which misses contacts with the `actions`"""
     ends: EndStatistics | None
     """statistics of the end of the recommended setting, or of a fallback that keeps the `invariant`, over fresh starts;
-    None if positions are predictable, or they are not known"""
+    None if the truth is trusted to the end, or they are not known"""
     remaining_risks: tuple[Risk, ...]
     """forecast for the recommended setting, or for the fallback without one"""
     knob_start: KnobStart | None

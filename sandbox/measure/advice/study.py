@@ -255,7 +255,7 @@ def _end_trials(request: AdviceRequest, score: AdviceScore, objective: Objective
     ends = end_ensemble(score.context, drawn, base, count, ENDS_FRACTION * request.effort, request.length)
     space = SearchSpace(scene, base, (request.engine,), request.frame, has_fixed_dt=True)
     known = space, score.context, objective, drawn, count, request.length, request.effort, request.deadline
-    return StartTrials(*known, *(ends or (None, 0)))
+    return StartTrials(*known, ends)
 
 
 def _fallback(
@@ -282,7 +282,7 @@ def _fallback(
         )
         if kept is not None and is_affordable:
             return next(point for point in points if evaluation_key(point) == evaluation_key(kept.point)), "invariant"
-    affordable = recommend_most_accurate(points, objective, lambda _: None)
+    affordable = recommend_most_accurate(points, objective, lambda _: True, lambda _: None)
     if affordable is not None:
         return affordable.point, "budget"
     nearest = None if has_cheapest else nearest_to_tolerance(points, objective)

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from dataclasses import fields
 
 from sandbox.columns import TRUTH, Column
+from sandbox.formatting import UNKNOWN
 from sandbox.measure.compare.end_statistics import EndStatistics
 from sandbox.measure.compare.metrics import METRICS
-from sandbox.measure.compare.result import Row, Score
+from sandbox.measure.compare.result import Comparison, Row, Score
 
 
 def _error(name: str) -> Column[Row]:
@@ -39,16 +40,19 @@ def _start_error(quantile: str) -> Callable[[Row], float | None]:
     return value
 
 
-END_ABOUT = "observables of the end whose distribution over perturbed starts differs from that of the truth"
+END_ABOUT = (
+    "measures of the end whose distribution over perturbed starts differs from that of the truth; in brackets the "
+    "number of starts"
+)
 
 
 def ends_text(ends: EndStatistics | None) -> str | None:
-    """Return the observables of the end that differ from those of the truth over perturbed starts."""
+    """Return the measures of the end that differ from the truth's over perturbed starts, and the number of starts."""
     if ends is None:
         return None
-    if ends.failed:
-        return f"{ends.failed} failed"
-    return ", ".join(f"{each.name.replace('_', ' ')}" for each in ends.differing) or "nothing"
+    names = [f"{ends.failed} failed"] if ends.failed else []
+    names += [each.name.replace("_", " ") for each in ends.differing]
+    return f"{', '.join(names) or 'nothing'} ({ends.starts})"
 
 
 def _divergence(row: Row) -> float | str | None:
@@ -96,3 +100,27 @@ COLUMNS: tuple[Column[Row], ...] = (
 """Columns of the table and of the page of a comparison, but for those that name a row."""
 ONE_SIDED = {"missed": "truth only", "phantom": "run only"}
 """Heads of unmatched contacts by their JSON names. `run` has another meaning of missed: tunnelling."""
+
+END_HEAD = "end, mean ± deviation"
+"""Head of the first column of `end_table`"""
+END_LEGEND = "≠: differs from the truth in distribution (exchange test, 5 %), by more than the tolerance"
+
+
+def end_table(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Return the heads and rows of a table of the ends of runs over perturbed starts: each measure that varies.
+
+    There are none without other starts, or of a sweep, whose values have truths of their own.
+    """
+    compared = [(row.name, row.end_statistics) for row in comparison.rows if row.end_statistics is not None]
+    if any(row.set for row in comparison.rows):
+        return [], []
+    names = dict.fromkeys(
+        each.name for _, ends in compared for each in ends.statistics if not each.compared.is_constant
+    )
+    rows: list[list[str]] = []
+    for name in names:
+        found = [next((each for each in ends.statistics if each.name == name), None) for _, ends in compared]
+        known = next(each for each in found if each is not None)
+        head = name.replace("_", " ") + (f", {known.unit}" if known.unit else "")
+        rows.append([head, known.truth_text, *(UNKNOWN if each is None else each.text for each in found)])
+    return [END_HEAD, TRUTH, *(name for name, _ in compared)] if rows else [], rows

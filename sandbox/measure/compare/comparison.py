@@ -9,10 +9,11 @@ from typing import Unpack
 import numpy as np
 
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named
+from sandbox.formatting import format_plural
 from sandbox.measure.compare.attribution import one_at_a_time, verdict
 from sandbox.measure.compare.contact_matching import match_contacts
-from sandbox.measure.compare.end_statistics import end_ensemble
-from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.compare.end_statistics import MIN_END_STARTS, end_ensemble
+from sandbox.measure.compare.ground_truth import Truth, find_truth, run_cost, truth_cost
 from sandbox.measure.compare.metrics import EvaluationContext
 from sandbox.measure.compare.result import (
     Comparison,
@@ -40,8 +41,8 @@ from sandbox.schedule import with_whole_steps
 from sandbox.signals import defer_interrupt
 from sandbox.trajectory import Trajectory
 
-START_EFFORT = 60.0
-"""Counted work that the runs of the truth's method from other starts may take, s"""
+START_EFFORT = 120.0
+"""Counted work of the runs and truths of other starts of a variant, s"""
 MAX_REPEATED_SECONDS = 5.0
 """s: a run no longer than this is timed a second time, because the first may have loaded compiled code from disk."""
 NEGLIGIBLE = 1e-6
@@ -69,7 +70,7 @@ def compare(
     taken to the next one, so that all runs end at the same time.
 
     With several `starts`, each row also has its errors over perturbed starts (`Starts`), each against a truth of its
-    own; or, if positions are unpredictable before the end, the statistics of the end against those of the truth's
+    own; or, if the truth is not trusted to the end, the statistics of the end against those of the truth's
     method (`EndStatistics`).
 
         sandbox.compare(scene, sweep={"solver.integrator": ["explicit_euler", "velocity_verlet", "rk4"]})
@@ -85,8 +86,8 @@ def compare(
         why: rerun each engine whose error is not negligible with other settings, and report the changes that lower the
             error.
         truth: truth of this scene, with its frames and the tolerance, if already known; not with a sweep.
-        starts: number of perturbed starts, besides that in the scene; 1: none. There are fewer if the runs of the
-            truth's method would take more than `START_EFFORT`.
+        starts: number of perturbed starts, besides that in the scene; 1: none. There are fewer if their runs and
+            truths would take more counted work than `START_EFFORT`.
         spread: largest change of a start, as a fraction: 0.01 moves bodies by up to 1 % of the smallest half width.
         on_progress: progress callback; its message describes each stage.
         settings: changes to the scene's `[solver]`, such as `dt=0.001`.
@@ -191,8 +192,9 @@ def compare_variants(
         for variant, own, names in plan:
             scoring.score_variant(variant, own, names)
         if starts > 1:
+            longest = max(own.dt for own in wanted)
             for variant, own, _ in plan:
-                scoring.score_starts(variant, own, Starts(variant.scene, spread, own.dt), starts)
+                scoring.score_starts(variant, own, Starts(variant.scene, spread, longest), starts)
     except KeyboardInterrupt:
         if not scoring.rows:
             raise
@@ -211,7 +213,19 @@ def compare_variants(
         same_scene=same_scene,
         starts=starts,
         spread=spread,
+        starts_about=scoring.starts_about,
     )
+
+
+def _affordable(effort: float, cost: float, count: int) -> int:
+    """Return how many of some starts an effort allows, s, if each costs some counted work, s."""
+    return min(count, math.floor(effort / cost)) if cost > 0.0 else count
+
+
+def _starts_text(what: str, count: int, asked: int, starts: Starts) -> str:
+    """Return from how many perturbed starts something is, and how they differ."""
+    fewer = "" if count == asked else f", not {asked:,}, which would exceed the counted work of {START_EFFORT:g} s"
+    return f"{what} from {format_plural(count, 'perturbed start')}{fewer}, with {starts}"
 
 
 @dataclass
@@ -228,6 +242,8 @@ class _Scoring:
     rows: list[Row] = field(default_factory=list)
     runs: dict[str, Trajectory] = field(default_factory=dict)
     row_truths: dict[str, Truth | None] = field(default_factory=dict)
+    starts_about: str | None = None
+    """perturbed starts that were run, or the reason why there are none"""
 
     def score_variant(self, variant: Variant, settings: Settings, engines: Sequence[str]) -> None:
         """Find the truth of a variant, and run and score each engine."""
@@ -246,26 +262,46 @@ class _Scoring:
                     self.runs[row.name] = run
 
     def score_starts(self, variant: Variant, settings: Settings, starts: Starts, count: int) -> None:
-        """Run each engine that reached its end from a number of perturbed starts too."""
-        truth = self._truth(variant.scene, settings)
-        if truth is None or not starts.can_vary:
+        """Run each engine that reached its end from perturbed starts too, as many as `START_EFFORT` allows."""
+        scene, truth = variant.scene, self._truth(variant.scene, settings)
+        rows = [k for k, row in enumerate(self.rows) if row.set == variant.set and row.status == "ok"]
+        rows = [k for k in rows if not self.rows[k].is_truth]
+        if truth is None or not rows or not starts.can_vary:
+            self.starts_about = "no other starts: " + ("no truth is known" if truth is None else "none would differ")
             return
-        context = EvaluationContext(variant.scene, truth)
-        is_chaotic = truth.trusted_until < variant.scene.world.duration
-        found = end_ensemble(context, starts, settings, count, START_EFFORT, self.tolerance) if is_chaotic else None
-        truths: dict[int, EvaluationContext] = {}
-        for k, row in enumerate(self.rows):
-            if row.set != variant.set or row.status != "ok" or (is_chaotic and found is None):
-                continue
-            self.report(Progress(f"{row.name}: from other starts"))
-            if found is not None:
-                ensemble, affordable = found
-                ends = ensemble.compare(row.engine, settings, range(1, affordable + 1))
-                self.rows[k] = replace(row, end_statistics=ends)
-            else:
-                errors = [self._error(row.engine, settings, starts, n, truths) for n in range(1, count + 1)]
-                known = [error for error in errors if not math.isnan(error)]
-                self.rows[k] = replace(row, start_errors=FreshStarts.of(known, self.tolerance))
+        cost = sum(run_cost(scene, self.runs[self.rows[k].name]) for k in rows)
+        if truth.trusted_until < scene.world.duration:
+            self._score_ends(rows, settings, starts, truth, count, cost)
+            return
+        affordable = _affordable(START_EFFORT, truth_cost(scene, truth) + cost, count)
+        known: dict[int, EvaluationContext] = {}
+        for k in rows if affordable else ():
+            row = self.rows[k]
+            self.report(Progress(f"{row.name}: from {affordable} other starts"))
+            errors = [self._error(row.engine, settings, starts, n, known) for n in range(1, affordable + 1)]
+            found = FreshStarts.of([error for error in errors if not math.isnan(error)], self.tolerance)
+            self.rows[k] = replace(row, start_errors=found)
+        self.starts_about = _starts_text("median, 95 %: of the max errors", affordable, count, starts)
+
+    def _score_ends(
+        self, rows: Sequence[int], settings: Settings, starts: Starts, truth: Truth, count: int, cost: float
+    ) -> None:
+        """Compare the ends of rows, by their indices, with those of the truth's method; `cost` is that of all, s."""
+        context = EvaluationContext(starts.scene, truth)
+        affordable = _affordable(0.5 * START_EFFORT, cost, count)
+        ensemble = end_ensemble(context, starts, settings, affordable, 0.5 * START_EFFORT, self.tolerance)
+        if ensemble is None:
+            cause = f"that takes {MIN_END_STARTS} of them"
+            if count >= MIN_END_STARTS:
+                cause = f"{cause}, which exceed the counted work of {START_EFFORT:g} s"
+            self.starts_about = f"ends from other starts were not compared: {cause}"
+            return
+        for k in rows:
+            row = self.rows[k]
+            self.report(Progress(f"{row.name}: the ends of runs from {ensemble.count} other starts"))
+            ends = ensemble.compare(row.engine, settings, range(1, ensemble.count + 1))
+            self.rows[k] = replace(row, end_statistics=ends)
+        self.starts_about = _starts_text("end differs in: of the ends of runs", ensemble.count, count, starts)
 
     def _error(
         self, engine: str, settings: Settings, starts: Starts, number: int, known: dict[int, EvaluationContext]

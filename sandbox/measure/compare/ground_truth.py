@@ -6,7 +6,7 @@ it agrees. It need not become as accurate as the result itself: the change by it
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -23,7 +23,7 @@ from sandbox.measure.metrics.invariants import momentum_drift
 from sandbox.measure.metrics.perturbation import PERTURBATION, agreement_time, perturb
 from sandbox.measure.metrics.trajectory_error import Errors, default_tolerance, errors
 from sandbox.measure.preflight.predictability import event_warnings
-from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import Demand, demands
@@ -349,6 +349,24 @@ def _without_frames(settings: Settings) -> dict[str, object]:
 def frame_settings(settings: Settings) -> Settings:
     """Return settings with only the times of the frames; all other choices are left to the engine."""
     return Settings(dt=settings.dt, record_every=settings.record_every)
+
+
+TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
+"""Cost of a truth in that of its finest run: before it, dt is halved several times, and a second method and perturbed
+runs confirm it. That took 14 times the finest run for `chain_of_20`."""
+
+
+def run_cost(scene: Scene, run: Trajectory) -> float:
+    """Return the counted cost of a run of a scene by an engine, s."""
+    info = run.info
+    settings = Settings.model_validate(info["settings"])
+    return counted_cost(scene, info["engine"], settings, info["steps"], info["work"])
+
+
+def truth_cost(scene: Scene, truth: Truth) -> float:
+    """Return the counted cost of finding the truth of another start of a scene, s, from that of its own."""
+    runs = TRUTH_RUNS[truth.kind]
+    return runs * run_cost(scene, truth.trajectory) if runs else 0.0
 
 
 def truth_of(scene: Scene, settings: Settings, tolerance: float) -> Truth | None:

@@ -152,9 +152,9 @@ class Row:
     verdict: str | None = None
     """conclusion from `why`, as one sentence"""
     start_errors: FreshStarts | None = None
-    """largest position errors from perturbed starts, m; None without other starts, or if the motion is chaotic"""
+    """largest position errors from perturbed starts, m; None without them, or if the truth is not trusted to the end"""
     end_statistics: EndStatistics | None = None
-    """statistics of the end over perturbed starts; None without other starts, or if positions are predictable"""
+    """statistics of the end over perturbed starts; None without them, or if the truth is trusted to the end"""
 
     json_properties: ClassVar = (
         "matched_contacts",
@@ -291,6 +291,8 @@ class Comparison(StudyAgainstTruth):
     """number of perturbed starts that were asked for; 1: none"""
     spread: float = DEFAULT_SPREAD
     """largest change of a start, as a fraction (`Starts`)"""
+    starts_about: str | None = None
+    """perturbed starts that were run, or the reason why there are none; None if none were asked for"""
 
     json_head: ClassVar = (
         ("scene", "title"),

@@ -298,8 +298,8 @@ class Evaluation:
     fresh_starts: FreshStarts | None = None
     """errors from perturbed starts, of the points of a front that are shown; None if they are not known"""
     end_statistics: EndStatistics | None = None
-    """statistics of the end over fresh starts, of recommended settings and those of the scene, if positions are
-    unpredictable before the end; None if they are not known"""
+    """statistics of the end over fresh starts, of recommended settings and those of the scene, if the truth is not
+    trusted to the end; None if they are not known"""
     counted_seconds: float = field(default=0.0, metadata=in_json(omit=True))
     """s, counted cost of one run, the largest over the starts; of a stopped run, the limit"""
     spent_seconds: float = field(default=0.0, metadata=in_json(omit=True))

@@ -146,7 +146,7 @@ def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
     if context.truth is None:
         doubt = f"no truth is known{f' ({context.doubt})' if context.doubt else ''}"
     else:
-        doubt = f"positions are predictable for {context.until:.3g} s of {duration:.4g} s only"
+        doubt = f"the truth of positions is trusted for {context.until:.3g} s of {duration:.4g} s only"
     if has_constraints(scene.joint_arrays):
         return METRICS["joint_error"], f"{doubt}, and the scene has joints"
     if conserves_energy(scene):

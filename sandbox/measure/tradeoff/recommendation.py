@@ -49,22 +49,28 @@ def recommend_cheapest(
 
 
 def recommend_most_accurate(
-    points: Sequence[Evaluation], objective: Objective, confirm: Confirm
+    points: Sequence[Evaluation], objective: Objective, screen: Screen, confirm: Confirm
 ) -> Recommendation | None:
     """Return the evaluation with the smallest error, without objections, whose frames are within the budget, or None.
 
     Of equal errors it is the one with the least counted work.
+
+    Args:
+        points: the evaluations.
+        objective: metric, tolerance and budget.
+        screen: returns whether a configuration is acceptable from other starts.
+        confirm: returns its errors from starts that did not decide.
     """
     if objective.budget is None:
         return None
     candidates = [
         p for p in _eligible(points, objective) if not p.objections and p.frame_time(objective.fps) <= objective.budget
     ]
-    point = min(candidates, key=lambda each: (each.error or 0.0, _counted_cost(each)), default=None)
-    if point is None:
-        return None
-    found = confirm(point)
-    return Recommendation(point, describe(point, objective, found), found)
+    for point in sorted(candidates, key=lambda each: (each.error or 0.0, _counted_cost(each))):
+        if screen(point):
+            found = confirm(point)
+            return Recommendation(point, describe(point, objective, found), found)
+    return None
 
 
 def cheapest_rejected(

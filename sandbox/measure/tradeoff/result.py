@@ -227,21 +227,21 @@ class Tradeoff(StudyAgainstTruth):
 
     @property
     def ends_about(self) -> str | None:
-        """How the time is judged in which positions are unpredictable, as one sentence; None if there is none.
+        """How the time after that for which the truth is trusted is judged, as one sentence; None if there is none.
 
         An invariant that was requested counts alone.
         """
         is_requested = self.metric_reason == REQUESTED and not self.metric.is_difference
         if self.best is None or self.best.trusted_until >= self.duration or is_requested:
             return None
-        after = f"after {self.best.trusted_until:.3g} s positions are unpredictable"
+        after = f"after {self.best.trusted_until:.3g} s no truth of positions is known"
         if not self.end_starts:
             is_few = self.starts < MIN_END_STARTS
             cause = f"that takes {MIN_END_STARTS} starts" if is_few else "runs of the truth's method exceed the effort"
             return f"{after}, and ends of runs were not compared: {cause}"
         return (
-            f"{after}: recommended settings have ends that do not differ from those of the truth's method "
-            f"({self.best.trajectory.info['engine']}) over {self.end_starts} perturbed starts"
+            f"{after}: the ends of runs are compared with those of the truth's method "
+            f"({self.best.trajectory.info['engine']}) over up to {self.end_starts} perturbed starts, as effort allows"
         )
 
     @property

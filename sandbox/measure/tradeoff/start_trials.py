@@ -5,16 +5,16 @@ settings too. Each is judged against its own truth.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from sandbox.engines.common.compile_clock import clock_without_compilation
 from sandbox.measure.compare.end_statistics import MIN_END_STARTS, EndEnsemble, EndStatistics
-from sandbox.measure.compare.ground_truth import Truth, TruthKind, find_truth
+from sandbox.measure.compare.ground_truth import Truth, find_truth, truth_cost
 from sandbox.measure.compare.metrics import EvaluationContext, default_zoom
 from sandbox.measure.fresh_starts import FreshStarts
-from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, counted_cost
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.measure.run.recorder import TooLargeError
 from sandbox.measure.starts import Starts, allowed_failures
 from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
@@ -33,9 +33,6 @@ SETTINGS_ENDS_FRACTION = 0.5
 """Fraction of the effort for the runs of the settings that are compared with either"""
 MIN_STARTS = 3
 """Fewer starts say too little: where the effort does not allow more, a setting is not tried from any other."""
-TRUTH_RUNS: Mapping[TruthKind, float] = {"closed_form": 0.0, "exact": 1.0, "refined": 15.0}
-"""Cost of a truth in that of its finest run: before it, dt is halved several times, and a second method and perturbed
-runs confirm it. That took 14 times the finest run for `chain_of_20`."""
 
 
 def affordable_starts(count: int, effort: float, cost: float) -> int:
@@ -84,9 +81,7 @@ class StartTrials:
     deadline: float
     """time of `clock_without_compilation` after which no setting is tried, s"""
     ends: EndEnsemble | None = None
-    """ends of a scene that is unpredictable before its end; None if they are not compared"""
-    end_count: int = 0
-    """number of starts whose ends decide, and of those whose ends are shown"""
+    """ends of a scene whose truth is not trusted to its end; None if they are not compared"""
     _ends: dict[tuple[Configuration, bool], EndStatistics | None] = field(default_factory=dict)
     """statistics of the ends of configurations, over the starts that decide or over fresh ones"""
     _ends_spent: dict[bool, float] = field(default_factory=lambda: {False: 0.0, True: 0.0})
@@ -119,7 +114,7 @@ class StartTrials:
         if self.ends is not None and key not in self._ends:
             first, cost = self.count if fresh else 0, point.counted_seconds
             left = SETTINGS_ENDS_FRACTION * self.effort - self._ends_spent[fresh]
-            count = min(self.end_count, math.floor(left / cost)) if cost > 0.0 else self.end_count
+            count = min(self.ends.count, math.floor(left / cost)) if cost > 0.0 else self.ends.count
             if count < MIN_END_STARTS or clock_without_compilation() >= self.deadline:
                 return None
             self._ends_spent[fresh] += count * cost
@@ -199,12 +194,7 @@ class StartTrials:
     @cached_property
     def _truth_cost(self) -> float:
         """Counted cost of the truth of a start, s, from that of the scene."""
-        truth = self.context.truth
-        if truth is None or not (runs := TRUTH_RUNS[truth.kind]):
-            return 0.0
-        info = truth.trajectory.info
-        settings = Settings.model_validate(info["settings"])
-        return runs * counted_cost(self.space.scene, info["engine"], settings, info["steps"], info["work"])
+        return 0.0 if self.context.truth is None else truth_cost(self.space.scene, self.context.truth)
 
     def _error(self, point: Evaluation, number: int) -> float:
         """Return the error of a configuration from another start; infinite if its run fails."""

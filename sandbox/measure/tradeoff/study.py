@@ -185,9 +185,7 @@ def tradeoff(
         space=space,
         context=context,
         objective=objective,
-        trials=StartTrials(
-            space, context, objective, drawn, count, truth_tolerance, effort, deadline, *(ends or (None, 0))
-        ),
+        trials=StartTrials(space, context, objective, drawn, count, truth_tolerance, effort, deadline, ends),
         effort=effort,
         deadline=deadline,
         on_progress=on_progress,
@@ -306,7 +304,9 @@ class _Study:
         points = [*self._timed(evaluations, repeats), *self.refused]
         self.on_progress(Progress("checking the recommended setting from other starts"))
         within_tolerance = recommend_cheapest(points, self.objective, self.trials.holds, self.trials.confirmation)
-        within_budget = recommend_most_accurate(points, self.objective, self.trials.confirmation)
+        within_budget = recommend_most_accurate(
+            points, self.objective, self.trials.ends_like_the_truth, self.trials.confirmation
+        )
         splits: list[ErrorBudget] = []
         proposals: list[Simplification] = []
         if repeats and self.is_explained and clock_without_compilation() < self.deadline:
@@ -355,7 +355,7 @@ class _Study:
             nearest_to_budget=self._completed(near_budget, points),
             starts=self.trials.count,
             spread=self.trials.starts.spread,
-            end_starts=self.trials.end_count,
+            end_starts=0 if self.trials.ends is None else self.trials.ends.count,
             searched_starts=(0, *self.counterexamples),
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
@@ -463,10 +463,7 @@ class _Study:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
         point = next(each for each in points if each.configuration == chosen.point.configuration)
-        sentence = chosen.sentence
-        if self.trials.ends is not None and self.is_explained:
-            unknown = "its ends were not compared, because their runs take more than the effort"
-            sentence += f"; {point.end_statistics or unknown}"
+        sentence = chosen.sentence if point.end_statistics is None else f"{chosen.sentence}; {point.end_statistics}"
         completed = replace(chosen, sentence=sentence, point=point, warnings=tuple(found))
         if cheapest is None or cheapest.point.configuration == point.configuration:
             return completed

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from sandbox.columns import TRUTH, shown
 from sandbox.formatting import UNKNOWN, format_number
 from sandbox.measure.compare import Comparison, Row
-from sandbox.measure.compare.columns import COLUMNS, DIVERGENCE
+from sandbox.measure.compare.columns import COLUMNS, DIVERGENCE, END_LEGEND, end_table
 from sandbox.measure.compare.contact_matching import ContactMatch
 from sandbox.measure.metrics.trajectory_error import errors
 from sandbox.provenance import machine, versions
@@ -147,6 +147,12 @@ def comparison_page(comparison: Comparison, replayed: bool = True, on_recording:
     sections = [Section("Engines", concatenated(engines_table(comparison), remarks(comparison), meanings))]
     if replayed and comparison.trajectories and comparison.same_scene:
         sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=HOW_TO_REPLAY))
+    heads, rows = end_table(comparison)
+    if rows:
+        columns = [HtmlColumn(head, k > 0) for k, head in enumerate(heads)]
+        sections.append(
+            Section("Ends", table(columns, rows, "Ends of runs from perturbed starts"), lead=f"{END_LEGEND}.")
+        )
     sections += explanations(comparison)
     sections.append(Section("Settings", settings_of(comparison)))
     about = fragment(TEMPLATE, "lead", scene.about, truth_sentence(comparison))
@@ -166,9 +172,9 @@ def meanings_of(*columns: Sequence[HtmlColumn]) -> Markup:
 
 
 def truth_sentence(comparison: Comparison) -> str:
-    """Return the kind and source of the truth as a complete sentence."""
-    text = comparison.sentence()
-    return f"{text[0].upper()}{text[1:]}."
+    """Return the kind and source of the truth, and the perturbed starts, as complete sentences."""
+    sentences = filter(None, (comparison.sentence(), comparison.starts_about))
+    return " ".join(f"{text[0].upper()}{text[1:]}." for text in sentences)
 
 
 def swept_numbers(comparison: Comparison) -> tuple[str, dict[str, float]] | None:

@@ -50,7 +50,7 @@ def gas() -> Scene:
     return scene_of(GAS + "".join(balls))
 
 
-def ensemble_of(scene: Scene, count: int, effort: float = 1e6) -> tuple[EndEnsemble, int]:
+def ensemble_of(scene: Scene, count: int, effort: float = 1e6) -> EndEnsemble:
     context = EvaluationContext(scene, truth_of(scene, scene.solver, 1e-3))
     found = end_ensemble(context, Starts(scene), scene.solver, count, effort, 1e-3)
     assert found is not None
@@ -66,7 +66,7 @@ def end_of(scene: Scene, engine: str = "pymunk") -> dict[str, float]:
 @pytest.mark.fail_slow(60)  # 72 runs, and the first use of a compiled engine
 def test_engine_that_loses_energy_ends_slower_than_the_truth_and_another_one_does_not() -> None:
     scene = gas()
-    ensemble, count = ensemble_of(scene, 24)
+    ensemble, count = ensemble_of(scene, 24), 24
     assert ensemble.engine == "exact"
     alike = ensemble.compare("pymunk", scene.solver, range(1, count + 1))
     assert alike is not None
@@ -99,7 +99,7 @@ def test_setting_whose_ends_differ_is_not_recommended() -> None:
     own = next(point for point in found.points if point.engine == "box2d" and point.is_own)
     assert own.end_statistics is not None
     assert "speed" in [each.name for each in own.end_statistics.differing]
-    assert "over 24 perturbed starts" in str(found.ends_about)
+    assert "over up to 24 perturbed starts" in str(found.ends_about)
 
 
 def test_predictable_scene_needs_no_statistics() -> None:
@@ -111,8 +111,8 @@ def test_predictable_scene_needs_no_statistics() -> None:
 @pytest.mark.fail_slow(60)  # truth of a chaotic scene
 def test_effort_bounds_the_number_of_starts() -> None:
     scene = gas()
-    ensemble, _ = ensemble_of(scene, 30)
-    assert ensemble_of(scene, 30, 10.5 * ensemble.cost)[1] == 10
+    ensemble = ensemble_of(scene, 30)
+    assert ensemble_of(scene, 30, 12.5 * ensemble.cost).count == 12
     context = EvaluationContext(scene, ensemble.truth)
     too_little = (MIN_END_STARTS - 0.5) * ensemble.cost
     assert end_ensemble(context, Starts(scene), scene.solver, 30, too_little, 1e-3) is None
@@ -120,7 +120,7 @@ def test_effort_bounds_the_number_of_starts() -> None:
 
 def test_setting_whose_runs_fail_is_not_alike() -> None:
     scene = gas()
-    ensemble, _ = ensemble_of(scene, 10)
+    ensemble = ensemble_of(scene, 10)
     found = ensemble.compare("pymunk", scene.solver, range(1, 11), cost=1e-9)  # each run is stopped
     assert found is not None
     assert found.failed == 10

@@ -190,7 +190,7 @@ def test_drift_of_a_body_at_rest_in_truth_counts_from_the_start(scene: Scene) ->
 def test_drift_is_chosen_for_resting_bodies_with_a_short_trusted_time(scene: Scene) -> None:
     metric, reason = choose_metric(context_of(scene, run_of(scene), until=0.5))
     assert metric.name == "drift"
-    assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should stay at rest"
+    assert reason == "the truth of positions is trusted for 0.5 s of 2 s only, and 2 bodies should stay at rest"
     tumbling = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
     metric, _ = choose_metric(context_of(scene, run_of(scene, tumbling), until=0.5))
     assert metric.name == "penetration"

@@ -140,25 +140,27 @@ def test_point_without_finite_error_is_not_recommended() -> None:
     useless = [point_of(1.0, None), point_of(1.0, math.nan), point_of(1.0, math.inf)]
     assert not any(point.is_usable for point in useless)
     assert recommend_cheapest(useless, OBJECTIVE, always, unconfirmed) is None
-    assert recommend_most_accurate(useless, OBJECTIVE, unconfirmed) is None
+    assert recommend_most_accurate(useless, OBJECTIVE, lambda _: True, unconfirmed) is None
 
 
 def test_most_accurate_within_the_budget_is_recommended() -> None:
     # 0.5 ms per frame, 60 a second: 30 ms per simulated second
-    found = recommend_most_accurate(POINTS, OBJECTIVE, unconfirmed)
+    found = recommend_most_accurate(POINTS, OBJECTIVE, lambda _: True, unconfirmed)
     assert found.point == POINTS[2]
-    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=0.01), unconfirmed) is None
-    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=None), unconfirmed) is None
+    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=0.01), lambda _: True, unconfirmed) is None
+    assert recommend_most_accurate(POINTS, OBJECTIVE._replace(budget=None), lambda _: True, unconfirmed) is None
 
 
 def test_cheapest_of_equally_accurate_points_is_recommended() -> None:
-    found = recommend_most_accurate([point_of(9.0, 0.0), point_of(3.0, 0.0)], OBJECTIVE, unconfirmed)
+    found = recommend_most_accurate([point_of(9.0, 0.0), point_of(3.0, 0.0)], OBJECTIVE, lambda _: True, unconfirmed)
     assert found.point.cost == 3.0
 
 
 def test_step_longer_than_a_frame_has_to_fit_into_one() -> None:
     """20 ms per second in steps of 0.1 s is 2 ms in the frame that contains the step."""
-    found = recommend_most_accurate([point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], OBJECTIVE, unconfirmed)
+    found = recommend_most_accurate(
+        [point_of(20.0, 0.0, dt=0.1), point_of(20.0, 0.5, dt=0.01)], OBJECTIVE, lambda _: True, unconfirmed
+    )
     assert found.point.settings.dt == 0.01
 
 
@@ -166,7 +168,7 @@ def test_step_longer_than_max_dt_is_not_recommended() -> None:
     points = [point_of(1.0, 0.0, dt=0.04), point_of(9.0, 0.0, dt=0.02)]
     for pick in (
         recommend_cheapest(points, OBJECTIVE._replace(max_dt=0.02), always, unconfirmed),
-        recommend_most_accurate(points, OBJECTIVE._replace(max_dt=0.02), unconfirmed),
+        recommend_most_accurate(points, OBJECTIVE._replace(max_dt=0.02), lambda _: True, unconfirmed),
     ):
         assert pick.point.settings.dt == 0.02
 
