@@ -223,9 +223,9 @@ def _affordable(effort: float, cost: float, count: int) -> int:
 
 
 def _starts_text(what: str, count: int, asked: int, starts: Starts) -> str:
-    """Return from how many perturbed starts something is, and how they differ."""
+    """Return over how many perturbed starts something is measured, and how they differ."""
     fewer = "" if count == asked else f", not {asked:,}, which would exceed the counted work of {START_EFFORT:g} s"
-    return f"{what} from {format_plural(count, 'perturbed start')}{fewer}, with {starts}"
+    return f"{what} {format_plural(count, 'perturbed start')}{fewer}, with {starts}"
 
 
 @dataclass
@@ -281,7 +281,7 @@ class _Scoring:
             errors = [self._error(row.engine, settings, starts, n, known) for n in range(1, affordable + 1)]
             found = FreshStarts.of([error for error in errors if not math.isnan(error)], self.tolerance)
             self.rows[k] = replace(row, start_errors=found)
-        self.starts_about = _starts_text("median, 95 %: of the max errors", affordable, count, starts)
+        self.starts_about = _starts_text("errors over", affordable, count, starts)
 
     def _score_ends(
         self, rows: Sequence[int], settings: Settings, starts: Starts, truth: Truth, count: int, cost: float
@@ -301,7 +301,7 @@ class _Scoring:
             self.report(Progress(f"{row.name}: the ends of runs from {ensemble.count} other starts"))
             ends = ensemble.compare(row.engine, settings, range(1, ensemble.count + 1))
             self.rows[k] = replace(row, end_statistics=ends)
-        self.starts_about = _starts_text("end differs in: of the ends of runs", ensemble.count, count, starts)
+        self.starts_about = _starts_text("ends compared over", ensemble.count, count, starts)
 
     def _error(
         self, engine: str, settings: Settings, starts: Starts, number: int, known: dict[int, EvaluationContext]
