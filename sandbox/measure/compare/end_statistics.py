@@ -37,8 +37,9 @@ EARLY_STARTS = 10
 EARLY_P_VALUE = 0.01
 """Adjusted probability for that: such an early look adds at most 1 % to the settings that are rejected by chance"""
 MAX_COARSENING = 4
-"""Largest factor by which the step of the truth's method is lengthened so that its runs cost less. Distributions
-converge with the step far sooner than positions do."""
+"""Largest factor by which the step of the truth's method is lengthened so that its runs cost less. With a step four
+times as long, the ends of `double_pendulum`, `table_tennis`, `conveyor` and a heap of five bodies did not differ over
+12 to 20 starts."""
 SETTLING_TIME = 1.0
 """s; a difference of speeds does not count if it moves a body by less than the tolerance of lengths in this time"""
 COST_MARGIN = 10.0
