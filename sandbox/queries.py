@@ -4,8 +4,8 @@
     hits = queries.cast_rays(starts, ends)
 
 They depend on the scene and on the state only, not on the engine that computed it, so that all engines agree bit for
-bit, and frames of a stored run can be queried like a running simulation. Objects are the bodies that are present,
-planes, walls that are solid, and posts. Bodies that collide with nothing are not seen, nor are zones.
+bit. Objects are the bodies that are present, planes, walls that are solid, and posts. Bodies that collide with nothing
+are not seen, nor are zones.
 
 Every shape is a convex hull of corners, widened by a radius. Its boundary consists of arcs about the corners and of
 edges moved outward by the radius, and a disc is cast as a ray against shapes that are wider by its radius. A ray enters
@@ -100,7 +100,13 @@ class _Features(NamedTuple):
 
 
 class SceneQueries:
-    """Queries of one state of a scene."""
+    """Queries of one state of a scene: ray casts, casts of discs and distances, equal on all engines.
+
+    Example:
+        >>> queries = sandbox.SceneQueries(sandbox.load("bounce"))
+        >>> queries.nearest((0.0, 0.3)).name
+        'floor'
+    """
 
     def __init__(
         self,
