@@ -105,7 +105,7 @@ class SceneQueries:
     Example:
         >>> queries = sandbox.SceneQueries(sandbox.load("bounce"))
         >>> queries.nearest((0.0, 0.3)).name
-        'floor'
+        'ground'
     """
 
     def __init__(

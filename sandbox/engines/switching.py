@@ -566,9 +566,9 @@ class SwitchableSimulation:
             ValueError: a coordinate or the radius is invalid, or the scene has no such object or category.
 
         Example:
-            >>> hit = sandbox.start("bounce").cast_ray((0.0, 3.0), (0.0, -1.0))
-            >>> hit.name, round(hit.point[1], 6)
-            ('ball', 1.1)
+            >>> hit = sandbox.start("bounce").cast_ray((0.0, 8.0), (0.0, 0.0))
+            >>> hit.name, hit.point
+            ('ball', (0.0, 6.0))
         """
         return self.queries(ignore, categories).cast_ray(start, end, radius)
 
