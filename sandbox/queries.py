@@ -265,7 +265,7 @@ def _enter_discs(offset: FloatArray, radius: FloatArray, way: FloatArray) -> Flo
     length2 = (way * way).sum(axis=1)[:, None]
     along = (offset * way[:, None]).sum(axis=2)
     across = offset[..., 0] * way[:, None, 1] - offset[..., 1] * way[:, None, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # short ways
         half = np.sqrt(radius**2 * length2 - across**2)
         fraction = (-along - half) / length2
     return np.where((fraction >= 0.0) & (fraction <= 1.0), fraction, np.inf)
@@ -282,7 +282,7 @@ def _enter_edges(features: _Features, offset: FloatArray, height: FloatArray, wa
     """
     fraction = _enter_planes(height, _dots(way, features.outward))
     length2 = (features.along * features.along).sum(axis=1)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         place = (offset * features.along).sum(axis=2) + fraction * _dots(way, features.along)
     return np.where((place >= 0.0) & (place <= length2), fraction, np.inf)
 
@@ -294,7 +294,7 @@ def _enter_planes(height: FloatArray, rate: FloatArray) -> FloatArray:
         height: (R, P) m, of the starts.
         rate: (R, P) m, change of the height on the whole way.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # short ways
         fraction = -height / rate
     return np.where((rate < 0.0) & (height >= 0.0) & (fraction <= 1.0), fraction, np.inf)
 

@@ -178,6 +178,20 @@ def test_ray_follows_a_body_and_ignores_the_one_that_looks() -> None:
     assert below.name != name
 
 
+def test_spawned_bodies_are_seen_and_removed_ones_are_not() -> None:
+    simulation = sandbox.start("bounce", "pymunk")
+    simulation.step()
+    simulation.apply(sandbox.Spawn(time=0.0, box={"name": "crate", "position": [0.0, 8.0], "size": [1.0, 1.0]}))
+    hit = simulation.cast_ray((0.0, 10.0), (0.0, 0.0))
+    assert hit is not None
+    assert (hit.name, hit.point) == ("crate", (0.0, 8.5))
+    for name in ("crate", "ball"):
+        simulation.apply(sandbox.Remove(time=0.0, body=name))
+    hit = simulation.cast_ray((0.0, 10.0), (0.0, 0.0))
+    assert hit is not None
+    assert hit.name == "ground"
+
+
 def test_ray_that_starts_inside_sees_what_is_behind() -> None:
     queries = SceneQueries(SCENE)
     assert queries.cast_ray((1.0, 1.0), (1.0, 1.1)) is None  # it stays inside the ball

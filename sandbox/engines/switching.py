@@ -540,7 +540,8 @@ class SwitchableSimulation:
         Raises:
             ValueError: the scene has no such object or category.
         """
-        return SceneQueries(self.setup, self.frame(), ignore=ignore, categories=categories)
+        setup = replace(self.setup, bodies=self.bodies)  # with spawned bodies
+        return SceneQueries(setup, self.frame(), ignore=ignore, categories=categories)
 
     def cast_ray(
         self,
