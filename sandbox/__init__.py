@@ -325,6 +325,12 @@ if TYPE_CHECKING:
     from sandbox.scene.geometry.shapes import (
         Shapes as Shapes,
     )
+    from sandbox.queries import (
+        NearestObject as NearestObject,
+        RayHit as RayHit,
+        RayHits as RayHits,
+        SceneQueries as SceneQueries,
+    )
     from sandbox.trajectory import (
         Contacts as Contacts,
         Frame as Frame,
@@ -406,6 +412,7 @@ _NAMES = {
     "sandbox.scene.errors": "Fault PartError SceneError SettingsError",
     "sandbox.scene.files.load": "dumps load loads",
     "sandbox.scene.geometry.shapes": "Shapes",
+    "sandbox.queries": "NearestObject RayHit RayHits SceneQueries",
     "sandbox.trajectory": "Contacts Frame RunFailedError Trajectory",
 }
 """Public names by the module that has them."""

@@ -38,11 +38,12 @@ from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
 from sandbox.frame_table import FrameTable
+from sandbox.queries import RayHit, SceneQueries
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.fixed import AWAY, PlaneReach
 from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
@@ -528,6 +529,49 @@ class SwitchableSimulation:
     def frame(self) -> Frame:
         """Return the present state."""
         return self._segment.frame()
+
+    def queries(self, ignore: Iterable[str] = (), categories: Iterable[str] = ()) -> SceneQueries:
+        """Return ray casts and distances in the present state, which stay those of this state.
+
+        Args:
+            ignore: names of bodies and static objects that are not seen.
+            categories: collision categories that are seen; default: all.
+
+        Raises:
+            ValueError: the scene has no such object or category.
+        """
+        setup = replace(self.setup, bodies=self.bodies)  # with spawned bodies
+        return SceneQueries(setup, self.frame(), ignore=ignore, categories=categories)
+
+    def cast_ray(
+        self,
+        start: Point,
+        end: Point,
+        radius: float = 0.0,
+        *,
+        ignore: Iterable[str] = (),
+        categories: Iterable[str] = (),
+    ) -> RayHit | None:
+        """Return the first object on the way of a ray, or of a disc, in the present state; None if nothing is hit.
+
+        `queries` casts many rays in one call.
+
+        Args:
+            start: m.
+            end: m.
+            radius: of a disc that moves from start to end, m; default: a ray.
+            ignore: names of bodies and static objects that are not seen.
+            categories: collision categories that are seen; default: all.
+
+        Raises:
+            ValueError: a coordinate or the radius is invalid, or the scene has no such object or category.
+
+        Example:
+            >>> hit = sandbox.start("bounce").cast_ray((0.0, 8.0), (0.0, 0.0))
+            >>> hit.name, hit.point
+            ('ball', (0.0, 6.0))
+        """
+        return self.queries(ignore, categories).cast_ray(start, end, radius)
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording.
