@@ -84,6 +84,25 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
     assert any(f"unknown key; did you mean {key}" in fault.message for fault in faults_of(typo))
 
 
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        (f"{BALL}bullet = true", "sandbox check"),
+        (f"{BALL}isSensor = true", r"\[\[zone\]\]"),
+        (f"{BALL}gravityScale = 0.5", r"world\.gravity"),
+        (f"{BALL}linear_damping = 0.1", r"world\.damping"),
+        (f"{BALL}rollingResistance = 0.1", r"surface\.rolling_friction"),
+        (f"{BALL}max_speed = 3", r"world\.quadratic_drag"),
+        (f"{BALL}[[joint]]\nkind = 'prismatic'\nbetween = ['ball-1']", "did you mean 'groove'"),
+        (f"{BALL}[[joint]]\nkind = 'RevoluteJoint'\nbetween = ['ball-1']", "did you mean 'pivot'"),
+        (f"{BALL}[[joint]]\nkind = 'weld'\nbetween = ['ball-1']", r"parts of one \[\[body\]\]; kinds of joint: rod"),
+    ],
+)
+def test_feature_of_another_engine_is_refused_with_what_a_scene_has_in_its_place(text: str, remedy: str) -> None:
+    with pytest.raises(SceneError, match=remedy):
+        loads(text)
+
+
 def test_unknown_key_without_a_similar_one_lists_the_known_keys() -> None:
     with pytest.raises(SceneError, match=r"zzzz: unknown key; known keys: .*position.*radius"):
         loads(f"{BALL}zzzz = 1")

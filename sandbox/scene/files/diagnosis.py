@@ -68,7 +68,7 @@ def explain(details: Any) -> LocatedMessage:
     if kind == "union_tag_not_found":
         return location, f"is missing; {_one_of(location)}"
     if kind == "union_tag_invalid":
-        return location, f"is {shown(context['tag'])}; {_one_of(location)}"
+        return location, f"is {shown(context['tag'])}; {_one_of(location, context['tag'])}"
     if kind == "value_error":
         return location, str(context["error"])
     if kind == "string_pattern_mismatch":
@@ -255,6 +255,8 @@ def _known_keys(location: Location) -> str:
     if word == "static":
         suggestion = "fixed = true" if "fixed" in known else "plane, wall or post, or a body with fixed = true"
         return f"did you mean {suggestion}?"
+    if location[0] not in _COMMON_TABLES and (remedy := _ELSEWHERE.get(re.sub(r"[^a-z]|^is", "", word))):
+        return remedy
     same = [name for name, words in _SYNONYMS.items() if name in known and {word, word.removesuffix("s")} & words]
     close = same or difflib.get_close_matches(key, known, n=1)
     return f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
@@ -275,12 +277,53 @@ _SYNONYMS: dict[str, set[str]] = {
 }
 """Keys of the scene file, and words that other engines and file formats use for them."""
 
+_FAST = (
+    "whether fast bodies miss contacts depends on the engine and [solver]: exact misses none, reference none with "
+    'detection = "swept", box2d none with static objects; for pymunk, `sandbox check` states the dt'
+)
+_SENSOR = "bodies have no sensors; a [[zone]] detects bodies whose centre is inside it"
+_GRAVITY = "no body has a gravity of its own; world.gravity acts on all bodies, that of a [[zone]] on those inside it"
+_DAMPING = "no body has a damping of its own; world.damping and world.linear_drag act on all bodies"
+_ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
+_SPEED = "speeds have no limit; world.quadratic_drag limits that of a fall"
+_ELSEWHERE = {
+    "bullet": _FAST,
+    "ccd": _FAST,
+    "continuouscollision": _FAST,
+    "sensor": _SENSOR,
+    "trigger": _SENSOR,
+    "gravityscale": _GRAVITY,
+    "lineardamping": _DAMPING,
+    "angulardamping": _DAMPING,
+    "rollingfriction": _ROLLING,
+    "rollingresistance": _ROLLING,
+    "maxspeed": _SPEED,
+    "maxvelocity": _SPEED,
+}
+"""Features that bodies have in other engines, in letters only and without `is`, and what a scene has in their place"""
+
+_OTHER_JOINTS = {
+    "prismatic": "did you mean 'groove', with a 'rotary_limit' that keeps the angle?",
+    "slider": "did you mean 'groove', with a 'rotary_limit' that keeps the angle?",
+    "revolute": "did you mean 'pivot'?",
+    "hinge": "did you mean 'pivot'?",
+    "distance": "did you mean 'rod', 'slide' with least and most, or 'spring'?",
+    "rope": "did you mean 'slide' with most, or a [[rope]] of links?",
+    "weld": "shapes that are welded together are the parts of one [[body]];",
+    "fixed": "shapes that are welded together are the parts of one [[body]];",
+    "wheel": "a wheel has a 'groove' along its axis, a 'spring' and a 'motor';",
+}
+"""Joints of other engines, in letters only and without `joint`, and what a scene has in their place"""
+
 _COMMON_TABLES = ("solver", "world")
 """Tables that every scene has; their keys are often misplaced in others."""
 
 
-def _one_of(location: Location) -> str:
-    return f"kinds of {location[0]}: {', '.join(TAGGED[str(location[0])][0])}"
+def _one_of(location: Location, tag: object = "") -> str:
+    """Return the kinds of joints or drives, after the one that a tag of another engine means."""
+    word = re.sub(r"[^a-z]|joint", "", str(tag).lower())
+    remedy = f"{_OTHER_JOINTS[word]} " if location[0] == "joint" and word in _OTHER_JOINTS else ""
+    return f"{remedy}kinds of {location[0]}: {', '.join(TAGGED[str(location[0])][0])}"
 
 
 PLACEHOLDERS: dict[str, Any] = {
