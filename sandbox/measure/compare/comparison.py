@@ -243,7 +243,7 @@ class _Scoring:
     runs: dict[str, Trajectory] = field(default_factory=dict)
     row_truths: dict[str, Truth | None] = field(default_factory=dict)
     starts_about: str | None = None
-    """perturbed starts that were run, or the reason why there are none"""
+    """perturbed starts that were run, or the reason why there are none; None if no row needs them"""
 
     def score_variant(self, variant: Variant, settings: Settings, engines: Sequence[str]) -> None:
         """Find the truth of a variant, and run and score each engine."""
@@ -266,7 +266,9 @@ class _Scoring:
         scene, truth = variant.scene, self._truth(variant.scene, settings)
         rows = [k for k, row in enumerate(self.rows) if row.set == variant.set and row.status == "ok"]
         rows = [k for k in rows if not self.rows[k].is_truth]
-        if truth is None or not rows or not starts.can_vary:
+        if not rows:
+            return
+        if truth is None or not starts.can_vary:
             self.starts_about = "no other starts: " + ("no truth is known" if truth is None else "none would differ")
             return
         cost = sum(run_cost(scene, self.runs[self.rows[k].name]) for k in rows)

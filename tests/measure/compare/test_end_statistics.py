@@ -102,6 +102,21 @@ def test_setting_whose_ends_differ_is_not_recommended() -> None:
     assert "over up to 24 perturbed starts" in str(found.ends_about)
 
 
+def test_comparison_says_over_how_many_starts_it_is_or_why_there_are_none() -> None:
+    scene = gas()
+    few = sandbox.compare(scene, ("pymunk",), starts=5)
+    assert few.rows[0].end_statistics is None
+    assert few.starts_about == f"ends from other starts were not compared: that takes {MIN_END_STARTS} of them"
+    found = sandbox.compare(scene, ("pymunk", "exact"), starts=12)
+    assert [row.end_statistics is None for row in found.rows] == [False, True]  # exact is the truth itself
+    assert str(found.starts_about).startswith("ends compared over 12 perturbed starts, with positions ±")
+    drop = sandbox.compare("bounce", ("pymunk",), starts=4, dt=0.01)
+    assert drop.rows[0].start_errors is not None
+    assert drop.rows[0].start_errors.held.trials == 4
+    assert str(drop.starts_about).startswith("errors over 4 perturbed starts")
+    assert sandbox.compare(scene, ("exact",), starts=12).starts_about is None
+
+
 def test_predictable_scene_needs_no_statistics() -> None:
     scene = sandbox.load("bounce")
     context = EvaluationContext(scene, truth_of(scene, scene.solver, 1e-3))
