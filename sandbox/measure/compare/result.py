@@ -292,8 +292,8 @@ class Comparison(StudyAgainstTruth):
     spread: float = DEFAULT_SPREAD
     """largest change of a start, as a fraction (`Starts`)"""
     starts_about: str | None = None
-    """perturbed starts that were run, or the reason why there are none; None if none were asked for, or all rows are the
-    truth itself"""
+    """perturbed starts that were run, or the reason why there are none; None if none were asked for, or all rows are
+    the truth itself"""
 
     json_head: ClassVar = (
         ("scene", "title"),
