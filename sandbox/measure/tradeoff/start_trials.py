@@ -99,15 +99,9 @@ class StartTrials:
         return self._is_within_tolerance(point) and self.ends_like_the_truth(point)
 
     def ends_like_the_truth(self, point: Evaluation) -> bool:
-        """Return whether no difference of the ends is known, over the starts that decide.
-
-        Where the effort does not allow a comparison, that is so unless another setting of the engine differs.
-        """
+        """Return whether no difference of the ends is known, over the starts that decide."""
         ends = self.end_statistics(point, fresh=False)
-        if ends is not None:
-            return ends.is_alike
-        known = (found for (other, fresh), found in self._ends.items() if other.engine == point.engine and not fresh)
-        return all(found is None or found.is_alike for found in known)
+        return ends is None or ends.is_alike
 
     def end_statistics(self, point: Evaluation, fresh: bool) -> EndStatistics | None:
         """Return the statistics of the ends of a configuration; None if they are not compared, or take too much effort.
@@ -123,10 +117,9 @@ class StartTrials:
             count = min(self.ends.count, math.floor(left / cost)) if cost > 0.0 else self.ends.count
             if count < MIN_END_STARTS or clock_without_compilation() >= self.deadline:
                 return None
+            self._ends_spent[fresh] += count * cost
             numbers = range(first + 1, first + 1 + count)
-            found = self.ends.compare(point.engine, point.asked, numbers, cost, stops_early=not fresh)
-            self._ends_spent[fresh] += cost * (count if found is None else found.starts)
-            self._ends[key] = found
+            self._ends[key] = self.ends.compare(point.engine, point.asked, numbers, cost, stops_early=not fresh)
         return self._ends.get(key)
 
     def _is_within_tolerance(self, point: Evaluation) -> bool:
