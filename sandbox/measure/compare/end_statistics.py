@@ -9,7 +9,7 @@ The test rounds values to the tolerance, so that smaller differences do not coun
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
@@ -187,7 +187,7 @@ class EndEnsemble:
         """
         if schedule(self.starts.scene.world.duration, settings.dt)[-1].part:
             return None
-        found = EndStatistics(0, 0, ())
+        starts = failed = 0
         both: list[tuple[FloatArray, FloatArray]] = []
         for number in numbers:
             expected = self._reference_end(number)
@@ -195,13 +195,13 @@ class EndEnsemble:
                 continue
             own = self._end(engine, settings, number, COST_MARGIN * cost)
             both += [] if own is None else [(own, expected)]
-            found = replace(found, starts=found.starts + 1, failed=found.failed + (own is None))
-            is_hopeless = found.failed > allowed_failures(len(numbers))
-            if stops_early and (is_hopeless or (found.starts == EARLY_STARTS and self._differs_early(both))):
+            starts, failed = starts + 1, failed + (own is None)
+            is_hopeless = failed > allowed_failures(len(numbers))
+            if stops_early and (is_hopeless or (starts == EARLY_STARTS and self._differs_early(both))):
                 break
-        if found.starts < MIN_END_STARTS and not found.failed:
+        if starts < MIN_END_STARTS and not failed:
             return None
-        return replace(found, statistics=self._statistics(both))
+        return EndStatistics(starts, failed, self._statistics(both))
 
     def _differs_early(self, both: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
         """Return whether the first starts show a difference that more starts would hardly take back."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 from sandbox.echo import short_repr
-from sandbox.formatting import format_quantity
+from sandbox.formatting import format_plural, format_quantity
 from sandbox.jsonable import in_json, to_json
 from sandbox.measure.compare.end_statistics import MIN_END_STARTS
 from sandbox.measure.compare.ground_truth import Truth
@@ -113,6 +113,8 @@ class Tradeoff(StudyAgainstTruth):
     """largest change of a start, as a fraction (`Starts`)"""
     end_starts: int
     """number of perturbed starts whose ends are compared with those of the truth's method; 0: none"""
+    differing_ends: int
+    """settings within the tolerance that are not recommended because their ends differ"""
     searched_starts: tuple[int, ...]
     """numbers of the starts over which errors are the largest: 0, that of the scene, and those from which the settings
     found before failed"""
@@ -239,9 +241,11 @@ class Tradeoff(StudyAgainstTruth):
             is_few = self.starts < MIN_END_STARTS
             cause = f"that takes {MIN_END_STARTS} starts" if is_few else "runs of the truth's method exceed the effort"
             return f"{after}, and ends of runs were not compared: {cause}"
+        passed = f"; those of {format_plural(self.differing_ends, 'setting')} within the tolerance differ"
         return (
             f"{after}: the ends of runs are compared with those of the truth's method "
             f"({self.best.trajectory.info['engine']}) over up to {self.end_starts} perturbed starts, as effort allows"
+            f"{passed if self.differing_ends else ''}"
         )
 
     @property

@@ -103,6 +103,11 @@ class StartTrials:
         ends = self.end_statistics(point, fresh=False)
         return ends is None or ends.is_alike
 
+    @property
+    def differing_ends(self) -> int:
+        """Number of configurations whose ends differ over the starts that decide."""
+        return sum(found is not None and not found.is_alike for (_, fresh), found in self._ends.items() if not fresh)
+
     def end_statistics(self, point: Evaluation, fresh: bool) -> EndStatistics | None:
         """Return the statistics of the ends of a configuration; None if they are not compared, or take too much effort.
 
@@ -117,9 +122,10 @@ class StartTrials:
             count = min(self.ends.count, math.floor(left / cost)) if cost > 0.0 else self.ends.count
             if count < MIN_END_STARTS or clock_without_compilation() >= self.deadline:
                 return None
-            self._ends_spent[fresh] += count * cost
             numbers = range(first + 1, first + 1 + count)
-            self._ends[key] = self.ends.compare(point.engine, point.asked, numbers, cost, stops_early=not fresh)
+            found = self.ends.compare(point.engine, point.asked, numbers, cost, stops_early=not fresh)
+            self._ends_spent[fresh] += 0.0 if found is None else found.starts * cost
+            self._ends[key] = found
         return self._ends.get(key)
 
     def _is_within_tolerance(self, point: Evaluation) -> bool:

@@ -180,7 +180,10 @@ def tradeoff(
     count = starts if drawn.can_vary else 1
     ends = None
     if metric is None or metric_named(metric).is_difference:  # these say nothing of the time after the horizon
-        ends = end_ensemble(context, drawn, base, count, ENDS_FRACTION * effort, truth_tolerance)
+        # In pixels or metres, the tolerance of the errors is that of the ends too.
+        scale = {"m": 1.0, "px": context.zoom}.get(objective.metric.unit)
+        length = default_tolerance(scene) if scale is None else objective.tolerance / scale
+        ends = end_ensemble(context, drawn, base, count, ENDS_FRACTION * effort, length)
     study = _Study(
         space=space,
         context=context,
@@ -356,6 +359,7 @@ class _Study:
             starts=self.trials.count,
             spread=self.trials.starts.spread,
             end_starts=0 if self.trials.ends is None else self.trials.ends.count,
+            differing_ends=self.trials.differing_ends,
             searched_starts=(0, *self.counterexamples),
             untried=len(search.skipped - set(search.evaluations)),
             effort=self.effort,
@@ -463,7 +467,11 @@ class _Study:
             return None
         found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
         point = next(each for each in points if each.configuration == chosen.point.configuration)
-        sentence = chosen.sentence if point.end_statistics is None else f"{chosen.sentence}; {point.end_statistics}"
+        sentence = chosen.sentence
+        if point.end_statistics is not None:
+            sentence += f"; {point.end_statistics}"
+        elif self.trials.ends is not None and chosen.confirmation is not None:  # not of the nearest setting
+            sentence += "; its ends were not compared, because that exceeds the effort"
         completed = replace(chosen, sentence=sentence, point=point, warnings=tuple(found))
         if cheapest is None or cheapest.point.configuration == point.configuration:
             return completed

@@ -82,6 +82,7 @@ def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "starts": 30,
         "spread": 0.01,
         "end_starts": 0,
+        "differing_ends": 0,
         "searched_starts": (0,),
         "untried": 0,
         "effort": 1.0,
