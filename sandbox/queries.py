@@ -13,7 +13,7 @@ a hull where it first enters one of these, so all of them are tested for all ray
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +24,6 @@ from sandbox.echo import short_repr
 from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Post, Wall, mask_of
 from sandbox.scene.geometry.vectors import offset_from_segment, rotate
 from sandbox.trajectory import Frame
@@ -140,12 +139,12 @@ class SceneQueries:
             return self._setup.bodies.names[index]
         return self._setup.scene.fixed_names[-1 - index]
 
-    def cast_ray(self, start: Point, end: Point, radius: float = 0.0) -> RayHit | None:
+    def cast_ray(self, start: Sequence[float], end: Sequence[float], radius: float = 0.0) -> RayHit | None:
         """Return the first object on the way of a ray, or of a disc; None if nothing is hit.
 
         Args:
-            start: m.
-            end: m.
+            start: (2,) m.
+            end: (2,) m.
             radius: of a disc that moves from start to end, m; default: a ray.
 
         Raises:
@@ -188,13 +187,13 @@ class SceneQueries:
             _cast(self._features, origins[part], ends[part] - origins[part], radius, of_part)
         return found
 
-    def nearest(self, point: Point) -> NearestObject | None:
+    def nearest(self, point: Sequence[float]) -> NearestObject | None:
         """Return the object whose surface is nearest to a point, or that the point is deepest in; None without any.
 
         Inside an object of several pieces, the depth is that in the piece in which it is deepest.
 
         Args:
-            point: m.
+            point: (2,) m.
 
         Raises:
             ValueError: a coordinate is not finite.
