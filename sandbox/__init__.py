@@ -282,6 +282,7 @@ if TYPE_CHECKING:
         Groove as Groove,
         Motor as Motor,
         Pivot as Pivot,
+        Prismatic as Prismatic,
         Pulley as Pulley,
         Ratchet as Ratchet,
         Rod as Rod,
@@ -289,6 +290,8 @@ if TYPE_CHECKING:
         RotarySpring as RotarySpring,
         Slide as Slide,
         Spring as Spring,
+        Weld as Weld,
+        Wheel as Wheel,
     )
     from sandbox.scene.description.play import (
         Marking as Marking,
@@ -404,7 +407,7 @@ _NAMES = {
     "sandbox.scene.description.forces": "Attraction PlungerDrive StrokeDrive Thrust TorqueDrive",
     "sandbox.scene.description.generators": "Cloth Ragdoll Rope RopeAttachment Stack",
     "sandbox.scene.description.joints": (
-        "Gear Groove Motor Pivot Pulley Ratchet Rod RotaryLimit RotarySpring Slide Spring"
+        "Gear Groove Motor Pivot Prismatic Pulley Ratchet Rod RotaryLimit RotarySpring Slide Spring Weld Wheel"
     ),
     "sandbox.scene.description.play": "Marking Play PlayPart Spot",
     "sandbox.scene.description.surface": "ContactModels Floor Pocket Shot Stroke",

@@ -158,7 +158,8 @@ class SetParameter(Timed):
 
     Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
     `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution`, `friction`, `surface_speed`
-    and `surface_velocity`, and `rate` and `max_torque` of motors.
+    and `surface_velocity`, and `rate`, `max_torque` and `max_force` of motors, also of those of prismatic joints and
+    wheels.
     """
 
     kind: Literal["set"] = "set"
@@ -307,10 +308,10 @@ _SETTABLE = (
 
 _SETTABLE_OF_SURFACES = ("restitution", "friction", "surface_speed", "surface_velocity")
 
-_SETTABLE_OF_MOTORS = ("rate", "max_torque")
+_SETTABLE_OF_MOTORS = ("rate", "max_torque", "max_force")
 
 SETTABLE = (
-    f"{', '.join(_SETTABLE)}, any {', '.join(_SETTABLE_OF_SURFACES)}, and {' and '.join(_SETTABLE_OF_MOTORS)} of motors"
+    f"{', '.join(_SETTABLE)}, any {', '.join(_SETTABLE_OF_SURFACES)}, and {', '.join(_SETTABLE_OF_MOTORS)} of motors"
 )
 """Parameters of a running scene that can be changed, as text for messages."""
 

@@ -49,6 +49,9 @@ JOINTS: dict[str, Document] = {
     "rotary_spring": {"stiffness": 10.0},
     "pulley": {"wheels": [[0.0, 6.0], [2.0, 6.0]]},
     "ratchet": {"ratchet": 0.5},
+    "weld": {},
+    "prismatic": {"axis": [1.0, 0.0], "travel": [-1.0, 1.0], "rate": 0.5, "max_force": 50.0},
+    "wheel": {"axis": [0.0, 1.0], "travel": [-1.0, 1.0], "stiffness": 100.0, "damping": 1.0, "rate": 1.0},
 }
 
 

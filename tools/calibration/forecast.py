@@ -39,7 +39,7 @@ from sandbox.measure.proportion import Proportion
 from sandbox.measure.run.runner import run
 from sandbox.measure.starts import Starts
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.files.load import from_document
@@ -193,7 +193,7 @@ def energy_gain(scene: Scene, done: Trajectory) -> float:
     The reference is at least the energy that lifts every body by its own width, for bodies at rest. The result is 0 if
     thrusts, motors, moving surfaces, kinematic bodies or wind do work.
     """
-    motors = len(scene.joint_arrays.of(JointKind.MOTOR))
+    motors = len(scene.joint_arrays.of(*MOTORS))
     belts = any(each.surface_speed for each in scene.fixed)
     if scene.thrusts or any(scene.world.wind) or motors or belts or scene.bodies.kinematic.any():
         return 0.0

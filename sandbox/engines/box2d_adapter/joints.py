@@ -1,6 +1,7 @@
 """Joints in a Box2D world, their breaking, and the forces of springs.
 
-Motors and rotary limits are part of the pivot between their two bodies. Springs are forces, constant during a substep.
+Motors and rotary limits are part of the pivot between their two bodies. Welds, prismatic joints and wheels are Box2D's
+own. Springs, also those of wheels, are forces, constant during a substep.
 """
 
 import math
@@ -14,12 +15,12 @@ from sandbox.engines.box2d_adapter.requirements import MERGED
 from sandbox.engines.box2d_adapter.world import Box2DWorld
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.springs import SpringExtent, rotary_torques, spring_tensions
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointArrays, JointKind
 
 SPRINGS = JointKind.SPRING, JointKind.ROTARY_SPRING
 
 UNLIMITED_TORQUE = 1e30
-"""N·m in Box2D's units, practically unlimited"""
+"""N·m or N in Box2D's units, practically unlimited"""
 
 
 class WorldJoints:
@@ -31,9 +32,12 @@ class WorldJoints:
         joints = store.setup.joints
         for k in store.intact_joints().tolist():
             kind = JointKind(int(joints.kind[k]))
+            if joints.part_of[k] != joints.number[k]:
+                continue
             if kind not in MERGED and (kind not in SPRINGS or (joints.a[k] != WORLD and not joints.collide[k])):
                 self._joints[k] = world.create_joint(self._definition(joints, k))
         self.has_springs = bool(np.isin(joints.kind, SPRINGS).any())
+        self.has_linear_motors = bool((joints.kind == JointKind.LINEAR_MOTOR).any())
         self.has_breakable = bool(np.isfinite(joints.strength).any())
         """whether joints can break"""
 
@@ -59,12 +63,10 @@ class WorldJoints:
                 joint.enable_spring, joint.hertz = True, 0.0  # no spring, and not rigid: only the limits act
                 joint.enable_limit, joint.min_length, joint.max_length = True, x * scale, y * scale
             case JointKind.GROOVE:
-                joint = box2d.WheelJointDef()
-                along = joints.figures[k, :2] - joints.anchor_a[k]
-                length = float(np.hypot(*along))
-                joint.local_axis_a = tuple((along / length).tolist())
-                joint.enable_spring = False
-                joint.enable_limit, joint.lower_translation, joint.upper_translation = True, 0.0, length * scale
+                joint = self._along_axis(joints, k)
+            case JointKind.PIVOT if joints.is_compound[k]:
+                joint = box2d.WeldJointDef()
+                joint.reference_angle = math.remainder(float(joints.figures[self._parts(joints, k)[0], 0]), math.tau)
             case _:
                 joint = self._pivot(joints, k)
         joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
@@ -73,12 +75,39 @@ class WorldJoints:
         joint.collide_connected = bool(joints.collide[k])
         return joint
 
+    def _parts(self, joints: JointArrays, k: int) -> list[int]:
+        """Return the further rows of the joint whose first row is k."""
+        return [int(row) for row in joints.whole(np.asarray([k]))[1:]]
+
+    def _along_axis(self, joints: JointArrays, k: int) -> Any:
+        """Return the definition of a groove, a prismatic joint or a wheel, whose first row is k."""
+        scale, kinds = self._world.scale, {int(joints.kind[part]): part for part in self._parts(joints, k)}
+        along = joints.figures[k, :2] - joints.anchor_a[k]
+        length = float(np.hypot(*along))
+        if JointKind.GEAR in kinds:
+            joint = box2d.PrismaticJointDef()
+            joint.reference_angle = math.remainder(float(joints.figures[kinds[JointKind.GEAR], 0]), math.tau)
+        else:
+            joint = box2d.WheelJointDef()
+        if JointKind.LINEAR_MOTOR in kinds:
+            motor = kinds[JointKind.LINEAR_MOTOR]
+            joint.enable_motor, joint.motor_speed = True, float(joints.figures[motor, 2]) * scale
+            joint.max_motor_force = min(float(joints.max_force[motor]) * scale, UNLIMITED_TORQUE)
+        if JointKind.MOTOR in kinds:
+            motor = kinds[JointKind.MOTOR]
+            joint.enable_motor, joint.motor_speed = True, float(joints.figures[motor, 0])
+            joint.max_motor_torque = min(float(joints.max_force[motor]) * scale**2, UNLIMITED_TORQUE)
+        joint.local_axis_a = tuple((along / length).tolist())
+        joint.enable_spring = False
+        joint.enable_limit, joint.lower_translation, joint.upper_translation = True, 0.0, length * scale
+        return joint
+
     def _pivot(self, joints: JointArrays, k: int) -> Any:
         """Return the definition of a pivot, with the motor and the rotary limit of its two bodies."""
         joint, scale = box2d.RevoluteJointDef(), self._world.scale
         intact = np.isin(np.arange(len(joints)), self._store.intact_joints())
-        between = np.flatnonzero((joints.a == joints.a[k]) & (joints.b == joints.b[k]) & intact)
-        for other in between.tolist():
+        between = (joints.a == joints.a[k]) & (joints.b == joints.b[k]) & intact & ~joints.is_compound
+        for other in np.flatnonzero(between).tolist():
             low, high, _ = joints.figures[other].tolist()
             if joints.kind[other] == JointKind.MOTOR:
                 joint.enable_motor, joint.motor_speed = True, low
@@ -107,14 +136,30 @@ class WorldJoints:
         joints = self._store.setup.joints
         if joints is before:
             return
-        changed = (joints.figures[:, 0] != before.figures[:, 0]) | (joints.max_force != before.max_force)
-        for motor in np.flatnonzero(changed & (joints.kind == JointKind.MOTOR)).tolist():
-            between = (joints.a == joints.a[motor]) & (joints.b == joints.b[motor]) & (joints.kind == JointKind.PIVOT)
-            for k in np.flatnonzero(between).tolist():
+        changed = (joints.figures != before.figures).any(axis=1) | (joints.max_force != before.max_force)
+        for motor in np.flatnonzero(changed & np.isin(joints.kind, MOTORS)).tolist():
+            if joints.is_compound[motor]:
+                holders = joints.number == joints.part_of[motor]
+            else:
+                holders = (joints.a == joints.a[motor]) & (joints.b == joints.b[motor])
+                holders &= (joints.kind == JointKind.PIVOT) & ~joints.is_compound
+            for k in np.flatnonzero(holders).tolist():
                 if k in self._joints:
                     definition, joint = self._definition(joints, k), self._joints[k]
-                    joint.motor_speed, joint.max_motor_torque = definition.motor_speed, definition.max_motor_torque
+                    limit = "max_motor_force" if joints.kind[motor] == JointKind.LINEAR_MOTOR else "max_motor_torque"
+                    joint.motor_speed = definition.motor_speed
+                    setattr(joint, limit, getattr(definition, limit))
                     joint.wake_bodies()
+
+    def limit_linear_motors(self, length: float) -> None:
+        """Set the speeds of motors along axes so that a step of a length, s, does not pass the end of the travel."""
+        joints = self._store.setup.joints
+        for motor in np.flatnonzero(joints.kind == JointKind.LINEAR_MOTOR).tolist():
+            joint = self._joints.get(int(np.flatnonzero(joints.number == joints.part_of[motor])[0]))
+            if joint is not None:
+                before, after = joint.lower_limit - joint.translation, joint.upper_limit - joint.translation
+                speed = float(joints.figures[motor, 2]) * self._world.scale
+                joint.motor_speed = min(max(speed, before / length), after / length)
 
     def forget(self) -> None:
         """Forget joints whose bodies were removed with them."""
@@ -151,6 +196,10 @@ class WorldJoints:
                 force = joint.get_constraint_force()
                 if math.hypot(force.x, force.y) > joints.strength[k] * self._world.scale:
                     found.append(k)
+        for k in np.flatnonzero(np.isfinite(joints.strength) & (joints.part_of != joints.number)).tolist():
+            weld = self._joints.get(int(np.flatnonzero(joints.number == joints.part_of[k])[0]))
+            if weld is not None and abs(weld.get_constraint_torque()) > joints.strength[k] * self._world.scale**2:
+                found.append(k)
         store = self._store
         springs, rotary = store.joints.of(JointKind.SPRING), store.joints.of(JointKind.ROTARY_SPRING)
         if len(springs):
@@ -159,4 +208,4 @@ class WorldJoints:
         if len(rotary):
             torques = rotary_torques(rotary, store.angle, store.angular_velocity)
             found += rotary.number[np.abs(torques) > rotary.strength].tolist()
-        return np.asarray(sorted(found), np.int64)
+        return joints.whole(np.asarray(found, np.int64)) if found else np.empty(0, np.int64)

@@ -34,6 +34,7 @@ def is_installed() -> bool:
 
 def joint_faults(joints: JointArrays) -> Iterator[str]:
     """Yield why joints are not supported."""
+    joints = joints.some(~joints.is_compound)
     pairs = list(zip(joints.a.tolist(), joints.b.tolist(), joints.kind.tolist(), strict=True))
     for k, name in enumerate(joints.names):
         kind, pair = JointKind(int(joints.kind[k])), (int(joints.a[k]), int(joints.b[k]))

@@ -101,7 +101,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _has_varying_forces(self) -> bool:
         """Whether each substep has to be a step of Box2D: forces depend on the state, or there are drives or zones."""
         forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
-        return forces or self._drives is not None or self._zoned is not None
+        return forces or self._joints.has_linear_motors or self._drives is not None or self._zoned is not None
 
     @property
     def _has_forces(self) -> bool:
@@ -151,6 +151,8 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         start = store.position.copy() if self._observer is not None else None
         if self._has_forces:
             self._apply_forces(time, length)
+        if self._joints.has_linear_motors:
+            self._joints.limit_linear_motors(length)
         if self._drives is not None:
             self._drives.plan(length)
         rows = world.raw_rows(1)

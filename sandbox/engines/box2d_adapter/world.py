@@ -452,6 +452,8 @@ class Box2DWorld:
         """Create a joint."""
         if isinstance(definition, box2d.FilterJointDef):  # which pyb2d3 0.11 looks for by its former name
             return self._world.create_filter_joint(definition)
+        if isinstance(definition, box2d.WeldJointDef):  # and which it calls a gear
+            return self._world.create_weld_joint(definition)
         return self._world.create_joint(definition)
 
     def push(self, index: int, force: FloatArray, torque: float) -> None:

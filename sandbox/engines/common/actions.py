@@ -45,6 +45,7 @@ from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.game_tables import PRESETS
+from sandbox.scene.description.joints import Motor, OnAxis
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, miscues, struck
 from sandbox.scene.errors import SceneError, quoted
@@ -174,10 +175,28 @@ def set_parameter(action: SetParameter, target: ActionTarget) -> None:
             scene = _validated_again(action, target.scene)
         except AddressError as error:
             raise ActionError(f"{error}{_spawned_hint(parts, target)}") from None
+    _check_motors(action, target.scene, scene)
     setup = target.setup.with_scene(scene)
     if on_floor(setup) != on_floor(target.setup):
         raise ActionError(f"{action.path}: floor friction cannot be switched on or off during a run")
     target.change(setup)
+
+
+def _check_motors(action: SetParameter, before: Scene, scene: Scene) -> None:
+    """Check that a change of joints changes motors only, which exist before and after it.
+
+    Raises:
+        ActionError: it changes something else.
+    """
+    if scene.joints is before.joints:
+        return
+    for new, old in zip(scene.joints, before.joints, strict=True):
+        has_motor = isinstance(new, Motor) or all(
+            isinstance(each, OnAxis) and each.rate is not None for each in (new, old)
+        )
+        if new != old and not has_motor:
+            why = "has no motor" if isinstance(new, OnAxis) else f"is of a {new.kind}, which is no motor"
+            raise ActionError(f"{action.path} {why}; a motor that starts at rest has `rate = 0.0` in the scene")
 
 
 def _validated_again(action: SetParameter, scene: Scene) -> Scene:

@@ -6,8 +6,8 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.springs import SpringExtent, anchors_in_world, relative
-from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force
-from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
+from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force, rod_anchors
+from sandbox.scene.compile.joint_arrays import MOTORS, JointArrays, JointKind
 
 
 class JointImpulses(NamedTuple):
@@ -123,15 +123,19 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_s
         joint_sums: sum of the impulses of all joints but springs.
     """
     rigid, motor_joints = joints.by_kind.rigid, joints.by_kind.motors
-    no_force = np.zeros((len(motor_joints), 2))
+    a, b, no_force = motor_joints.a, motor_joints.b, np.zeros((len(motor_joints), 2))
     if not len(motor_joints):
-        return JointImpulses(motor_joints.a, motor_joints.b, no_force, no_force, no_force, np.zeros(0))
+        return JointImpulses(a, b, no_force, no_force, no_force, np.zeros(0))
     unknown = _least_squares(_unit_responses(rigid, position, angle), _stacked(joint_sums))
     first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
-    signs = np.sign(unknown[first[rigid.kind == JointKind.MOTOR]])
-    return JointImpulses(
-        motor_joints.a, motor_joints.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_joints))
-    )
+    signs = np.sign(unknown[first[np.isin(rigid.kind, MOTORS)]])
+    impulse, is_linear = signs * np.abs(joints.impulses(motor_joints)), motor_joints.kind == JointKind.LINEAR_MOTOR
+    arm_a, point_a = anchors_in_world(a, rod_anchors(motor_joints), position, angle)
+    arm_b, point_b = anchors_in_world(b, motor_joints.anchor_b, position, angle)
+    along = point_b - point_a
+    length = np.where(is_linear, np.hypot(*along.T), 1.0)
+    linear = np.where(is_linear, impulse / length, 0.0)[:, None] * along
+    return JointImpulses(a, b, arm_a, arm_b, linear, np.where(is_linear, 0.0, impulse))
 
 
 def set_unknown_sums(
@@ -177,7 +181,7 @@ def _unit_responses(joints: JointArrays, position: FloatArray, angle: FloatArray
     count = _component_counts(joints)
     column = np.cumsum(count) - count
     table = np.zeros((len(position) + 1, 3, int(count.sum())))
-    arm_a, point_a = anchors_in_world(joints.a, joints.anchor_a, position, angle)
+    arm_a, point_a = anchors_in_world(joints.a, rod_anchors(joints), position, angle)
     arm_b, point_b = anchors_in_world(joints.b, joints.anchor_b, position, angle)
     for k, kind in enumerate(joints.kind.tolist()):
         a, b, first_column = int(joints.a[k]), int(joints.b[k]), int(column[k])

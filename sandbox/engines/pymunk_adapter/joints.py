@@ -9,7 +9,7 @@ import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.springs import SpringExtent, rotary_torques, spring_law, spring_tensions
-from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointArrays, JointKind
 
 
 def constraint_of(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
@@ -24,9 +24,12 @@ def constraint_of(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, b
     """
     constraint = _new_constraint(joints, k, a, b)
     constraint.collide_bodies = bool(joints.collide[k])
-    constraint.error_bias = bias if math.isnan(joints.bias[k]) else float(joints.bias[k])
-    constraint.max_bias = float(joints.max_bias[k])
     constraint.max_force = float(joints.max_force[k])
+    if joints.kind[k] == JointKind.LINEAR_MOTOR:
+        constraint.error_bias = 0.0  # corrected in one step, if its speed allows that
+    else:
+        constraint.error_bias = bias if math.isnan(joints.bias[k]) else float(joints.bias[k])
+        constraint.max_bias = float(joints.max_bias[k])
     return constraint
 
 
@@ -58,8 +61,33 @@ def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body)
             ratchet = pymunk.RatchetJoint(a, b, y, z)
             ratchet.angle = x
             return ratchet
+        case JointKind.LINEAR_MOTOR:
+            return _linear_motor(a, b, joints, k)
         case kind:
             raise ValueError(f"pymunk has no {kind.name.lower()} joints")
+
+
+def _linear_motor(a: pymunk.Body, b: pymunk.Body, joints: JointArrays, k: int) -> pymunk.PinJoint:
+    """Return a motor along an axis, which pymunk lacks: a rod that corrects its length at a constant speed.
+
+    Its first anchor is on the axis, before the near end, so that the rod has the direction of the axis. Its length is
+    that at the end of the travel towards which the motor moves.
+    """
+    rod = pymunk.PinJoint(a, b, tuple(rod_anchors(joints)[k].tolist()), tuple(joints.anchor_b[k].tolist()))
+    _set_speed(rod, joints, k)
+    return rod
+
+
+def rod_anchors(joints: JointArrays) -> FloatArray:
+    """Return the first anchors of joints in pymunk, (J, 2) m: before the near end of the axis of a linear motor."""
+    is_linear = (joints.kind == JointKind.LINEAR_MOTOR)[:, None]
+    return np.where(is_linear, 2.0 * joints.anchor_a - joints.figures[:, :2], joints.anchor_a)
+
+
+def _set_speed(rod: pymunk.PinJoint, joints: JointArrays, k: int) -> None:
+    speed, travel = float(joints.figures[k, 2]), float(np.hypot(*(joints.figures[k, :2] - joints.anchor_a[k])))
+    rod.distance = travel if speed < 0.0 else 2.0 * travel
+    rod.max_bias = abs(speed)
 
 
 def spring_forces(joints: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
@@ -103,7 +131,7 @@ class JointsByKind(NamedTuple):
     rigid: JointArrays
     """all but springs and rotary springs"""
     motors: JointArrays
-    """the motors among the rigid joints"""
+    """motors of both kinds among the rigid joints"""
 
     def __bool__(self) -> bool:
         """Return whether there are any."""
@@ -142,7 +170,8 @@ class SpaceJoints:
 
     def update(self, joints: JointArrays) -> None:
         """Set the values of motors to those of the scene's joints, of which only these differ from before."""
-        if self._joints is None or joints is self._joints:
+        before = self._joints
+        if before is None or joints is before:
             return
         self._joints = joints
         for k, constraint in self._constraints.items():
@@ -150,6 +179,11 @@ class SpaceJoints:
                 rate, max_force = -float(joints.figures[k, 0]), float(joints.max_force[k])
                 if (constraint.rate, constraint.max_force) != (rate, max_force):  # to set them wakes bodies
                     constraint.rate, constraint.max_force = rate, max_force
+            elif isinstance(constraint, pymunk.PinJoint) and joints.kind[k] == JointKind.LINEAR_MOTOR:
+                speed, max_force = float(joints.figures[k, 2]), float(joints.max_force[k])
+                if (before.figures[k, 2], before.max_force[k]) != (speed, max_force):
+                    _set_speed(constraint, joints, k)
+                    constraint.max_force = max_force
         self._rebuild(self._of_constraints())
 
     def remove(self, index: int) -> None:
@@ -186,6 +220,8 @@ class SpaceJoints:
             broken.append(rotary.number[_limited(rotary, torques) > rotary.strength])
         indices = np.sort(np.concatenate(broken))
         if len(indices):
+            assert self._joints is not None
+            indices = np.intersect1d(self._joints.whole(indices), list(self._constraints))
             self._remove(indices.tolist())
         return indices
 
@@ -196,7 +232,7 @@ class SpaceJoints:
             springs, rotary = JointKind.SPRING, JointKind.ROTARY_SPRING
             present = self._present
             rigid = present.some(~np.isin(present.kind, (springs, rotary)))
-            self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(JointKind.MOTOR))
+            self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(*MOTORS))
         return self._by_kind
 
     def impulses(self, joints: JointArrays) -> FloatArray:

@@ -23,6 +23,7 @@ from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 ROD, PIVOT, SLIDE = int(JointKind.ROD), int(JointKind.PIVOT), int(JointKind.SLIDE)
 ROTARY_LIMIT, MOTOR, GEAR = int(JointKind.ROTARY_LIMIT), int(JointKind.MOTOR), int(JointKind.GEAR)
 GROOVE, PULLEY = int(JointKind.GROOVE), int(JointKind.PULLEY)
+LINEAR_MOTOR = int(JointKind.LINEAR_MOTOR)
 SPRING, ROTARY_SPRING = int(JointKind.SPRING), int(JointKind.ROTARY_SPRING)
 
 SPRINGS = (JointKind.SPRING, JointKind.ROTARY_SPRING)
@@ -31,7 +32,7 @@ CONSTRAINTS = tuple(kind for kind in JointKind if kind not in SPRINGS)
 GROOVE_ENDS = 1 + int(max(JointKind))
 """Second constraint of a groove, along it; that of the kind `GROOVE` is across it"""
 
-JACOBIAN_KINDS = (GROOVE, GROOVE_ENDS, GEAR, PULLEY)
+JACOBIAN_KINDS = (GROOVE, GROOVE_ENDS, GEAR, PULLEY, LINEAR_MOTOR)
 """Kinds whose quantity and limits are those of `constrained_value` and `value_limits`"""
 
 _spring_law = bare_kernel(spring_law)
@@ -210,9 +211,9 @@ Jacobian: TypeAlias = tuple[float, float, float, float, float, float]
 def constrained_value(joints: JointData, k: int, pose: FloatArray) -> tuple[float, Jacobian]:
     """Return the quantity that joint k, of one of `JACOBIAN_KINDS`, constrains, and its Jacobian.
 
-    It is the position of the second anchor across a groove, m, or along it; the angle of the second body relative to
-    that of a gear, rad; or the length of a pulley's rope, m. An impulse along the Jacobian acts on the second body as
-    an impulse along the groove's normal or axis, as an angular impulse, or along the rope.
+    It is the position of the second anchor across a groove, m, or along it, as that of a linear motor; the angle of the
+    second body relative to that of a gear, rad; or the length of a pulley's rope, m. An impulse along the Jacobian acts
+    on the second body as an impulse along the groove's normal or axis, as an angular impulse, or along the rope.
     """
     i, j = joints.first[k], joints.second[k]
     kind = joints.kind[k]
@@ -247,7 +248,7 @@ def value_limits(joints: JointData, k: int) -> tuple[float, float]:
     """Return the smallest and largest value of the quantity that `constrained_value` returns."""
     if joints.kind[k] == PULLEY:
         return -math.inf, joints.figures[k, 0]
-    if joints.kind[k] == GROOVE_ENDS:
+    if joints.kind[k] == GROOVE_ENDS or joints.kind[k] == LINEAR_MOTOR:
         x, y = joints.figures[k, 0] - joints.anchor[k, 0], joints.figures[k, 1] - joints.anchor[k, 1]
         return 0.0, math.sqrt(x * x + y * y)
     return 0.0, 0.0

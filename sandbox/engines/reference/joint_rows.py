@@ -18,6 +18,7 @@ from sandbox.engines.reference.joint_data import (
     GEAR,
     GROOVE_ENDS,
     JACOBIAN_KINDS,
+    LINEAR_MOTOR,
     MOTOR,
     PIVOT,
     PULLEY,
@@ -144,6 +145,9 @@ def prepare(
             inverse = inverse_jacobian_mass(i, j, jacobian, inverse_mass, inverse_moment)
             rows.mass[k, 0] = 1.0 / inverse if inverse > 0.0 else 0.0
             lower_limit, upper_limit = value_limits(joints, k)
+            if joints.kind[k] == LINEAR_MOTOR:  # not beyond the end of the travel
+                rows.target[k, 0] = min(max(joints.figures[k, 2], (lower_limit - value) / h), (upper_limit - value) / h)
+                continue
             if joints.kind[k] == PULLEY:
                 # The rope may become taut within the step: as Box2D's limits, it bounds the velocity before that.
                 slack = upper_limit - value
@@ -311,7 +315,11 @@ def joint_work(rows: VelocityConstraints, joints: JointData, velocity: FloatArra
                 work += done
             continue
         if rows.kind[k] == JACOBIAN:
-            work += x * jacobian_rate(i, j, _row_jacobian(rows, k), velocity)
+            done = x * jacobian_rate(i, j, _row_jacobian(rows, k), velocity)
+            if joints.kind[k] == LINEAR_MOTOR:
+                motors += done
+            else:
+                work += done
             continue
         if rows.kind[k] != POINT:
             x, y = x * rows.normal[k, 0], x * rows.normal[k, 1]

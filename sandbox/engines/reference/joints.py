@@ -27,7 +27,6 @@ from sandbox.engines.reference.joint_data import (
     CONSTRAINTS,
     GROOVE_ENDS,
     MAX_STRETCH,
-    MOTOR,
     SPRINGS,
     JointData,
     add_spring_forces,
@@ -46,7 +45,7 @@ from sandbox.engines.reference.joint_rows import (
     write_joint_impulses,
 )
 from sandbox.engines.reference.position_joints import project
-from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, JointArrays, JointKind
 
 LIMITS = (JointKind.SLIDE, JointKind.ROTARY_LIMIT, JointKind.PULLEY, GROOVE_ENDS)
 """Kinds that act at a limit only"""
@@ -205,7 +204,7 @@ class JointSolver:
         bound[:, 0] = np.where(either | (impulse[:, 0] < 0.0), -h * self.constraints.max_force, 0.0)
         bound[:, 1] = np.where(either | (impulse[:, 0] > 0.0), h * self.constraints.max_force, 0.0)
         self.rows.impulse[:] = impulse  # applied already, but part of the accumulated impulse
-        self.rows.target[self.constraints.kind != MOTOR] = 0.0
+        self.rows.target[~np.isin(self.constraints.kind, MOTORS)] = 0.0
         self._iterate(moved[1])
 
     def work(self, velocity: FloatArray) -> tuple[float, float]:
@@ -248,7 +247,7 @@ class JointBreaker:
     """
 
     def __init__(self, joints: JointArrays) -> None:
-        self._strength = joints.strength
+        self._joints, self._strength = joints, joints.strength
         self._breakable: IntArray = np.flatnonzero(np.isfinite(joints.strength))
         self._impulse: FloatArray = np.zeros((len(joints), 2))  # N·s or N·m·s, in this substep
 
@@ -262,10 +261,11 @@ class JointBreaker:
         self._impulse += impulse
 
     def find_broken(self, h: float) -> IntArray:
-        """Return the indices of the joints that break at the end of a substep of h, s."""
+        """Return the rows of the joints that break at the end of a substep of h, s."""
         force = np.hypot(*self._impulse[self._breakable].T) / h
         self._impulse[:] = 0.0
         broken: IntArray = self._breakable[force > self._strength[self._breakable]]
         if len(broken):
+            broken = self._joints.whole(broken)
             self._breakable = np.setdiff1d(self._breakable, broken)
         return broken

@@ -19,6 +19,7 @@ from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
     JACOBIAN_KINDS,
+    LINEAR_MOTOR,
     MOTOR,
     PIVOT,
     ROTARY_LIMIT,
@@ -163,15 +164,20 @@ def _solve_value(
     direction: FloatArray,
     jacobian: FloatArray,
 ) -> None:
-    """Solve joint k of one of the kinds of `constrained_value`."""
+    """Solve joint k of one of the kinds of `constrained_value`. A motor moves its value from that at the start."""
     i, j = joints.first[k], joints.second[k]
     value, axes = constrained_value(joints, k, pose)
-    if shake:
-        _, axes = constrained_value(joints, k, start)
+    lower, upper = value_limits(joints, k)
+    if shake or joints.kind[k] == LINEAR_MOTOR:
+        start_value, start_axes = constrained_value(joints, k, start)
+        if shake:
+            axes = start_axes
+        if joints.kind[k] == LINEAR_MOTOR:
+            lower = upper = min(max(start_value + joints.figures[k, 2] * h, lower), upper)
     inverse = inverse_jacobian_mass(i, j, axes, inverse_mass, inverse_moment)
     if inverse == 0.0:
         return
-    old, (lower, upper) = multiplier[k, 0], value_limits(joints, k)
+    old = multiplier[k, 0]
     new, bound = _bounded_multiplier(value - inverse * old, lower, upper, inverse), joints.max_force[k] * h * h
     new = min(max(new, -bound), bound)
     multiplier[k, 0] = new

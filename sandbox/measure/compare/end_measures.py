@@ -67,7 +67,8 @@ def fallen(run: Trajectory, context: EvaluationContext) -> float:
 
 def broken(run: Trajectory, context: EvaluationContext) -> float:
     """Return the number of broken joints."""
-    return float(np.isfinite(run.breaks(len(context.scene.joint_arrays))).sum())
+    joints = context.scene.joint_arrays
+    return float(joints.count_among(np.flatnonzero(np.isfinite(run.breaks(len(joints))))))
 
 
 def _staying(run: Trajectory, context: EvaluationContext) -> BoolArray:

@@ -10,7 +10,7 @@ from sandbox.measure.metrics.perturbation import agreement_time, perturb
 from sandbox.measure.metrics.trajectory_error import Errors, errors
 from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.joint_arrays import JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import MAX_STEPS
@@ -107,7 +107,7 @@ def refine(scene: Scene, settings: Settings, tolerance: float) -> RefinedRun | N
 
 def preferred_settings(scene: Scene) -> tuple[dict[str, object], ...]:
     """Return the choices of methods that converge fastest in a scene, the best first."""
-    if len(scene.joint_arrays.of(*CONSTRAINT_KINDS, JointKind.MOTOR)):
+    if len(scene.joint_arrays.of(*CONSTRAINT_KINDS, *MOTORS)):
         return JOINT_SETTINGS, *PREFERENCES
     return PREFERENCES if contact_matrix(scene).touches.any() else (SMOOTH_SETTINGS, *PREFERENCES)
 

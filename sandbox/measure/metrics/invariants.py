@@ -11,7 +11,7 @@ from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import AIR, demands
-from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, JointArrays, JointKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -77,7 +77,7 @@ def conserves_energy(scene: Scene) -> bool:
         return False
     springs, motors = (
         scene.joint_arrays.of(JointKind.SPRING, JointKind.ROTARY_SPRING),
-        scene.joint_arrays.of(JointKind.MOTOR),
+        scene.joint_arrays.of(*MOTORS),
     )
     slides = scene.joint_arrays.of(JointKind.SLIDE)
     if springs.figures[:, 2].any() or len(motors) or len(slides) or scene.joint_arrays.is_limited.any():
@@ -95,7 +95,7 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     body by its own width. Energy that explicit Euler adds in free flight, m·g²·h·t/2, does not count.
     """
     joints = scene.joint_arrays
-    if scene.thrusts or scene.drives or any(scene.world.wind) or len(joints.of(JointKind.MOTOR)):
+    if scene.thrusts or scene.drives or any(scene.world.wind) or len(joints.of(*MOTORS)):
         return 0.0
     if scene.bodies.kinematic.any():
         return 0.0

@@ -10,7 +10,7 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.joint_arrays import WORLD, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointKind
 from sandbox.scene.compile.potential import Potential
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_SPEED
@@ -107,7 +107,7 @@ class SpeedBounds:
             found.append("kinematic bodies")
         if self.matrix.moving_surfaces:
             found.append("moving surfaces")
-        if len(scene.joint_arrays.of(JointKind.MOTOR)):
+        if len(scene.joint_arrays.of(*MOTORS)):
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")

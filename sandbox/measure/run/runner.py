@@ -125,7 +125,11 @@ def run(
     work, state_hash = dict(simulation.work), simulation.state_hash()
 
     outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
-    outcome |= {"audited": audit, "state_hash": state_hash, "broken": len(simulation.broken)}
+    outcome |= {
+        "audited": audit,
+        "state_hash": state_hash,
+        "broken": simulation.setup.joints.count_among(simulation.broken),
+    }
     info = _info(scene, engine, resolved, end.done, **outcome)
     if bout is not None:
         info["game"] = bout.to_dict(scene.play.game or "")

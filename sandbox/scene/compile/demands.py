@@ -13,11 +13,13 @@ from sandbox.arrays import BoolArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.derived import derived_once
-from sandbox.scene.compile.joint_arrays import JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.joints import Joined, Prismatic, Weld, Wheel
+from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.world import World
 
 
@@ -54,6 +56,9 @@ class Demand(StrEnum):
     ROTARY_SPRINGS = "rotary springs"
     PULLEYS = "pulleys"
     RATCHETS = "ratchets"
+    WELDS = "welds"
+    PRISMATICS = "prismatic joints"
+    WHEELS = "wheels"
     MAX_FORCE = "max_force of joints"
     MAX_BIAS = "max_bias of joints"
     JOINT_BIAS = "bias of joints"
@@ -126,7 +131,14 @@ DEMAND_OF_JOINT = {
 }
 """Demands of each kind of joint."""
 
-JOINTS = frozenset(DEMAND_OF_JOINT.values())
+DEMAND_OF_COMPOUND: dict[type[Joined], Demand] = {
+    Weld: Demand.WELDS,
+    Prismatic: Demand.PRISMATICS,
+    Wheel: Demand.WHEELS,
+}
+"""Demands of joints that consist of several rows"""
+
+JOINTS = frozenset({*DEMAND_OF_JOINT.values(), *DEMAND_OF_COMPOUND.values()})
 
 JOINT_LIMITS = frozenset({Demand.MAX_FORCE, Demand.MAX_BIAS, Demand.JOINT_BIAS})
 """Demands of the keys of joints that limit or change how they hold"""
@@ -271,9 +283,13 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
 
 def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     scene, joints = setup.scene, setup.joints
-    has_limit = np.isfinite(joints.max_force) & (joints.kind != JointKind.MOTOR)  # that of a motor is part of motors
+    has_limit = np.isfinite(joints.max_force) & ~np.isin(joints.kind, MOTORS)  # that of a motor is part of motors
+    simple = ~joints.is_compound
+    present = set(joints.names) if not simple.all() else set()
+    kinds = [type(each) for k, each in enumerate(scene.joints) if (each.name or default_name("joint", k)) in present]
     for demand, applies in (
-        *((demand, joints.kind == kind) for kind, demand in DEMAND_OF_JOINT.items()),
+        *((demand, (joints.kind == kind) & simple) for kind, demand in DEMAND_OF_JOINT.items()),
+        *((demand, [each is kind for each in kinds]) for kind, demand in DEMAND_OF_COMPOUND.items()),
         (Demand.MAX_FORCE, has_limit),
         (Demand.MAX_BIAS, np.isfinite(joints.max_bias)),
         (Demand.JOINT_BIAS, np.isfinite(joints.bias)),

@@ -1,4 +1,8 @@
-"""Joints of a scene as arrays, J of them, by the indices of their bodies."""
+"""Joints of a scene as arrays, J rows, by the indices of their bodies.
+
+Most joints are one row. A weld, a prismatic joint and a wheel consist of several: the first is at the place of the
+joint, the others follow those of all joints, and `part_of` relates them.
+"""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
@@ -40,7 +44,12 @@ class JointKind(IntEnum):
     """length of the rope, m, and ratio: length_a + ratio·length_b is at most the length"""
     RATCHET = 10
     """last click, phase and angle between two clicks, of angle_b − angle_a, rad"""
+    LINEAR_MOTOR = 11
+    """far end of the axis in the first body's frame, m, `anchor_a` is its near end; speed along it, m/s"""
 
+
+MOTORS = (JointKind.MOTOR, JointKind.LINEAR_MOTOR)
+"""Kinds that prescribe a rate, up to a largest force or torque"""
 
 TURNING = (
     JointKind.GROOVE,
@@ -49,6 +58,7 @@ TURNING = (
     JointKind.GEAR,
     JointKind.ROTARY_SPRING,
     JointKind.RATCHET,
+    JointKind.LINEAR_MOTOR,
 )
 """Kinds that can rotate bodies at any anchor; the others only at anchors off the centre of mass."""
 
@@ -92,6 +102,8 @@ class JointArrays:
     """(J,) force or torque at which each breaks, N or N·m; inf if it cannot"""
     number: IntArray
     """(J,) index of each among the joints of the whole scene; 0 to J − 1 unless this is a selection"""
+    part_of: IntArray
+    """(J,) `number` of the first row of the joint that each row belongs to"""
     names: tuple[str, ...]
     """(J,)"""
 
@@ -119,6 +131,7 @@ class JointArrays:
             collide=np.empty(0, np.bool_),
             strength=np.empty(0),
             number=np.empty(0, np.int64),
+            part_of=np.empty(0, np.int64),
             names=(),
         )
 
@@ -152,6 +165,7 @@ class JointArrays:
             collide=np.zeros(count, np.bool_),
             strength=np.full(count, np.inf),
             number=np.arange(count),
+            part_of=np.arange(count),
             names=("",) * count,
         )
 
@@ -173,12 +187,27 @@ class JointArrays:
         return replace(self, names=(*self.names, *more.names), **columns)
 
     def counted(self) -> Self:
-        """Return these joints numbered as those of a whole scene."""
-        return replace(self, number=np.arange(len(self)))
+        """Return these joints numbered as those of a whole scene, in the order of their numbers so far."""
+        return replace(self, number=np.arange(len(self)), part_of=np.searchsorted(self.number, self.part_of))
+
+    @property
+    def is_compound(self) -> BoolArray:
+        """(J,) whether each row belongs to a joint of several rows."""
+        return np.asarray(np.isin(self.part_of, self.part_of[self.part_of != self.number]))
+
+    def whole(self, rows: IntArray) -> IntArray:
+        """Return the rows of the joints that some rows belong to, in ascending order: a joint breaks as a whole."""
+        return np.flatnonzero(np.isin(self.part_of, self.part_of[rows]))
+
+    def count_among(self, rows: Collection[int] | IntArray) -> int:
+        """Return the number of joints that some rows belong to."""
+        return len(np.unique(self.part_of[list(rows)])) if len(rows) else 0
 
     def without(self, broken: Collection[int]) -> Self:
-        """Return the joints without those of some indices in the whole scene."""
-        return self.some(~np.isin(self.number, list(broken))) if broken else self
+        """Return the joints without those of some indices in the whole scene; a compound one is left out as a whole."""
+        if not broken:
+            return self
+        return self.some(~np.isin(self.part_of, self.part_of[np.isin(self.number, list(broken))]))
 
     def of(self, *kinds: JointKind) -> Self:
         """Return the joints of some kinds."""

@@ -1,8 +1,9 @@
 """Joints of a scene as arrays, including those of ropes, cloths and ragdolls."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -20,9 +21,11 @@ from sandbox.scene.description.joints import (
     ForceLimited,
     Gear,
     Groove,
+    Joined,
     Joint,
     Motor,
     Pivot,
+    Prismatic,
     Pulley,
     Ratchet,
     Rod,
@@ -30,6 +33,8 @@ from sandbox.scene.description.joints import (
     RotarySpring,
     Slide,
     Spring,
+    Weld,
+    Wheel,
 )
 from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.geometry.shapes import geometry_of
@@ -104,7 +109,7 @@ def _to_body_frame(position: Point, number: int, bodies: Bodies) -> FloatArray:
     return rotated(np.asarray([position]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
 
 
-KINDS: dict[type, JointKind] = {
+KINDS: dict[type[Joined], JointKind] = {
     Rod: JointKind.ROD,
     Pivot: JointKind.PIVOT,
     Slide: JointKind.SLIDE,
@@ -116,41 +121,141 @@ KINDS: dict[type, JointKind] = {
     RotarySpring: JointKind.ROTARY_SPRING,
     Pulley: JointKind.PULLEY,
     Ratchet: JointKind.RATCHET,
+    Weld: JointKind.PIVOT,
+    Prismatic: JointKind.GROOVE,
+    Wheel: JointKind.GROOVE,
 }
+"""Kind of the first row of each joint"""
 
 
 def compile_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
-    """Return the joints of a scene between its bodies: those of the file, then those of generators."""
-    return _file_joints(scene, bodies).joined(generator_joints(scene, bodies)).counted()
+    """Return the joints of a scene between its bodies.
 
-
-def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
-    """Return the joints of the file."""
-    if not scene.joints:
-        return JointArrays.none()
+    Those of the file come first, then those of generators, then the further rows of compound joints.
+    """
     number = {name: k for k, name in enumerate(bodies.names)}
-    rows = [_row(joint, bodies, number) for joint in scene.joints]
-    a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
-    max_force, max_bias, bias = zip(*map(_limits, scene.joints), strict=True)
-    wheels = [
-        (*joint.wheels[0], *joint.wheels[1]) if isinstance(joint, Pulley) else (0.0,) * 4 for joint in scene.joints
-    ]
+    first = [_first_row(joint, k, bodies, number) for k, joint in enumerate(scene.joints)]
+    parts = [part for row, joint in zip(first, scene.joints, strict=True) for part in _parts(row, joint, bodies)]
+    joints = _as_arrays(first).joined(generator_joints(scene, bodies))
+    owner = np.concatenate((np.arange(len(joints)), np.asarray([part.part_of for part in parts], np.int64)))
+    joints = joints.joined(_as_arrays(parts))
+    return replace(joints, number=np.arange(len(joints)), part_of=owner)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A row of `JointArrays`."""
+
+    name: str
+    kind: JointKind
+    a: int
+    b: int
+    anchor_a: Point
+    anchor_b: Point
+    figures: tuple[float, float, float]
+    collide: bool
+    part_of: int
+    wheels: tuple[float, ...] = (0.0,) * 4
+    max_force: float | None = None
+    max_bias: float | None = None
+    bias: float | None = None
+    strength: float | None = None
+
+
+def _as_arrays(rows: Sequence[_Row]) -> JointArrays:
+    """Return rows as arrays."""
+    if not rows:
+        return JointArrays.none()
     return JointArrays(
-        kind=np.asarray([KINDS[type(joint)] for joint in scene.joints], dtype=np.int64),
-        a=np.asarray(a, dtype=np.int64),
-        b=np.asarray(b, dtype=np.int64),
-        anchor_a=np.asarray(anchor_a, dtype=np.float64).reshape(-1, 2),
-        anchor_b=np.asarray(anchor_b, dtype=np.float64).reshape(-1, 2),
-        figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
-        wheels=np.asarray(wheels, dtype=np.float64).reshape(-1, 4),
-        max_force=_column(max_force, math.inf),
-        max_bias=_column(max_bias, math.inf),
-        bias=_column(bias, math.nan),
-        collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
-        strength=_column([joint.strength for joint in scene.joints], math.inf),
-        number=np.arange(len(scene.joints)),
-        names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
+        kind=np.asarray([row.kind for row in rows], dtype=np.int64),
+        a=np.asarray([row.a for row in rows], dtype=np.int64),
+        b=np.asarray([row.b for row in rows], dtype=np.int64),
+        anchor_a=np.asarray([row.anchor_a for row in rows], dtype=np.float64),
+        anchor_b=np.asarray([row.anchor_b for row in rows], dtype=np.float64),
+        figures=np.asarray([row.figures for row in rows], dtype=np.float64),
+        wheels=np.asarray([row.wheels for row in rows], dtype=np.float64),
+        max_force=_column([row.max_force for row in rows], math.inf),
+        max_bias=_column([row.max_bias for row in rows], math.inf),
+        bias=_column([row.bias for row in rows], math.nan),
+        collide=np.asarray([row.collide for row in rows], dtype=np.bool_),
+        strength=_column([row.strength for row in rows], math.inf),
+        number=np.arange(len(rows)),
+        part_of=np.asarray([row.part_of for row in rows], dtype=np.int64),
+        names=tuple(row.name for row in rows),
     )
+
+
+def _first_row(joint: Joint, k: int, bodies: Bodies, number: dict[str, int]) -> _Row:
+    """Return the row at the place of a joint; of most joints, the only one."""
+    a, b, anchor_a, anchor_b, figures = _geometry(joint, bodies, number)
+    max_force, max_bias, bias = _limits(joint)
+    return _Row(
+        name=joint.name or default_name("joint", k),
+        kind=KINDS[type(joint)],
+        a=a,
+        b=b,
+        anchor_a=anchor_a,
+        anchor_b=anchor_b,
+        figures=figures,
+        collide=joint.collide,
+        part_of=k,
+        wheels=(*joint.wheels[0], *joint.wheels[1]) if isinstance(joint, Pulley) else (0.0,) * 4,
+        max_force=max_force,
+        max_bias=max_bias,
+        bias=bias,
+        strength=joint.strength,
+    )
+
+
+def _parts(first: _Row, joint: Joint, bodies: Bodies) -> Iterator[_Row]:
+    """Yield the rows of a compound joint after its first, which holds a point of the second body.
+
+    A weld is a pivot whose angle is held. A prismatic joint is a groove whose angle is held, with a motor along it. A
+    wheel is a groove with a spring along it and a motor of the angle.
+    """
+    rest = replace(first, figures=(0.0, 0.0, 0.0), strength=None)
+    free = replace(rest, anchor_a=(0.0, 0.0), anchor_b=(0.0, 0.0))  # of the angle only
+    match joint:
+        case Weld() | Prismatic():
+            turned = _angle_between(first.a, first.b, bodies)
+            strength = joint.torque_strength if isinstance(joint, Weld) else None
+            phase = turned, 1.0, 0.0  # of a gear: limits that are equal act only after an error
+            yield replace(free, name=f"{first.name} angle", kind=JointKind.GEAR, figures=phase, strength=strength)
+            if isinstance(joint, Prismatic) and joint.rate is not None:
+                far_x, far_y, _ = first.figures
+                figures = far_x, far_y, joint.rate
+                kind = JointKind.LINEAR_MOTOR
+                yield replace(rest, name=f"{first.name} motor", kind=kind, figures=figures, max_force=joint.max_force)
+        case Wheel():
+            yield _suspension(rest, joint, first)
+            if joint.rate is not None:
+                figures = joint.rate, 0.0, 0.0
+                yield replace(
+                    free,
+                    name=f"{first.name} motor",
+                    kind=JointKind.MOTOR,
+                    figures=figures,
+                    max_force=joint.max_torque,
+                )
+        case _:
+            pass
+
+
+def _suspension(rest: _Row, wheel: Wheel, first: _Row) -> _Row:
+    """Return the spring of a wheel, whose upper end is on the axis beyond the travel: its length stays above 0."""
+    least, most = wheel.travel
+    length = most - least
+    x, y = (end - start for start, end in zip(first.anchor_a, first.figures[:2], strict=True))
+    beyond = length + max(wheel.rest, most) - most
+    far_x, far_y, _ = first.figures
+    top = far_x + x * beyond / length, far_y + y * beyond / length
+    figures = most + beyond - wheel.rest, wheel.stiffness, wheel.damping
+    return replace(rest, name=f"{first.name} spring", kind=JointKind.SPRING, anchor_a=top, figures=figures)
+
+
+def _angle_between(a: int, b: int, bodies: Bodies) -> float:
+    """Return the angle of the second body relative to the first at the start, rad."""
+    return float(bodies.angle[b]) - (0.0 if a == WORLD else float(bodies.angle[a]))
 
 
 def _limits(joint: Joint) -> tuple[float | None, float | None, float | None]:
@@ -172,15 +277,15 @@ def _column(values: Sequence[float | None], default: float) -> FloatArray:
 
 def ends_of(joint: Rod | Pulley, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
     """Return the start positions of the two anchors of a joint, m; `number` has the index of each body."""
-    a, b, anchor_a, anchor_b, _ = _row(joint, bodies, number)
+    a, b, anchor_a, anchor_b, _ = _geometry(joint, bodies, number)
     return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
 
 
-JointRow = tuple[int, int, Point, Point, tuple[float, float, float]]
+_Geometry: TypeAlias = tuple[int, int, Point, Point, tuple[float, float, float]]
 
 
-def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> JointRow:
-    """Return bodies, anchors about the centres of mass, and parameters of a joint; the world comes first."""
+def _geometry(joint: Joint, bodies: Bodies, number: dict[str, int]) -> _Geometry:
+    """Return bodies, anchors about the centres of mass, and figures of a joint's first row; the world comes first."""
     if len(joint.between) == 1:
         a, b = WORLD, number[joint.between[0]]
     else:
@@ -189,6 +294,15 @@ def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> JointRow:
     match joint:
         case Pivot(at=(_, _) as at):
             return a, b, _local(at, a, bodies), _local(at, b, bodies), (0.0, 0.0, 0.0)
+        case Weld() | Prismatic() | Wheel():
+            x, y = bodies.position[b].tolist()
+            at = (x, y) if joint.at is None else joint.at
+            start = _local(at, a, bodies)
+            near, far = start, (0.0, 0.0)
+            if not isinstance(joint, Weld):
+                length = math.hypot(*joint.axis)
+                near, far = (_along(start, joint.axis, way / length) for way in joint.travel)
+            return a, b, near, _local(at, b, bodies), (*far, 0.0)
         case Anchored() | Pivot(anchors=(_, _)):
             assert joint.anchors is not None
             anchors = joint.anchors if a != WORLD else (joint.anchors[1], joint.anchors[0])
@@ -201,6 +315,10 @@ def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> JointRow:
             pass
     anchor_a, anchor_b = _about_centre(anchors[0], a, bodies), _about_centre(anchors[1], b, bodies)
     return a, b, anchor_a, anchor_b, _figures(joint, a, b, anchor_a, anchor_b, bodies)
+
+
+def _along(start: Point, axis: Point, factor: float) -> Point:
+    return start[0] + factor * axis[0], start[1] + factor * axis[1]
 
 
 def _figures(

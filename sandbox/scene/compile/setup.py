@@ -5,13 +5,15 @@ from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from typing import Any, Self, Union
 
+import numpy as np
+
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import initial_drive_states
-from sandbox.scene.compile.joint_arrays import JointArrays
+from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Passing, PlaneReach
-from sandbox.scene.description.joints import Motor
+from sandbox.scene.description.joints import Motor, Prismatic, Wheel
 from sandbox.scene.description.scene import default_name
 
 
@@ -98,8 +100,15 @@ class Setup:
         figures, max_force = self.joints.figures.copy(), self.joints.max_force.copy()
         for index, (motor, before) in enumerate(zip(scene.joints, self.scene.joints, strict=True)):
             name = motor.name or default_name("joint", index)
-            if motor != before and isinstance(motor, Motor) and name in self.joints.names:
-                row = self.joints.names.index(name)
-                figures[row, 0] = motor.rate
-                max_force[row] = math.inf if motor.max_torque is None else motor.max_torque
+            if motor == before or name not in self.joints.names:
+                continue
+            first = self.joints.names.index(name)
+            for row in self.joints.whole(np.asarray([first])).tolist():
+                kind = self.joints.kind[row]
+                if kind == JointKind.MOTOR and isinstance(motor, Motor | Wheel):
+                    figures[row, 0] = motor.rate
+                    max_force[row] = math.inf if motor.max_torque is None else motor.max_torque
+                elif kind == JointKind.LINEAR_MOTOR and isinstance(motor, Prismatic):
+                    figures[row, 2] = motor.rate
+                    max_force[row] = math.inf if motor.max_force is None else motor.max_force
         return replace(self.joints, figures=figures, max_force=max_force)

@@ -17,6 +17,7 @@ from sandbox.scene.description.base import (
     Part,
     Point,
     PointField,
+    Vector,
     default,
     default_kind,
 )
@@ -25,6 +26,7 @@ JointStrength = Annotated[float, Field(gt=0, le=1e42)]
 JointLimit = Annotated[float, Field(ge=0, le=1e42)]
 JointBias = Annotated[float, Field(ge=0, le=1)]
 JointDistance = Annotated[float, Field(ge=0, le=1e9)]
+Travel = Annotated[float, Field(ge=-1e9, le=1e9)]
 JointAngle = Annotated[float, Field(ge=-1e12, le=1e12)]
 Stiffness = Annotated[float, Field(gt=0, le=1e30)]
 Damping = Annotated[float, Field(ge=0, le=1e30)]
@@ -163,6 +165,8 @@ class Spring(Anchored, ForceLimited):
     """stiffness k, N/m"""
     damping: Damping = 0.0
     """damping c, N·s/m"""
+    pulls_only: bool = False
+    """Act only while longer than the rest length, and never push, as an elastic band."""
 
 
 class RotarySpring(ForceLimited):
@@ -194,7 +198,69 @@ class Pulley(Anchored):
     """length of the rope, m; default: length₁ + ratio·length₂ at the start"""
 
 
+class Weld(Joined):
+    """Holds two bodies together as they are at the start: neither their distance nor their angle changes."""
+
+    kind: Literal["weld"] = default_kind("weld")
+    at: OptionalPoint = default(None)
+    """point in the world at the start at which it holds them, m; default: the centre of mass of the second body. The
+    force is that at this point, so it matters for the strengths"""
+    torque_strength: JointStrength | None = None
+    """torque at which it breaks, N·m; default: unbreakable"""
+
+
+class OnAxis(Joined):
+    """A joint that lets a point of the second body move along an axis of the first."""
+
+    axis: Accepts[Vector, Sequence[float]]
+    """direction of the axis in the frame of the first body, any length; with one body, in the world"""
+    at: OptionalPoint = default(None)
+    """the point, in the world at the start, m; default: the centre of mass of the second body"""
+    travel: Accepts[tuple[Travel, Travel], Sequence[float]]
+    """smallest and largest displacement along the axis, m; it is 0 at the start"""
+    rate: Annotated[float, Field(ge=-1e12, le=1e12)] | None = None
+    """speed of the motor, m/s along the axis up to the end of the travel, rad/s of a wheel; default: no motor"""
+
+
+class Prismatic(OnAxis):
+    """Lets the second body slide along an axis of the first without turning relative to it, as a piston or a lift."""
+
+    kind: Literal["prismatic"] = default_kind("prismatic")
+    max_force: JointLimit | None = None
+    """largest force of the motor, N; default: unlimited"""
+
+
+class Wheel(OnAxis):
+    """A wheel with its suspension: the hub moves along an axis of the first body, with a spring, and the wheel turns.
+
+    The spring acts along the axis: F = −k (s − s₀) − c ṡ, s the displacement of the hub.
+    """
+
+    kind: Literal["wheel"] = default_kind("wheel")
+    stiffness: Stiffness
+    """stiffness k, N/m"""
+    damping: Damping = 0.0
+    """damping c, N·s/m"""
+    rest: Travel = 0.0
+    """displacement s₀ without force of the spring, m"""
+    max_torque: JointLimit | None = None
+    """largest torque of the motor, N·m; default: unlimited"""
+
+
 Joint = Annotated[
-    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring | Pulley | Ratchet,
+    Rod
+    | Pivot
+    | Slide
+    | Groove
+    | RotaryLimit
+    | Motor
+    | Gear
+    | Spring
+    | RotarySpring
+    | Pulley
+    | Ratchet
+    | Weld
+    | Prismatic
+    | Wheel,
     Field(discriminator="kind"),
 ]

@@ -11,7 +11,18 @@ from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive
-from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Pulley, Ratchet, Rod, RotaryLimit, Slide
+from sandbox.scene.description.joints import (
+    Gear,
+    Groove,
+    Joint,
+    OnAxis,
+    Pivot,
+    Pulley,
+    Ratchet,
+    Rod,
+    RotaryLimit,
+    Slide,
+)
 from sandbox.scene.description.play import marking_fault
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
@@ -120,6 +131,12 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
         case Groove():
             if math.dist(*joint.groove) < SHORTEST:
                 yield "groove", f"is too short; its ends must be at least {SHORTEST:g} m apart"
+        case OnAxis():
+            least, most = joint.travel
+            if math.hypot(*joint.axis) < SHORTEST:
+                yield "axis", "has no direction; give one of any length, such as [0.0, 1.0]"
+            if not least <= 0.0 <= most or most - least < SHORTEST:
+                yield "travel", "must contain 0, the displacement at the start, as [-0.5, 0.5] does"
         case _:
             pass
 

@@ -141,7 +141,7 @@ def _joint_elements(scene: Scene, name: str) -> list[ElementKey | None]:
     joints = scene.joint_arrays
     if name not in joints.names:
         return []
-    index = joints.names.index(name)
+    index = int(joints.part_of[joints.names.index(name)])
     if index < len(scene.joints):
         return [ElementKey("joint", index)]
     return [element_of_body(scene, int(joints.b[index]))]

@@ -282,7 +282,8 @@ class LiveView:
             self._contact_interval = self.session.time - before
             self._read_contacts()
             self.diagnostics.advance(self.session.take_replayed_actions())
-            broken = len(self.session.simulation.broken)
+            simulation = self.session.simulation
+            broken = simulation.setup.joints.count_among(simulation.broken)
             self.notifications.extend(self._break_notifier.update(broken, self.session.time))
         if self.session.ended is not None and not self._end_notified:
             self._end_notified = True

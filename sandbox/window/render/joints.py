@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
 from sandbox.scene.compile.joint_arrays import JointArrays, JointKind, last_click
 from sandbox.scene.description.forces import PlungerDrive
@@ -73,7 +73,10 @@ class JointSegments:
 
     def of(self, *kinds: JointKind) -> "JointSegments":
         """Return the joints of the given kinds."""
-        which = np.isin(self.joints.kind, kinds)
+        return self.some(np.isin(self.joints.kind, kinds))
+
+    def some(self, which: BoolArray) -> "JointSegments":
+        """Return a selection of the joints, by a mask."""
         return JointSegments(self.joints.some(which), self.ends[which])
 
     @property
@@ -224,6 +227,7 @@ _TINTS: dict[JointKind, RgbColour] = {
     JointKind.ROTARY_SPRING: SKY,
     JointKind.PULLEY: SKY,
     JointKind.RATCHET: GREEN,
+    JointKind.LINEAR_MOTOR: ORANGE,
 }
 
 
@@ -252,7 +256,12 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
         JointKind.ROTARY_SPRING: _draw_rotary_springs,
         JointKind.MOTOR: _draw_motors,
         JointKind.RATCHET: _draw_ratchets,
+        JointKind.LINEAR_MOTOR: _draw_linear_motors,
     }
+    is_compound = joints.joints.is_compound
+    welds = joints.some(is_compound & (joints.joints.kind == JointKind.PIVOT))
+    is_hidden = np.isin(joints.joints.kind, (JointKind.PIVOT, JointKind.GEAR))  # of welds and prismatic joints
+    joints = joints.some(~(is_compound & is_hidden))
     for kind in (*renderers, JointKind.SPRING, JointKind.PULLEY, JointKind.PIVOT):
         some = joints.of(kind)
         if len(some.joints) > MAX_SYMBOLS:
@@ -271,6 +280,8 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
             _draw_dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
         if kind in (JointKind.PIVOT, JointKind.GROOVE) and 0 < len(some.joints) <= MAX_SYMBOLS:
             _draw_rings(view, some.ends[:, 2:], _TINTS[kind], discs)
+    if 0 < len(welds.joints) <= MAX_SYMBOLS:
+        _draw_welds(view, welds, discs)
 
 
 def _draw_dots(view: DrawContext, points: FloatArray, size: float, colour: RgbColour, discs: CircleRenderer) -> None:
@@ -289,6 +300,30 @@ def _draw_rings(view: DrawContext, points: FloatArray, colour: RgbColour, discs:
     tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(visible), 3))
     style = CircleStyle(1.8 * view.ui_scale, hollow=True, antialias=view.antialias)
     discs.draw(view.surface, points[visible], radius, tint, style)
+
+
+def _draw_welds(view: DrawContext, welds: JointSegments, discs: CircleRenderer) -> None:
+    """Draw a cross on a dark disc where a weld holds its bodies."""
+    points = welds.ends[:, 2:]
+    _draw_dots(view, points, 5.0, BACKGROUND, discs)
+    half = 4.0 * view.ui_scale
+    for x, y in points[view.inside(points, 10.0 * view.ui_scale)].tolist():
+        for side in (-half, half):
+            draw_line(
+                view.surface, (x - half, y - side), (x + half, y + side), YELLOW, 2.4 * view.ui_scale, view.antialias
+            )
+
+
+def _draw_linear_motors(view: DrawContext, motors: JointSegments) -> None:
+    """Draw an arrow along the axis from the point that a motor moves, in its direction."""
+    joints, frame = motors.joints, view.snapshot.frame
+    along = joints.figures[:, :2] - joints.anchor_a
+    along *= np.where(joints.figures[:, 2] < 0.0, -1.0, 1.0)[:, None]
+    turned = np.arctan2(along[:, 1], along[:, 0]) + np.where(joints.a < 0, 0.0, frame.angle[joints.a])
+    reach = LARGE_SYMBOL * view.ui_scale
+    for (_, _, x, y), angle in zip(motors.ends.tolist(), turned.tolist(), strict=True):
+        tip = x + reach * math.cos(angle), y - reach * math.sin(angle)
+        draw_arrow(view.surface, (x, y), tip, INK, 2.2 * view.ui_scale, view.antialias, BACKGROUND)
 
 
 def _draw_rod_symbols(view: DrawContext, rods: JointSegments) -> None:

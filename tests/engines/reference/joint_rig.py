@@ -37,6 +37,7 @@ def compile_joints(*links: dict[str, Any]) -> JointArrays:
         collide=column("collide", False, np.bool_),
         strength=column("strength", np.inf),
         number=np.arange(len(links)),
+        part_of=np.arange(len(links)),
         names=tuple(f"link {k}" for k in range(len(links))),
     )
 

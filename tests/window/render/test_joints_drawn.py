@@ -29,8 +29,11 @@ KINDS = {
     "rotary_spring": PAIR | {"kind": "rotary_spring", "stiffness": 1.0},
     "pulley": PAIR | {"kind": "pulley", "wheels": [[-3, 2], [3, 2]]},
     "ratchet": PAIR | {"kind": "ratchet", "ratchet": 0.5},
+    "weld": PAIR | {"kind": "weld", "at": [0, 1]},
+    "prismatic": PAIR | {"kind": "prismatic", "axis": [1, 0], "travel": [-1, 1], "rate": 1.0},
+    "wheel": PAIR | {"kind": "wheel", "axis": [0, 1], "travel": [-1, 1], "stiffness": 1.0},
 }
-WITHOUT_OVERLAY = {"rod", "slide", "spring", "pulley"}
+WITHOUT_OVERLAY = {"rod", "slide", "spring", "pulley", "wheel"}
 
 
 def scene_with(*joints: dict) -> Scene:
