@@ -273,7 +273,11 @@ class Contents:
             lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
             columns = {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
             limits = {"max_force": joints.max_force[k], "max_bias": joints.max_bias[k], "error_bias": joints.bias[k]}
+            if kind == JointKind.LINEAR_MOTOR:
+                limits |= {"max_bias": abs(joints.figures[k, 2]), "error_bias": 0.0}
             columns |= {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
+            if joints.pulls_only[k]:
+                lines += ["joint.damping = 0.0", "joint.force_func = pull({rest_length}, {stiffness}, {damping})"]
             stated = "".join(f", {key}={{{key}}}" for key in limits if key in columns)
             lines.append(f"add_joint(space, joint, collide_bodies={bool(joints.collide[k])}{stated})")
             title = literal(joints.names[k]) if joints.names[k] else f"joint {k + 1}"
@@ -346,6 +350,11 @@ JOINT_LINES: dict[JointKind, tuple[str, ...]] = {
         "joint = pymunk.DampedSpring(<a>, <b>, {anchor_a}, {anchor_b}, {rest_length}, {stiffness}, {damping})",
     ),
     JointKind.ROTARY_SPRING: ("joint = pymunk.DampedRotarySpring(<a>, <b>, {rest_angle}, {stiffness}, {damping})",),
+    JointKind.LINEAR_MOTOR: (
+        "# a motor along an axis: a rod that gets its length at the end of the travel, at the speed of the motor",
+        "joint = pymunk.PinJoint(<a>, <b>, {before_axis}, {anchor_b})",
+        "joint.distance = {end}",
+    ),
 }
 """Statements that create each kind of joint; <a> and <b> stand for its bodies."""
 
@@ -359,7 +368,11 @@ def _joint_values(joints: JointArrays, k: int, names: Sequence[str]) -> dict[str
     x, y, z = map(literal, joints.figures[k].tolist())
     opposite = literal(-float(joints.figures[k, 0]))
     a = int(joints.a[k])
+    along = joints.figures[k, :2] - joints.anchor_a[k]
+    travel = math.hypot(*along)
     return {
+        "before_axis": literal(tuple((joints.anchor_a[k] - along).tolist())),
+        "end": literal(travel if joints.figures[k, 2] < 0.0 else 2.0 * travel),
         "a": literal("" if a == WORLD else names[a]),
         "b": literal(names[int(joints.b[k])]),
         "anchor_a": literal(tuple(joints.anchor_a[k].tolist())),

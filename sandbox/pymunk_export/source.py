@@ -239,6 +239,26 @@ def _helpers(contents: Contents) -> Iterator[str]:
             "    space.add(joint)",
             "",
         )
+    if contents.setup.joints.pulls_only.any():
+        yield from (
+            "",
+            "def pull(rest, stiffness, damping):",
+            '    """Return the force of a spring that only pulls. The damper is part of it: the own one would push."""',
+            "",
+            "    def force(spring, length):",
+            "        if length <= rest:",
+            "            return 0.0",
+            "        rate = 0.0",
+            "        if damping:",
+            "            first = spring.a.local_to_world(spring.anchor_a)",
+            "            second = spring.b.local_to_world(spring.anchor_b)",
+            "            velocity = spring.b.velocity_at_world_point(second) - spring.a.velocity_at_world_point(first)",
+            "            rate = velocity.dot(second - first) / length",
+            "        return min(stiffness * (rest - length) - damping * rate, 0.0)",
+            "",
+            "    return force",
+            "",
+        )
 
 
 def _make_space(contents: Contents, static: list[str], bodies: list[str], joints: list[str]) -> Iterator[str]:

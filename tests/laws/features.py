@@ -140,6 +140,7 @@ FEATURES: dict[str, Document] = {
         "joint": [{"kind": "spring", "between": ["a", "b"], "stiffness": 1.0}],
         "zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True}],
     },
+    "elastic band": {"joint": [{**_joint("spring", "a"), "rest_length": 2.0, "pulls_only": True}]},
     **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS if kind != "pulley"},
     **{f"{kind} between two": {"joint": [_joint(kind, "a", "b")]} for kind in JOINTS},
     "friction of the ground": {

@@ -237,6 +237,22 @@ PROOFS: dict[Demand, Proof] = {
         ),
         position(math.cos(2.0), 0.0),
     ),
+    # slack until x = 1 at 0.25 s, taut for half a period, π/ω = 0.25 s with ω² = k/m, then slack on the way back
+    Demand.BANDS: Proof(
+        scene(
+            ball=[ball(0.5, vx=2.0, name="a")],
+            joint=[
+                {
+                    **_pendulum(),
+                    "kind": "spring",
+                    "rest_length": 1.0,
+                    "stiffness": (4.0 * math.pi) ** 2,
+                    "pulls_only": True,
+                }
+            ],
+        ),
+        both(position(0.0, 0.0), velocity(-2.0, 0.0)),
+    ),
     Demand.ROTARY_SPRINGS: Proof(
         scene(
             box=[box(angular_velocity=1.0)],
@@ -259,6 +275,30 @@ PROOFS: dict[Demand, Proof] = {
             joint=[AXLE, {"kind": "ratchet", "between": ["box"], "ratchet": 0.4}],
         ),
         angle(0.0),
+    ),
+    # a kick at one of two equal boxes turns both about their common centre: I = 2 (MOMENT + 0.5² kg·m²)
+    Demand.WELDS: Proof(
+        scene(
+            box=[box(-0.5, velocity=[0.0, -0.5]), box(0.5, name="other", velocity=[0.0, 0.5])],
+            joint=[{"kind": "weld", "between": ["box", "other"]}],
+        ),
+        angle(2.0 * 0.5 * 0.5 / (2.0 * (MOMENT + 0.25))),
+    ),
+    # across the axis nothing moves, and nothing turns
+    Demand.PRISMATICS: Proof(
+        scene(
+            box=[box(velocity=[1.0, 1.0], angular_velocity=1.0)],
+            joint=[{"kind": "prismatic", "between": ["box"], "axis": [1.0, 0.0], "travel": [-2.0, 2.0]}],
+        ),
+        both(position(1.0, 0.0), angle(0.0)),
+    ),
+    # y = sin ω t / ω with ω² = k/m, while the wheel turns and x stays
+    Demand.WHEELS: Proof(
+        scene(
+            ball=[ball(vx=1.0, vy=1.0, angular_velocity=1.0, name="a")],
+            joint=[{"kind": "wheel", "between": ["a"], "axis": [0.0, 1.0], "travel": [-1.0, 1.0], "stiffness": 4.0}],
+        ),
+        both(position(0.0, 0.5 * math.sin(2.0)), angle(1.0)),
     ),
     # a weight of 10 N hangs from a rod of at most 4 N
     Demand.MAX_FORCE: Proof(

@@ -101,5 +101,5 @@ def test_invalid_change_is_refused_and_changes_nothing(engine: str, path: str, v
 
 
 def test_motors_are_the_only_joints_that_can_change() -> None:
-    with pytest.raises(ActionError, match="rate and max_torque of motors"):
+    with pytest.raises(ActionError, match="rate, max_torque, max_force of motors"):
         start(wheel(), "pymunk").apply(set_value("joint[0].bias", 0.5))

@@ -353,16 +353,20 @@ def _joints(draw: st.DrawFn, names: list[str]) -> dict[str, Any]:
         "rotary_limit": {"least": numbers(-3, 0), "most": numbers(0, 3)},
         "motor": {"rate": numbers(-10, 10), "max_torque": figure},
         "gear": {"ratio": figure},
-        "spring": {"stiffness": figure, "damping": figure, "rest_length": figure},
+        "spring": {"stiffness": figure, "damping": figure, "rest_length": figure, "pulls_only": st.booleans()},
         "rotary_spring": {"stiffness": figure, "rest_angle": numbers(-3, 3)},
         "ratchet": {"ratchet": figure, "phase": numbers(-3, 3)},
+        "weld": {"at": point},
+        "prismatic": {"axis": st.just([1, 2]), "travel": st.just([-1, 1]), "rate": numbers(-3, 3), "max_force": figure},
+        "wheel": {"axis": st.just([1, 2]), "travel": st.just([-1, 1]), "stiffness": figure, "rate": numbers(-3, 3)},
     }
+    compound = ("weld", "prismatic", "wheel")
     kind = draw(st.sampled_from(list(kinds)))
     between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
     optional: dict[str, Any] = {"collide": st.booleans()}
-    if kind != "motor":
+    if kind not in ("motor", *compound):
         optional["max_force"] = numbers(0, 100)
-    if kind not in ("motor", "spring", "rotary_spring"):
+    if kind not in ("motor", "spring", "rotary_spring", *compound):
         optional |= {"max_bias": numbers(0, 3), "bias": numbers(0, 1)}
     joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional=optional)
     return {"kind": kind, **draw(joint)}

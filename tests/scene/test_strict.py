@@ -93,9 +93,12 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
         (f"{BALL}linear_damping = 0.1", r"world\.damping"),
         (f"{BALL}rollingResistance = 0.1", r"surface\.rolling_friction"),
         (f"{BALL}max_speed = 3", r"world\.quadratic_drag"),
-        (f"{BALL}[[joint]]\nkind = 'prismatic'\nbetween = ['ball-1']", "did you mean 'groove'"),
+        (f"{BALL}[[joint]]\nkind = 'LineJoint'\nbetween = ['ball-1']", "did you mean 'wheel'"),
         (f"{BALL}[[joint]]\nkind = 'RevoluteJoint'\nbetween = ['ball-1']", "did you mean 'pivot'"),
-        (f"{BALL}[[joint]]\nkind = 'weld'\nbetween = ['ball-1']", r"parts of one \[\[body\]\]; kinds of joint: rod"),
+        (
+            f"{BALL}[[joint]]\nkind = 'FixedJoint'\nbetween = ['ball-1']",
+            r"parts of one \[\[body\]\]; kinds of joint: rod",
+        ),
     ],
 )
 def test_feature_of_another_engine_is_refused_with_what_a_scene_has_in_its_place(text: str, remedy: str) -> None:

@@ -57,6 +57,7 @@ OWN = frozenset(
         Demand.MOTORS,
         Demand.SPRINGS,
         Demand.ROTARY_SPRINGS,
+        Demand.BANDS,
         Demand.WELDS,
         Demand.PRISMATICS,
         Demand.WHEELS,

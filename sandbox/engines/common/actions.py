@@ -45,7 +45,7 @@ from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.game_tables import PRESETS
-from sandbox.scene.description.joints import Motor, OnAxis
+from sandbox.scene.description.joints import Motor, Prismatic, Wheel
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, miscues, struck
 from sandbox.scene.errors import SceneError, quoted
@@ -191,12 +191,12 @@ def _check_motors(action: SetParameter, before: Scene, scene: Scene) -> None:
     if scene.joints is before.joints:
         return
     for new, old in zip(scene.joints, before.joints, strict=True):
-        has_motor = isinstance(new, Motor) or all(
-            isinstance(each, OnAxis) and each.rate is not None for each in (new, old)
-        )
-        if new != old and not has_motor:
-            why = "has no motor" if isinstance(new, OnAxis) else f"is of a {new.kind}, which is no motor"
-            raise ActionError(f"{action.path} {why}; a motor that starts at rest has `rate = 0.0` in the scene")
+        if new == old or isinstance(new, Motor):
+            continue
+        if not isinstance(new, Prismatic | Wheel):
+            raise ActionError(f"{action.path} is of a {new.kind}, which has no motor")
+        if None in (new.rate, getattr(old, "rate", None)):
+            raise ActionError(f"{action.path} has no motor; one that starts at rest has `rate = 0.0` in the scene")
 
 
 def _validated_again(action: SetParameter, scene: Scene) -> Scene:

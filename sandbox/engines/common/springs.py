@@ -86,7 +86,21 @@ def spring_tensions(springs: JointArrays, extent: SpringExtent, velocity: FloatA
     length = np.where(extent.length > 0.0, extent.length, 1.0)
     rate = np.einsum("kd,kd->k", extent.displacement, separating) / length
     rest, stiffness, damping = springs.figures.T
-    return np.asarray(spring_law(rest, stiffness, damping, extent.length, rate))
+    return of_bands(springs, extent.length, spring_law(rest, stiffness, damping, extent.length, rate))
+
+
+def of_bands(springs: JointArrays, length: FloatArray, force: FloatArray) -> FloatArray:
+    """Return the forces of springs, (K,) N, where those that only pull are slack, or pull and do not push.
+
+    Args:
+        springs: K springs.
+        length: (K,) m.
+        force: (K,) N, by `spring_law`.
+    """
+    if not springs.pulls_only.any():
+        return force
+    pull = np.where(length > springs.figures[:, 0], np.minimum(force, 0.0), 0.0)
+    return np.where(springs.pulls_only, pull, force)
 
 
 def rotary_torques(springs: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.springs import SpringExtent, rotary_torques, spring_law, spring_tensions
+from sandbox.engines.common.springs import SpringExtent, of_bands, rotary_torques, spring_law, spring_tensions
 from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointArrays, JointKind
 
 
@@ -54,6 +54,10 @@ def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body)
         case JointKind.GEAR:
             return pymunk.GearJoint(a, b, x, y)
         case JointKind.SPRING:
+            if joints.pulls_only[k]:
+                band = pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, 0.0)
+                band.force_func = _pull(x, y, z)
+                return band
             return pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, z)
         case JointKind.ROTARY_SPRING:
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
@@ -65,6 +69,25 @@ def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body)
             return _linear_motor(a, b, joints, k)
         case kind:
             raise ValueError(f"pymunk has no {kind.name.lower()} joints")
+
+
+def _pull(rest: float, stiffness: float, damping: float) -> Callable[[pymunk.DampedSpring, float], float]:
+    """Return the force, N, of a spring that only pulls, at its length, m, and the velocities before the step.
+
+    The damper is part of it: pymunk's own would push.
+    """
+
+    def force(spring: pymunk.DampedSpring, length: float) -> float:
+        if length <= rest:
+            return 0.0
+        rate = 0.0
+        if damping:
+            first, second = spring.a.local_to_world(spring.anchor_a), spring.b.local_to_world(spring.anchor_b)
+            velocity = spring.b.velocity_at_world_point(second) - spring.a.velocity_at_world_point(first)
+            rate = velocity.dot(second - first) / length
+        return min(spring_law(rest, stiffness, damping, length, rate), 0.0)
+
+    return force
 
 
 def _linear_motor(a: pymunk.Body, b: pymunk.Body, joints: JointArrays, k: int) -> pymunk.PinJoint:
@@ -113,7 +136,7 @@ def elastic_force(joints: JointArrays, extent: FloatArray) -> FloatArray:
     pymunk limits it to `max_force`, and then its sum with the force of the damper.
     """
     rest, stiffness, damping = joints.figures.T
-    force = spring_law(rest, stiffness, damping, extent, np.zeros_like(extent))
+    force = of_bands(joints, extent, spring_law(rest, stiffness, damping, extent, np.zeros_like(extent)))
     return np.asarray(np.clip(force, -joints.max_force, joints.max_force))
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from sandbox.engines.tabletop.requirements import on_floor
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.contacts import contact_matrix
@@ -52,7 +54,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
         ("drives", scene.drives),
         ("zones", scene.zones),
         ("one-way walls", any(wall.one_way for wall in scene.walls)),
-        ("joints that can break", any(joint.strength is not None for joint in scene.joints)),
+        ("joints that can break", bool(np.isfinite(scene.joint_arrays.strength).any())),
         ("a [surface]", on_floor(scene)),
     ):
         if has:

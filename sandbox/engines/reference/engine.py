@@ -86,7 +86,7 @@ ABSENT_ON_TABLETOP = dict.fromkeys(("joints", "stretch", "stiffness", "damping")
 JOINT_INTEGRATORS = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """Default integrators of position-based joint methods: they change velocities before positions are corrected."""
 
-CONSTRAINTS = JOINTS - {Demand.SPRINGS, Demand.ROTARY_SPRINGS}
+CONSTRAINTS = JOINTS - {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.BANDS}
 """Joints that are constraints; springs are forces"""
 
 MAX_ALL_PAIRS = 24

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.geometry import length_and_direction, rotate
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.common.springs import spring_law
@@ -63,6 +63,8 @@ class JointData(NamedTuple):
     """(K,) N or N·m"""
     max_bias: FloatArray
     """(K,) m/s or rad/s, largest speed of a correction; impulses alone have it"""
+    pulls_only: BoolArray
+    """(K,) whether a spring acts only while longer than its rest length, and never pushes"""
 
     def take(self, which: IntArray) -> "JointData":
         """Return the joints of some rows."""
@@ -82,7 +84,10 @@ def select_joints(joints: JointArrays, *kinds: JointKind, among: IntArray | None
     if among is not None:
         which &= np.isin(np.arange(len(joints)), among)
     anchor = np.column_stack((joints.anchor_a, joints.anchor_b))
-    columns = joints.kind, joints.a, joints.b, anchor, joints.figures, joints.wheels, joints.max_force, joints.max_bias
+    columns = (
+        *(joints.kind, joints.a, joints.b, anchor, joints.figures, joints.wheels),
+        *(joints.max_force, joints.max_bias, joints.pulls_only),
+    )
     found = JointData(np.arange(len(joints)), *columns).take(np.flatnonzero(which))
     if not (found.kind == GROOVE).any():
         return found
@@ -341,6 +346,8 @@ def spring_force(
         _, nx, ny = length_and_direction(vx, vy)
     rest, stiffness, damping = joints.figures[k, 0], joints.figures[k, 1], joints.figures[k, 2]
     force = _spring_law(rest, stiffness, damping, length, vx * nx + vy * ny)
+    if joints.pulls_only[k] and (length <= rest or force > 0.0):
+        return 0.0, 0.0
     return force * nx, force * ny
 
 
@@ -358,6 +365,8 @@ def spring_torque(joints: JointData, k: int, pose: FloatArray, rates: FloatArray
 def damper_power(joints: JointData, pose: FloatArray, rates: FloatArray) -> float:
     """Return the power, W, of the dampers of springs: −c l̇² and −c φ̇²; at most 0.
 
+    Where a spring that only pulls would push, its damper takes what its stiffness gives.
+
     Args:
         joints: joints other than springs have no effect.
         pose: (N, 3) m and rad.
@@ -372,7 +381,12 @@ def damper_power(joints: JointData, pose: FloatArray, rates: FloatArray) -> floa
             length, nx, ny = length_and_direction(dx, dy)
             if length == 0.0:
                 _, nx, ny = length_and_direction(vx, vy)
-            power -= joints.figures[k, 2] * (vx * nx + vy * ny) ** 2
+            rate, stretch = vx * nx + vy * ny, length - joints.figures[k, 0]
+            if joints.pulls_only[k]:
+                if stretch > 0.0:
+                    power -= max(joints.figures[k, 2] * rate, -joints.figures[k, 1] * stretch) * rate
+                continue
+            power -= joints.figures[k, 2] * rate**2
         elif joints.kind[k] == ROTARY_SPRING:
             power -= joints.figures[k, 2] * relative_rotation(i, j, rates) ** 2
     return power
@@ -414,4 +428,10 @@ def stretch_limits(joints: JointData, max_stretch: float) -> JointData:
     figures = np.zeros((len(rows), 3))
     figures[:, 1] = (1.0 + max_stretch) * own.figures[:, 0]
     unlimited = np.full(len(rows), np.inf)
-    return own._replace(kind=np.full(len(rows), SLIDE), figures=figures, max_force=unlimited, max_bias=unlimited.copy())
+    return own._replace(
+        kind=np.full(len(rows), SLIDE),
+        figures=figures,
+        max_force=unlimited,
+        max_bias=unlimited.copy(),
+        pulls_only=np.zeros(len(rows), np.bool_),
+    )

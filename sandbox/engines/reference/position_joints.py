@@ -107,6 +107,8 @@ def project(
                 continue
             if kind == SPRING:
                 new = old + _compliant_change(joints, k, length - joints.figures[k, 0], displacement, old, inverse, h)
+                if joints.pulls_only[k]:
+                    new = min(new, 0.0)
             else:
                 upper = joints.figures[k, 1] if kind == SLIDE else joints.figures[k, 0]
                 new = _bounded_multiplier(length - inverse * old, joints.figures[k, 0], upper, inverse)

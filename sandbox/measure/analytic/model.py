@@ -85,13 +85,13 @@ class SceneFacts:
     def anchor(self, number: int) -> Anchor | None:
         """Return the only joint of a body, or None.
 
-        It counts if it neither breaks nor gives way, and connects the body to the world or a static body.
+        It counts if it neither breaks, gives way nor slackens, and connects the body to the world or a static body.
         """
         found = np.flatnonzero((self.joints.a == number) | (self.joints.b == number))
         if len(found) != 1:
             return None
         k = int(found[0])
-        if math.isfinite(self.joints.strength[k]) or self.joints.is_limited[k]:
+        if math.isfinite(self.joints.strength[k]) or self.joints.is_limited[k] or self.joints.pulls_only[k]:
             return None
         joint = self.joints.some(np.asarray([k]))
         (start,), (end,) = joint.ends(self.bodies.position, self.bodies.angle)

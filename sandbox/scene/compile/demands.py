@@ -56,6 +56,7 @@ class Demand(StrEnum):
     ROTARY_SPRINGS = "rotary springs"
     PULLEYS = "pulleys"
     RATCHETS = "ratchets"
+    BANDS = "springs that only pull"
     WELDS = "welds"
     PRISMATICS = "prismatic joints"
     WHEELS = "wheels"
@@ -138,7 +139,7 @@ DEMAND_OF_COMPOUND: dict[type[Joined], Demand] = {
 }
 """Demands of joints that consist of several rows"""
 
-JOINTS = frozenset({*DEMAND_OF_JOINT.values(), *DEMAND_OF_COMPOUND.values()})
+JOINTS = frozenset({*DEMAND_OF_JOINT.values(), *DEMAND_OF_COMPOUND.values(), Demand.BANDS})
 
 JOINT_LIMITS = frozenset({Demand.MAX_FORCE, Demand.MAX_BIAS, Demand.JOINT_BIAS})
 """Demands of the keys of joints that limit or change how they hold"""
@@ -290,6 +291,7 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     for demand, applies in (
         *((demand, (joints.kind == kind) & simple) for kind, demand in DEMAND_OF_JOINT.items()),
         *((demand, [each is kind for each in kinds]) for kind, demand in DEMAND_OF_COMPOUND.items()),
+        (Demand.BANDS, joints.pulls_only),
         (Demand.MAX_FORCE, has_limit),
         (Demand.MAX_BIAS, np.isfinite(joints.max_bias)),
         (Demand.JOINT_BIAS, np.isfinite(joints.bias)),

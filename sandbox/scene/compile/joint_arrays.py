@@ -96,6 +96,8 @@ class JointArrays:
     """(J,) largest speed of error correction, m/s or rad/s; inf without a limit"""
     bias: FloatArray
     """(J,) fraction of the error that remains after one second; nan: that of the solver"""
+    pulls_only: BoolArray
+    """(J,) whether a spring acts only while it is longer than its rest length, and never pushes"""
     collide: BoolArray
     """(J,) whether the two bodies also collide"""
     strength: FloatArray
@@ -128,6 +130,7 @@ class JointArrays:
             max_force=np.empty(0),
             max_bias=np.empty(0),
             bias=np.empty(0),
+            pulls_only=np.empty(0, np.bool_),
             collide=np.empty(0, np.bool_),
             strength=np.empty(0),
             number=np.empty(0, np.int64),
@@ -162,6 +165,7 @@ class JointArrays:
             max_force=np.full(count, np.inf),
             max_bias=np.full(count, np.inf),
             bias=np.full(count, np.nan),
+            pulls_only=np.zeros(count, np.bool_),
             collide=np.zeros(count, np.bool_),
             strength=np.full(count, np.inf),
             number=np.arange(count),

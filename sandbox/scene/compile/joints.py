@@ -160,6 +160,7 @@ class _Row:
     max_bias: float | None = None
     bias: float | None = None
     strength: float | None = None
+    pulls_only: bool = False
 
 
 def _as_arrays(rows: Sequence[_Row]) -> JointArrays:
@@ -177,6 +178,7 @@ def _as_arrays(rows: Sequence[_Row]) -> JointArrays:
         max_force=_column([row.max_force for row in rows], math.inf),
         max_bias=_column([row.max_bias for row in rows], math.inf),
         bias=_column([row.bias for row in rows], math.nan),
+        pulls_only=np.asarray([row.pulls_only for row in rows], dtype=np.bool_),
         collide=np.asarray([row.collide for row in rows], dtype=np.bool_),
         strength=_column([row.strength for row in rows], math.inf),
         number=np.arange(len(rows)),
@@ -204,6 +206,7 @@ def _first_row(joint: Joint, k: int, bodies: Bodies, number: dict[str, int]) -> 
         max_bias=max_bias,
         bias=bias,
         strength=joint.strength,
+        pulls_only=isinstance(joint, Spring) and joint.pulls_only,
     )
 
 

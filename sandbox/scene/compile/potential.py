@@ -17,9 +17,9 @@ class Potential:
     """Potential energy of springs and attraction, frame by frame.
 
     A spring stores ½ k (l − l₀)², a rotary spring ½ k (φ − φ₀)²; beyond the stretch F/k of its largest force F it
-    stores F per unit of stretch. An attraction a = s/(r² + ε²) has −m s/r where ε = 0,
-    else −(m s/ε)·atan(ε/r), which is 0 at infinity; a pair of bodies counts once. Energy between two moving bodies is
-    divided equally; energy between a body and the world or a fixed body belongs to the body.
+    stores F per unit of stretch. One that only pulls stores nothing while it is slack. An attraction a = s/(r² + ε²)
+    has −m s/r where ε = 0, else −(m s/ε)·atan(ε/r), which is 0 at infinity; a pair of bodies counts once. Energy
+    between two moving bodies is divided equally; that between a body and the world or a fixed body belongs to the body.
     """
 
     def __init__(
@@ -78,10 +78,8 @@ class Potential:
         stored = np.zeros(len(position))
         for joints, breaks, strain in self._springs:
             if len(joints):
-                stiffness, stretch = (
-                    joints.figures[:, 1],
-                    np.abs(strain(joints, position, angle) - joints.figures[:, 0]),
-                )
+                stiffness, stretch = joints.figures[:, 1], strain(joints, position, angle) - joints.figures[:, 0]
+                stretch = np.where(joints.pulls_only, np.maximum(stretch, 0.0), np.abs(stretch))
                 energy = 0.5 * stiffness * np.square(stretch)
                 excess = np.maximum(stretch - joints.max_force / stiffness, 0.0)
                 energy -= 0.5 * stiffness * np.square(excess)

@@ -218,14 +218,15 @@ class OnAxis(Joined):
     """the point, in the world at the start, m; default: the centre of mass of the second body"""
     travel: Accepts[tuple[Travel, Travel], Sequence[float]]
     """smallest and largest displacement along the axis, m; it is 0 at the start"""
-    rate: Annotated[float, Field(ge=-1e12, le=1e12)] | None = None
-    """speed of the motor, m/s along the axis up to the end of the travel, rad/s of a wheel; default: no motor"""
 
 
 class Prismatic(OnAxis):
     """Lets the second body slide along an axis of the first without turning relative to it, as a piston or a lift."""
 
     kind: Literal["prismatic"] = default_kind("prismatic")
+    rate: Annotated[float, Field(ge=-1e9, le=1e9)] | None = None
+    """speed at which a motor moves the second body along the axis, up to the end of the travel, m/s; default: no
+    motor"""
     max_force: JointLimit | None = None
     """largest force of the motor, N; default: unlimited"""
 
@@ -243,6 +244,8 @@ class Wheel(OnAxis):
     """damping c, N·s/m"""
     rest: Travel = 0.0
     """displacement s₀ without force of the spring, m"""
+    rate: JointAngle | None = None
+    """rate at which a motor turns the wheel relative to the first body, rad/s; default: no motor"""
     max_torque: JointLimit | None = None
     """largest torque of the motor, N·m; default: unlimited"""
 

@@ -303,15 +303,14 @@ _ELSEWHERE = {
 """Features that bodies have in other engines, in letters only and without `is`, and what a scene has in their place"""
 
 _OTHER_JOINTS = {
-    "prismatic": "did you mean 'groove', with a 'rotary_limit' that keeps the angle?",
-    "slider": "did you mean 'groove', with a 'rotary_limit' that keeps the angle?",
+    "slider": "did you mean 'prismatic', or 'groove', in which a body also turns?",
+    "line": "did you mean 'wheel', or 'groove' without its spring?",
+    "suspension": "did you mean 'wheel'?",
     "revolute": "did you mean 'pivot'?",
     "hinge": "did you mean 'pivot'?",
     "distance": "did you mean 'rod', 'slide' with least and most, or 'spring'?",
     "rope": "did you mean 'slide' with most, or a [[rope]] of links?",
-    "weld": "shapes that are welded together are the parts of one [[body]];",
-    "fixed": "shapes that are welded together are the parts of one [[body]];",
-    "wheel": "a wheel has a 'groove' along its axis, a 'spring' and a 'motor';",
+    "fixed": "did you mean 'weld'? Shapes that never come apart are the parts of one [[body]];",
 }
 """Joints of other engines, in letters only and without `joint`, and what a scene has in their place"""
 

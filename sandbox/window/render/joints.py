@@ -113,7 +113,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
 
 
 def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
-    """Draw rods, strings and springs, and their anchors on the world."""
+    """Draw rods, strings and springs, and their anchors on the world. Springs that only pull are lines."""
     fast = joints.of(JointKind.ROD, JointKind.SLIDE, JointKind.SPRING)
     anchors = fast.ends[fast.joints.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(anchors), 3))
@@ -135,6 +135,11 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     rest = springs.joints.figures[:, 0] * view.camera.scale
     for k, row in enumerate(springs.ends.tolist()):
         red, green, blue = SHADES[shade[k]].tolist()
+        if springs.joints.pulls_only[k]:
+            is_slack, ends = springs.length[k] <= rest[k], ((row[0], row[1]), (row[2], row[3]))
+            width = (1.2 if is_slack else 2.4) * view.ui_scale
+            draw_line(view.surface, *ends, STRING if is_slack else (red, green, blue), width, view.antialias)
+            continue
         _draw_coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
 
 

@@ -34,6 +34,7 @@ def compile_joints(*links: dict[str, Any]) -> JointArrays:
         max_force=column("max_force", np.inf),
         max_bias=column("max_bias", np.inf),
         bias=column("bias", np.nan),
+        pulls_only=column("pulls_only", False, np.bool_),
         collide=column("collide", False, np.bool_),
         strength=column("strength", np.inf),
         number=np.arange(len(links)),

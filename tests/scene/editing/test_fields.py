@@ -115,7 +115,7 @@ def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
 
 
 DIMENSIONLESS = {
-    "ball_restitution", "bias", "bot", "bounce", "curl", "cushion_friction", "cushion_restitution", "damping",
+    "axis", "ball_restitution", "bias", "bot", "bounce", "curl", "cushion_friction", "cushion_restitution", "damping",
     "direction", "error", "facing", "friction", "height", "hold_ratio", "lift", "normal", "ratio", "restitution",
     "return_ratio", "rolling_friction", "roughness", "side", "sliding_friction", "spinning_friction", "stretch",
 }  # fmt: skip
