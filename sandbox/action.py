@@ -27,6 +27,7 @@ from sandbox.scene.description.base import (
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Course
+from sandbox.scene.description.joints import Joint
 from sandbox.scene.description.surface import Stroke
 
 Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
@@ -247,6 +248,29 @@ class Toggle(Timed):
     """whether bodies collide with it"""
 
 
+class Join(Timed):
+    """Add a joint, for example a grappling hook.
+
+    Lengths and angles that the joint leaves out, its `at` and its `travel` are taken from the present positions. Its
+    name must differ from those of the joints that are there. Contacts begin anew, as after a `Switch`.
+    """
+
+    kind: Literal["join"] = "join"
+    joint: Joint
+    """the joint; its fields are the keys of a `[[joint]]`"""
+
+
+class Unjoin(Timed):
+    """Remove a joint of the scene, of a generator or of an earlier `Join`, for example to cut a rope.
+
+    It counts as broken. Contacts begin anew, as after a `Switch`.
+    """
+
+    kind: Literal["unjoin"] = "unjoin"
+    joint: Name
+    """name of the joint"""
+
+
 class Strike(Timed, Stroke):
     """Strike a ball on a `[surface]` with a cue; its velocity and spin are replaced by those of the stroke.
 
@@ -284,6 +308,8 @@ Action = Annotated[
     | Reshape
     | Drive
     | Toggle
+    | Join
+    | Unjoin
     | Strike
     | Switch,
     Field(discriminator="kind"),

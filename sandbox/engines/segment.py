@@ -31,6 +31,7 @@ class Checkpoint:
     """number of steps since `origin`"""
     retired: Mapping[int, float]
     broken: Mapping[int, float]
+    joined: Mapping[int, float]
     forces: Mapping[str, Force]
     throttles: Mapping[str, Throttle]
     pulls: Mapping[str, Pull]

@@ -8,6 +8,7 @@ import copy
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, Self, Unpack
@@ -18,6 +19,7 @@ from sandbox.action import (
     Action,
     ActionError,
     Force,
+    Join,
     Launch,
     Pull,
     Remove,
@@ -25,6 +27,7 @@ from sandbox.action import (
     Spawn,
     Switch,
     Throttle,
+    Unjoin,
     Value,
 )
 from sandbox.arrays import BoolArray
@@ -41,6 +44,7 @@ from sandbox.frame_table import FrameTable
 from sandbox.queries import RayHit, SceneQueries
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
+from sandbox.scene.compile.joints import compile_added_joint
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, Point
@@ -48,7 +52,7 @@ from sandbox.scene.description.fixed import AWAY, PlaneReach
 from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
-from sandbox.scene.validate.references import generators
+from sandbox.scene.validate.references import check_joints, generators
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -191,6 +195,7 @@ class SwitchableSimulation:
         self._segment = Segment(start_engine(setup, engine, self.wanted), setup.bodies)
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
+        self._joined: dict[int, float] = {}
         self._work: Counter[str] = Counter()
         self._pulls = MouseJoints()
         self._persistent = PersistentActions()
@@ -255,6 +260,7 @@ class SwitchableSimulation:
             steps=self._segment.steps,
             retired=dict(self.retired),
             broken=dict(self.broken),
+            joined=dict(self._joined),
             forces=self._active_actions().forces,
             throttles=self._persistent.throttles,
             pulls=self._pulls.pulls,
@@ -292,6 +298,7 @@ class SwitchableSimulation:
         )
         simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
         simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
+        simulation._joined = dict(point.joined)
         simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
             None,
             None,
@@ -343,6 +350,11 @@ class SwitchableSimulation:
     def broken(self) -> Mapping[int, float]:
         """Time in s, by index in `setup.joints`, at which joints broke."""
         return MappingProxyType({**self._broken, **self._segment.broken}) if self._broken else self._segment.broken
+
+    @property
+    def joined(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.joints`, at which joints were added."""
+        return MappingProxyType(self._joined)
 
     @property
     def plane_reach(self) -> PlaneReach | None:
@@ -453,6 +465,10 @@ class SwitchableSimulation:
                 self._hand_over(self.engine, self.wanted, bodies, frame, retired)
             case Spawn():
                 self._spawn(action)
+            case Join():
+                self._join(action)
+            case Unjoin():
+                self._unjoin(action)
             case _:
                 self._segment.simulation.apply(action)
                 self._persistent.record(action)
@@ -468,6 +484,42 @@ class SwitchableSimulation:
         named = action.named(name)
         self._segment.simulation.apply(named)
         self._segment.add_body(self.bodies.joined_by(named.single, name))
+
+    def _join(self, action: Join) -> None:
+        setup, frame = self.setup, self.frame()
+        state = ("position", "velocity", "angle", "angular_velocity")
+        bodies = replace(self.bodies, **{key: getattr(frame, key) for key in state})
+        faults = list(check_joints([action.joint], setup.scene, bodies.some(np.flatnonzero(frame.present))))
+        if faults:
+            listed = (f"{'.'.join(map(str, location[2:]))}: {message}" for location, message in faults)
+            raise ActionError(f"joint: {'; '.join(listed)}")
+        taken = self._intact_joint_names()
+        free = (f"joined-{k}" for k in count(1))
+        name = action.joint.name or next(each for each in free if each not in taken)
+        if name in taken:
+            raise ActionError(f"a joint is already named {name!r}")
+        rows = compile_added_joint(action.joint, name, bodies, len(setup.joints))
+        joined = replace(setup, bodies=self.bodies, joints=setup.joints.joined(rows))  # with spawned bodies
+        self._hand_over(self.engine, self.wanted, self.bodies, frame, dict(self.retired), self.plane_reach, joined)
+        self._joined |= dict.fromkeys(rows.number.tolist(), self.time)
+
+    def _unjoin(self, action: Unjoin) -> None:
+        joints, broken = self.setup.joints, dict(self.broken)
+        found = [k for k, name in enumerate(joints.names) if name == action.joint and k not in broken]
+        if not found:
+            known = ", ".join(map(repr, sorted(self._intact_joint_names())[:MAX_NAMED])) or "none"
+            raise ActionError(f"no joint is named {action.joint!r}; joints: {known}")
+        removed = dict.fromkeys(joints.whole(np.asarray(found)).tolist(), self.time)
+        plane_reach, retired = self.plane_reach, dict(self.retired)
+        self._hand_over(
+            self.engine, self.wanted, self.bodies, self.frame(), retired, plane_reach, broken={**broken, **removed}
+        )
+
+    def _intact_joint_names(self) -> set[str]:
+        """Return the names of the joints that are there."""
+        joints, broken = self.setup.joints, self.broken
+        first = joints.part_of == joints.number
+        return {joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
 
     def _switch(self, action: Switch) -> None:
         try:
@@ -486,15 +538,18 @@ class SwitchableSimulation:
         frame: Frame,
         retired: dict[int, float],
         plane_reach: PlaneReach | None = None,
+        setup: Setup | None = None,
+        broken: dict[int, float] | None = None,
     ) -> None:
-        """Start the next segment from a state.
+        """Start the next segment from a state, with the present joints or other ones.
 
         Raises:
             ActionError: the engine cannot continue from the state. Nothing has changed then.
         """
         try:
-            persistent, broken = self._active_actions().actions(), dict(self.broken)
-            segment = start_segment(self.setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
+            persistent, setup = self._active_actions().actions(), setup or self.setup
+            broken = dict(self.broken) if broken is None else broken
+            segment = start_segment(setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
             if self._ledger.is_on:
                 segment.simulation.account()
         except (Refusal, UnknownEngineError) as refusal:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import sandbox
-from sandbox.engines.energy_ledger import Cause
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 

@@ -17,6 +17,7 @@ from sandbox.action import (
     Drive,
     Force,
     Impulse,
+    Join,
     Launch,
     Move,
     Pull,
@@ -28,6 +29,7 @@ from sandbox.action import (
     Switch,
     Throttle,
     Toggle,
+    Unjoin,
     check_speed,
     heading_of,
     index_of_name,
@@ -340,7 +342,7 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
             toggle(action, target)
         case Strike():
             _strike(action, target)
-        case Pull() | Launch() | Switch():
+        case Pull() | Launch() | Switch() | Join() | Unjoin():
             raise ActionError(
                 f"{action!r} is not an action of an engine; the simulation that sandbox.start returns accepts it"
             )

@@ -177,8 +177,10 @@ def _recorded_run(
     retired = np.full(len(bodies), np.nan)
     for number, time in simulation.retired.items():
         retired[number] = time
-    broken = np.full(len(setup.joints), np.nan)
-    broken[list(simulation.broken)] = list(simulation.broken.values())
+    broken = np.full(len(setup.joints), np.nan)  # without the joints that actions added
+    for row, time in simulation.broken.items():
+        if row < len(broken):
+            broken[row] = time
     missed_time, missed_pair = audit.missed if audit else (None, None)
     trajectory = Trajectory.from_frames(
         {**recorder.arrays(len(bodies)), "layer": recorder.layers(len(bodies))},
@@ -192,6 +194,8 @@ def _recorded_run(
     )
     trajectory = trajectory if audit is None else audit.with_slender_passages(trajectory)
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
+    if simulation.joined:
+        total[-1] = total_energy(simulation)
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     worst = joint_error(trajectory, setup)
     info["joint_error"] = None if worst is None else worst.relative

@@ -13,13 +13,11 @@ from sandbox.arrays import BoolArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.derived import derived_once
-from sandbox.scene.compile.joint_arrays import MOTORS, JointKind
+from sandbox.scene.compile.joint_arrays import MOTORS, JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.fixed import Plane, Post, Wall
-from sandbox.scene.description.joints import Joined, Prismatic, Weld, Wheel
-from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.world import World
 
 
@@ -132,12 +130,12 @@ DEMAND_OF_JOINT = {
 }
 """Demands of each kind of joint."""
 
-DEMAND_OF_COMPOUND: dict[type[Joined], Demand] = {
-    Weld: Demand.WELDS,
-    Prismatic: Demand.PRISMATICS,
-    Wheel: Demand.WHEELS,
+DEMAND_OF_COMPOUND = {
+    (JointKind.PIVOT, JointKind.GEAR): Demand.WELDS,
+    (JointKind.GROOVE, JointKind.GEAR): Demand.PRISMATICS,
+    (JointKind.GROOVE, JointKind.SPRING): Demand.WHEELS,
 }
-"""Demands of joints that consist of several rows"""
+"""Demands of joints of several rows, by the kinds of the first two"""
 
 JOINTS = frozenset({*DEMAND_OF_JOINT.values(), *DEMAND_OF_COMPOUND.values(), Demand.BANDS})
 
@@ -286,11 +284,10 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     scene, joints = setup.scene, setup.joints
     has_limit = np.isfinite(joints.max_force) & ~np.isin(joints.kind, MOTORS)  # that of a motor is part of motors
     simple = ~joints.is_compound
-    present = set(joints.names) if not simple.all() else set()
-    kinds = [type(each) for k, each in enumerate(scene.joints) if (each.name or default_name("joint", k)) in present]
+    compounds = [] if simple.all() else _compound_kinds(joints)
     for demand, applies in (
         *((demand, (joints.kind == kind) & simple) for kind, demand in DEMAND_OF_JOINT.items()),
-        *((demand, [each is kind for each in kinds]) for kind, demand in DEMAND_OF_COMPOUND.items()),
+        *((demand, [each == kinds for each in compounds]) for kinds, demand in DEMAND_OF_COMPOUND.items()),
         (Demand.BANDS, joints.pulls_only),
         (Demand.MAX_FORCE, has_limit),
         (Demand.MAX_BIAS, np.isfinite(joints.max_bias)),
@@ -304,6 +301,15 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         (Demand.DRIVES, scene.drives),
     ):
         yield demand, bool(elements), f"{len(elements):,}" if elements else "none"
+
+
+def _compound_kinds(joints: JointArrays) -> list[tuple[JointKind, JointKind]]:
+    """Return the kinds of the first two rows of each joint of several rows."""
+    first, second = np.unique(joints.part_of[joints.part_of != joints.number], return_index=True)
+    parts = np.flatnonzero(joints.part_of != joints.number)[second]
+    heads = np.searchsorted(joints.number, first)
+    pairs = zip(joints.kind[heads].tolist(), joints.kind[parts].tolist(), strict=True)
+    return [(JointKind(head), JointKind(part)) for head, part in pairs]
 
 
 def _floor(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:

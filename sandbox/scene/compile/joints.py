@@ -142,6 +142,20 @@ def compile_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     return replace(joints, number=np.arange(len(joints)), part_of=owner)
 
 
+def compile_added_joint(joint: Joint, name: str, bodies: Bodies, first: int) -> JointArrays:
+    """Return the rows of a joint that is added to a running scene.
+
+    Args:
+        joint: between the bodies.
+        name: of the joint.
+        bodies: in their present state.
+        first: index of its first row, the number of rows before it.
+    """
+    row = replace(_first_row(joint, 0, bodies, bodies.number_of), name=name, part_of=first)
+    rows = _as_arrays([row, *_parts(row, joint, bodies)])
+    return replace(rows, number=first + np.arange(len(rows)))
+
+
 @dataclass(frozen=True)
 class _Row:
     """A row of `JointArrays`."""

@@ -24,7 +24,7 @@ from sandbox.scene.description.joints import (
     Slide,
 )
 from sandbox.scene.description.play import marking_fault
-from sandbox.scene.description.scene import default_name
+from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
 from sandbox.scene.errors import LocatedMessage
 
@@ -52,9 +52,14 @@ def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
 
 
 def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
-    index, is_driven = {name: k for k, name in enumerate(bodies.names)}, is_immovable(scene, bodies)
     yield from _check_names("joint", scene.joints)
-    for k, joint in enumerate(scene.joints):
+    yield from check_joints(scene.joints, scene, bodies)
+
+
+def check_joints(joints: Sequence[Joint], scene: SceneDescription, bodies: Bodies) -> Iterator[LocatedMessage]:
+    """Yield the faults of joints between bodies, apart from their names."""
+    index, is_driven = {name: k for k, name in enumerate(bodies.names)}, is_immovable(scene, bodies)
+    for k, joint in enumerate(joints):
         for side, name in enumerate(joint.between):
             if name not in index:
                 yield ("joint", k, "between", side), f"no body is named {name!r}; {_known(bodies)}"

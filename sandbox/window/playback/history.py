@@ -277,8 +277,15 @@ class BreakTimes:
         self.times: FloatArray = np.full(joints, np.inf)
         """(J,) s, inf if unbroken; replaced by an update, never changed in place"""
 
+    def of(self, joints: int) -> FloatArray:
+        """Return the times of the first so many joints, some of which may have been added, (joints,) s."""
+        if joints > len(self.times):
+            self.times = np.append(self.times, np.full(joints - len(self.times), np.inf))
+        return self.times[:joints]
+
     def update(self, broken: Mapping[int, float]) -> None:
         """Add break times, s. Times later than the present remain, as a replay reaches them again."""
+        self.of(1 + max(broken, default=-1))
         numbers = list(broken)
         if numbers and not np.isfinite(self.times[numbers]).all():
             self.times = self.times.copy()

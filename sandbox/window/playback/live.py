@@ -214,12 +214,17 @@ class LiveView:
             flashes=self.diagnostics.missed_markers,
             picked=picked,
             pull=pull,
-            broken=broken_joints(session.break_times, frame.time),
+            broken=self._absent_joints(frame.time),
             flames=active_thrusters(session.scene, self.bodies, session.simulation.throttles, session.time)
             if present and session.scene.thrusts
             else (),
             setup=session.simulation.setup if scene is session.scene else None,
         )
+
+    def _absent_joints(self, time: float) -> list[int]:
+        """Return the indices of joints that have broken by a time, s, or are added later."""
+        later = [k for k, joined in self.session.simulation.joined.items() if joined > time]
+        return [*broken_joints(self.session.break_times, time), *later]
 
     # --- Real time -----------------------------------------------------------------------------------------------
 

@@ -201,7 +201,7 @@ class Session:
     @property
     def break_times(self) -> FloatArray:
         """Time at which each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
-        return self._breaks.times
+        return self._breaks.of(len(self.simulation.setup.joints))
 
     def bodies_in(self, frame: Frame) -> Bodies:
         """Return the bodies of a state in the history; it may be later than now and have more."""
