@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         Drive as Drive,
         Force as Force,
         Impulse as Impulse,
+        Join as Join,
         Launch as Launch,
         Move as Move,
         Pull as Pull,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
         Switch as Switch,
         Throttle as Throttle,
         Toggle as Toggle,
+        Unjoin as Unjoin,
     )
     from sandbox.batch.query import (
         QuantityStatistics as QuantityStatistics,
@@ -343,8 +345,8 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "sandbox.action": (
-        "ActionError Drive Force Impulse Launch Move Pull Remove Reshape SetParameter Spawn Strike Switch Throttle "
-        "Toggle"
+        "ActionError Drive Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn Strike Switch Throttle "
+        "Toggle Unjoin"
     ),
     "sandbox.batch.query": "QuantityStatistics RunGroup StoredRuns open_store",
     "sandbox.batch.store": "Store",

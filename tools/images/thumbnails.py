@@ -93,7 +93,7 @@ MOMENTS = {
     "games/table_tennis": Moment(0.72, trail=0.72, box=((-1.6, 0.1), (2.0, 1.7))),
     "joints/atwood": Moment(0.8, strobe=3),
     "joints/bridge": Moment(4.0),
-    "joints/buggy": Moment(2.6),
+    "joints/buggy": Moment(2.6, box=((0.5, -0.9), (7.5, 3.2))),
     "joints/cloth": Moment(4.0),
     "joints/flipper": Moment(2.0, strobe=8),
     "joints/hanging_chain": Moment(2.0),

@@ -14,7 +14,7 @@ from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.bodies import Attached, Compound, Polygon
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import Stack
-from sandbox.scene.description.joints import Anchored, Groove, Pivot, Pulley
+from sandbox.scene.description.joints import Anchored, Groove, OnAxis, Pivot, Pulley, Weld
 from sandbox.scene.editing.elements import ElementKey, body_names, element_at, table_values
 
 
@@ -180,6 +180,12 @@ def _joint_values(joint: Part, moved: Collection[str], *, is_selected: bool, by:
     if isinstance(joint, Pivot) and joint.at is not None:
         return {"at": by.point(joint.at)} if are_all_moved or (is_selected and not moved) else {}
     is_to_world = len(between) == 1
+    if isinstance(joint, Weld | OnAxis):
+        moves = are_all_moved or (is_selected and not moved)
+        values: dict[str, Any] = {"at": by.point(joint.at)} if moves and joint.at is not None else {}
+        if isinstance(joint, OnAxis) and is_to_world and moves and (by.angle or by.mirrored):
+            values["axis"] = by.direction(joint.axis)
+        return values
     if isinstance(joint, Pulley):
         return {"wheels": tuple(by.point(each) for each in joint.wheels)} if is_selected else {}
     if not (is_to_world and is_selected):

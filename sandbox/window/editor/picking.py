@@ -10,7 +10,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.description.forces import Attraction, Thrust
-from sandbox.scene.description.joints import Anchored, Groove, Joined, Pivot, Pulley
+from sandbox.scene.description.joints import Anchored, Groove, Joined, OnAxis, Pivot, Pulley, Weld
 from sandbox.scene.description.surface import Pocket
 from sandbox.scene.editing.elements import (
     ElementKey,
@@ -243,6 +243,9 @@ def attachment_lines(scene: Scene, element: Part) -> list[tuple[Point, Point]]:
             return [] if at is None else [(at, at)]
         case Groove():
             return _groove_line(scene, element)
+        case OnAxis() | Weld():
+            at = element.at or to_world(scene, element.between[-1], (0.0, 0.0))
+            return [] if at is None else [_axis_line(scene, element, at) if isinstance(element, OnAxis) else (at, at)]
         case Joined():
             return _line(*_ends(scene, element.between, ((0.0, 0.0), (0.0, 0.0)), is_to_world=False))
         case Thrust():
@@ -265,6 +268,20 @@ def _ends(
 
 def _line(one: Point | None, other: Point | None) -> list[tuple[Point, Point]]:
     return [] if one is None or other is None else [(one, other)]
+
+
+def _axis_line(scene: Scene, joint: OnAxis, at: Point) -> tuple[Point, Point]:
+    """Return the travel of the point of a joint that is at a position at the start, m."""
+    bodies = scene.bodies
+    first = bodies.number_of.get(joint.between[0]) if len(joint.between) == 2 else None
+    turned = 0.0 if first is None else float(bodies.angle[first])
+    (x, y), length = joint.axis, math.hypot(*joint.axis) or 1.0
+    ux, uy = (
+        (math.cos(turned) * x - math.sin(turned) * y) / length,
+        (math.sin(turned) * x + math.cos(turned) * y) / length,
+    )
+    least, most = joint.travel
+    return (at[0] + least * ux, at[1] + least * uy), (at[0] + most * ux, at[1] + most * uy)
 
 
 def _groove_line(scene: Scene, groove: Groove) -> list[tuple[Point, Point]]:
