@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from sandbox.action import (
         ActionError as ActionError,
         Drive as Drive,
+        Explosion as Explosion,
         Force as Force,
         Impulse as Impulse,
         Join as Join,
@@ -345,8 +346,8 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "sandbox.action": (
-        "ActionError Drive Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn Strike Switch Throttle "
-        "Toggle Unjoin"
+        "ActionError Drive Explosion Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn Strike "
+        "Switch Throttle Toggle Unjoin"
     ),
     "sandbox.batch.query": "QuantityStatistics RunGroup StoredRuns open_store",
     "sandbox.batch.store": "Store",

@@ -364,7 +364,7 @@ def _check_lengths(lengths: Mapping[str, int], stated: _Stated) -> None:
     """
     info, scene = stated.info, stated.scene
     frames, bodies, known = lengths["T"], lengths["N"], len(scene.bodies)
-    spawned = sum(isinstance(action, Spawn) for action in info.actions)
+    spawned = scene.spawned_by_events + sum(isinstance(action, Spawn) for action in info.actions)
     without = info.status == "refused" or (
         info.status == "failed" and info.steps == 0
     )  # such as a run that exceeded its time limit

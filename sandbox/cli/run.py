@@ -592,7 +592,7 @@ def _report_unbalanced_sample(study: Study | None) -> None:
 def _memory_fault(job: Job) -> Fault | None:
     """Return a fault if the frames of a run do not fit into memory."""
     try:
-        spawned = sum(isinstance(action, Spawn) for action in job.actions)
+        spawned = job.scene.spawned_by_events + sum(isinstance(action, Spawn) for action in job.actions)
         require_memory(job.scene, job.scene.solver, len(job.scene.bodies) + spawned, job.actions)
     except TooLargeError as error:
         return Fault(job.label, None, "solver.record_every", str(error))

@@ -62,7 +62,10 @@ class Divergence(Exception):  # noqa: N818, a result of the physics, not an erro
 
 
 class Exhaustion(Exception):  # noqa: N818, as above
-    """A step needs more memory or work than its limit. The simulation can still be read, but not stepped."""
+    """A step needs more memory or work than its limit, or an event of the scene cannot be applied.
+
+    The simulation can still be read, but not stepped.
+    """
 
 
 class SnapshotError(TypeError):

@@ -5,6 +5,7 @@ continue. Other engine state, such as the impulses of lasting contacts, is reset
 """
 
 import copy
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -18,7 +19,9 @@ import numpy as np
 from sandbox.action import (
     Action,
     ActionError,
+    Explosion,
     Force,
+    Impulse,
     Join,
     Launch,
     Pull,
@@ -29,6 +32,8 @@ from sandbox.action import (
     Throttle,
     Unjoin,
     Value,
+    check_speed,
+    in_order,
 )
 from sandbox.arrays import BoolArray
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
@@ -43,6 +48,7 @@ from sandbox.engines.segment import Checkpoint, Segment, start_segment
 from sandbox.frame_table import FrameTable
 from sandbox.queries import RayHit, SceneQueries
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
 from sandbox.scene.compile.joints import compile_added_joint
 from sandbox.scene.compile.scene import Scene
@@ -178,6 +184,30 @@ def start(
     return SwitchableSimulation(setup, engine, settings)
 
 
+EVENT_ROUNDING = 1e-6
+"""Fraction of a step by which a time may be beyond a step by rounding"""
+
+
+class _EventQueue:
+    """Events of a scene that have not happened yet."""
+
+    def __init__(self, events: Iterable[Action], time: float) -> None:
+        """Take the events that are at a time, s, or later."""
+        self._events = [event for event in in_order(tuple(events)) if event.time >= time]
+        self.next = self._time_of_first()
+        """time of the next event, s; inf without any"""
+
+    def _time_of_first(self) -> float:
+        return self._events[0].time if self._events else math.inf
+
+    def due(self, time: float) -> list[Action]:
+        """Return the events up to a time, s, and remove them."""
+        due = [event for event in self._events if event.time <= time]
+        self._events = self._events[len(due) :]
+        self.next = self._time_of_first()
+        return due
+
+
 class SwitchableSimulation:
     """Running scene whose engine and settings can be changed during the run. It is a `Simulation`.
 
@@ -196,6 +226,7 @@ class SwitchableSimulation:
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._joined: dict[int, float] = {}
+        self._events = _EventQueue(setup.scene.events, setup.time)
         self._work: Counter[str] = Counter()
         self._pulls = MouseJoints()
         self._persistent = PersistentActions()
@@ -299,6 +330,7 @@ class SwitchableSimulation:
         simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
         simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
         simulation._joined = dict(point.joined)
+        simulation._events = _EventQueue(point.scene.events, point.frame.time)
         simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
             None,
             None,
@@ -398,7 +430,10 @@ class SwitchableSimulation:
         Raises:
             Divergence, Exhaustion: as `step`.
         """
+        self._apply_events()
         segment, before = self._segment, frames.steps
+        if math.isfinite(self._events.next):
+            steps = max(min(steps, math.ceil((self._events.next - self.time) / self.settings.dt - EVENT_ROUNDING)), 1)
         if self._pulls.any or segment.before is not None:  # mouse joints act in each step; frames need other indices
             step_and_record(self, 1 if until_event else steps, frames)
             return
@@ -431,7 +466,8 @@ class SwitchableSimulation:
         return self._segment.simulation.makes_whole_steps
 
     def _make_step(self, part: float, advance: Callable[[], None]) -> None:
-        """Apply the mouse joints, and advance the engine, for a fraction of a step."""
+        """Apply events and mouse joints, and advance the engine, for a fraction of a step."""
+        self._apply_events()
         simulation = self._segment.simulation
         if self._pulls.any:
             with self._ledger.attributing_pulls(simulation):
@@ -455,6 +491,8 @@ class SwitchableSimulation:
             ActionError: the action cannot be applied. The simulation is left unchanged.
         """
         match action:
+            case Explosion():
+                self._explode(action)
             case Pull():
                 self._pulls.set_pull(action, self._segment.simulation)
             case Switch():
@@ -484,6 +522,36 @@ class SwitchableSimulation:
         named = action.named(name)
         self._segment.simulation.apply(named)
         self._segment.add_body(self.bodies.joined_by(named.single, name))
+
+    def _apply_events(self) -> None:
+        """Apply the events of the scene that are due; those of bodies that have left are passed over.
+
+        Raises:
+            Exhaustion: one cannot be applied.
+        """
+        if self._events.next > self.time:
+            return
+        for event in self._events.due(self.time):
+            body = getattr(event, "body", None)
+            if body in self.bodies.names and not self.frame().present[self.bodies.names.index(body)]:
+                continue
+            try:
+                self.apply(event)
+            except ActionError as error:
+                raise Exhaustion(f"the event {event.kind!r} of {event.time:g} s cannot be applied: {error}") from None
+
+    def _explode(self, action: Explosion) -> None:
+        """Apply the impulses of an explosion."""
+        frame, bodies = self.frame(), self.bodies
+        away = frame.position - np.asarray(action.position)
+        distance = np.hypot(*away.T)
+        moves = frame.present & ~bodies.immovable & ~is_driven(self.scene, bodies)
+        hit = np.flatnonzero(moves & (distance < action.radius) & (distance > 0.0))
+        impulse = action.impulse * (1.0 / distance[hit] - 1.0 / action.radius)[:, None] * away[hit]
+        for index, velocity in zip(hit.tolist(), frame.velocity[hit] + impulse / bodies.mass[hit, None], strict=True):
+            check_speed(math.hypot(*velocity), f"the explosion at {bodies.names[index]!r}")
+        for index, (x, y) in zip(hit.tolist(), impulse.tolist(), strict=True):
+            self._segment.simulation.apply(Impulse(time=action.time, body=bodies.names[index], impulse=(x, y)))
 
     def _join(self, action: Join) -> None:
         setup, frame = self.setup, self.frame()

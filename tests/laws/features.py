@@ -140,6 +140,13 @@ FEATURES: dict[str, Document] = {
         "joint": [{"kind": "spring", "between": ["a", "b"], "stiffness": 1.0}],
         "zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True}],
     },
+    "events": {
+        "event": [
+            {"kind": "explosion", "time": 0.1, "position": [0.5, 2.0], "radius": 3.0, "impulse": 1.0},
+            {"kind": "spawn", "time": 0.1, "ball": _ball("c", -3.0)},
+            {"kind": "set", "time": 0.2, "path": "world.gravity", "value": [0.0, -1.0]},
+        ]
+    },
     "elastic band": {"joint": [{**_joint("spring", "a"), "rest_length": 2.0, "pulls_only": True}]},
     **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS if kind != "pulley"},
     **{f"{kind} between two": {"joint": [_joint(kind, "a", "b")]} for kind in JOINTS},

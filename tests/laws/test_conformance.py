@@ -237,6 +237,11 @@ PROOFS: dict[Demand, Proof] = {
         ),
         position(math.cos(2.0), 0.0),
     ),
+    # an impulse of 2 N·s on 1 kg, after a quarter of a second
+    Demand.EVENTS: Proof(
+        scene(ball=[ball(name="a")], event=[{"kind": "impulse", "time": 0.25, "body": "a", "impulse": [2.0, 0.0]}]),
+        position(1.5, 0.0),
+    ),
     # slack until x = 1 at 0.25 s, taut for half a period, π/ω = 0.25 s with ω² = k/m, then slack on the way back
     Demand.BANDS: Proof(
         scene(

@@ -88,6 +88,7 @@ MOMENTS = {
     "billiards/throw": Moment(3.0, trail=3.0),
     "games/conveyor": Moment(3.0),
     "games/curling": Moment(60.0, player="random"),
+    "games/demolition": Moment(2.6),
     "games/landing": Moment(4.8, trail=4.8),
     "games/rube_goldberg": Moment(6.0),
     "games/table_tennis": Moment(0.72, trail=0.72, box=((-1.6, 0.1), (2.0, 1.7))),

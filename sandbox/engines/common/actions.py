@@ -15,6 +15,7 @@ from sandbox.action import (
     Action,
     ActionError,
     Drive,
+    Explosion,
     Force,
     Impulse,
     Join,
@@ -342,7 +343,7 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
             toggle(action, target)
         case Strike():
             _strike(action, target)
-        case Pull() | Launch() | Switch() | Join() | Unjoin():
+        case Pull() | Launch() | Switch() | Join() | Unjoin() | Explosion():
             raise ActionError(
                 f"{action!r} is not an action of an engine; the simulation that sandbox.start returns accepts it"
             )

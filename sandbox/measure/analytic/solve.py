@@ -108,7 +108,8 @@ def solution(scene: Scene) -> Solution | None:
     otherwise all are solved together.
     """
     has_filters = len(scene.layers) > 1 or scene.categories or scene.bodies.groups
-    if on_floor(scene) or scene.zones or has_filters or scene.bodies.kinematic.any():  # no formula includes them
+    changes = scene.zones or scene.events or scene.bodies.kinematic.any()
+    if on_floor(scene) or changes or has_filters:  # no formula includes them
         return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:
@@ -162,11 +163,12 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     Otherwise it is free flight up to the first contact: a recorded one, or the time at which the formula reaches a
     plane. Missed contacts count if the run was audited; a missed bounce does not end the bouncing.
 
-    A run with actions, or in a scene whose zones act on bodies, has none; entering a zone that only detects bodies ends
-    a closed form as a contact does.
+    A run with actions, and one in a scene with events or with zones that act on bodies, has none; entering a zone that
+    only detects bodies ends a closed form as a contact does.
     """
     bodies = scene.bodies
-    if trajectory.info.get("actions") or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
+    acted = trajectory.info.get("actions") or scene.events
+    if acted or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones):
         return None

@@ -68,10 +68,10 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, lift, damping, friction, damper, thrust, drive, motor or kinematic body, no joint that gives way or
-    that jerks a body when it becomes taut, and elastic contacts.
+    It has no drag, lift, damping, friction, damper, thrust, drive, event, motor or kinematic body, no joint that gives
+    way or that jerks a body when it becomes taut, and elastic contacts.
     """
-    if demands(scene) & AIR or scene.thrusts or scene.drives:
+    if demands(scene) & AIR or scene.thrusts or scene.drives or scene.events:
         return False
     if scene.bodies.kinematic.any():
         return False
@@ -95,7 +95,7 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     body by its own width. Energy that explicit Euler adds in free flight, m·g²·h·t/2, does not count.
     """
     joints = scene.joint_arrays
-    if scene.thrusts or scene.drives or any(scene.world.wind) or len(joints.of(*MOTORS)):
+    if scene.thrusts or scene.drives or scene.events or any(scene.world.wind) or len(joints.of(*MOTORS)):
         return 0.0
     if scene.bodies.kinematic.any():
         return 0.0

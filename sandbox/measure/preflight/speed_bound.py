@@ -109,6 +109,8 @@ class SpeedBounds:
             found.append("moving surfaces")
         if len(scene.joint_arrays.of(*MOTORS)):
             found.append("motors")
+        if scene.events:
+            found.append("events")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")
         if bodies.lift.any() and any(scene.world.wind):  # it keeps the speed through the air, which walls do not

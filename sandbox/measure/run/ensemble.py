@@ -273,6 +273,8 @@ def run_members(
         (M,) whether each was computed. The others need an ordinary run: their states are the start states.
     """
     is_done = np.zeros(len(members.position), np.bool_)
+    if setup.scene.events:  # they happen between steps
+        return is_done
     try:
         simulation = start_engine(setup, engine, settings)
     except Refusal:  # of the scene's own start; each varied one is tried

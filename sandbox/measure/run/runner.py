@@ -114,7 +114,7 @@ def run(
         refused = run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
         return refused.raise_if_failed() if strict else refused
     resolved = simulation.settings
-    bodies = len(setup.bodies) + sum(isinstance(action, Spawn) for action in actions)
+    bodies = len(setup.bodies) + scene.spawned_by_events + sum(isinstance(action, Spawn) for action in actions)
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
     timed_audit = TimedAudit(setup, simulation) if audit else None
 

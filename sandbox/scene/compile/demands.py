@@ -76,6 +76,7 @@ class Demand(StrEnum):
     GROUPS = "groups"
     ZONES = "zones"
     KINEMATIC = "kinematic bodies"
+    EVENTS = "events"
 
 
 BALLS = frozenset(
@@ -92,6 +93,7 @@ BALLS = frozenset(
         Demand.FRICTION,
         Demand.BOUNDS,
         Demand.LIFETIMES,
+        Demand.EVENTS,
     }
 )
 """Demands of scenes of balls and static colliders. Engines list their capabilities; a new demand is supported by
@@ -224,6 +226,7 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         kinematic > 0,
         _count(kinematic, "body is kinematic", "bodies are kinematic", "no body is kinematic"),
     )
+    yield Demand.EVENTS, bool(scene.events), f"{len(scene.events):,}" if scene.events else "none"
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())

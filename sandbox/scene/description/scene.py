@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, StringConstraints
 
+from sandbox.scene.description.actions import Event, Spawn
 from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMaterial, Items, Part, default
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
@@ -24,6 +25,10 @@ from sandbox.scene.description.world import Material, Pair, Settings, World
 
 if TYPE_CHECKING:
     from sandbox.arrays import BoolArray, IntArray
+
+
+MAX_EVENTS = 10_000
+"""Largest number of events of a scene"""
 
 
 @with_game_tables()
@@ -71,6 +76,13 @@ class SceneDescription(_Header):
     drives: Items[AnyDrive] = default((), alias="drive")
     """Drive that moves a body between two positions: torque, stroke or plunger."""
     shots: Items[Shot] = default((), alias="shot")
+    events: Items[Event] = default((), alias="event", max_length=MAX_EVENTS)
+    """Actions that the scene makes itself, each before the first step that starts at its time or later."""
+
+    @property
+    def spawned_by_events(self) -> int:
+        """Number of bodies that events add."""
+        return sum(isinstance(event, Spawn) for event in self.events)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """Return a copy, with other values for some fields. Derived values are computed again from the fields."""

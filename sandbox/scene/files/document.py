@@ -11,6 +11,7 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.actions import Event, Join, Timed
 from sandbox.scene.description.forces import Driven, PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.description.game_tables import lazy_table
 from sandbox.scene.description.joints import Joined, Joint
@@ -123,13 +124,15 @@ def keys_of(model: type[BaseModel]) -> list[str]:
 
 
 def model_at(location: Location) -> type[BaseModel]:
-    """Return the model of a table by its location; for joints and drives the kind follows the index."""
+    """Return the model of a table by its location; for joints, drives and events the kind follows the index."""
     model: type[BaseModel] = Scene
+    kinds: dict[str, type[BaseModel]] = {}  # of the present table, whose kind comes next
     for key in location:
-        if model is Scene and key in TAGGED:
-            kinds, common = TAGGED[str(key)]
-            return kinds.get(str(location[2]), common) if len(location) > 2 else common
-        if isinstance(key, str):
+        if kinds and isinstance(key, str):
+            model, kinds = kinds.get(key, model), {}
+        elif (model is Scene and key in TAGGED) or (model is Join and key == "joint"):
+            kinds, model = TAGGED[str(key)]
+        elif isinstance(key, str):
             field = {field.alias or name: field for name, field in model.model_fields.items()}[key]
             table = lazy_table(field)
             annotation = field.annotation if table is None else table.model
@@ -147,9 +150,16 @@ DRIVES: dict[str, type[BaseModel]] = {"torque": TorqueDrive, "stroke": StrokeDri
 """Models of drives by their `kind`."""
 
 
+EVENTS: dict[str, type[BaseModel]] = {
+    tag: model for model in get_args(get_args(Event)[0]) for tag in get_args(model.model_fields["kind"].annotation)
+}
+"""Models of events by their `kind`."""
+
+
 TAGGED: dict[str, tuple[dict[str, type[BaseModel]], type[BaseModel]]] = {
     "joint": (JOINTS, Joined),
     "drive": (DRIVES, Driven),
+    "event": (EVENTS, Timed),
 }
 """Tables with a `kind`: models by kind, and the base model of all of them."""
 

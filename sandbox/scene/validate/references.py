@@ -1,12 +1,13 @@
 """Checks of references: joints, forces, drives, `[play]` and `[surface]`."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_immovable, moment_of_mass, mount_of, single_bodies
 from sandbox.scene.compile.joints import ends_of
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.actions import SETTABLE, Join, SetParameter, Spawn, Unjoin, is_settable
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
@@ -54,6 +55,53 @@ def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
 def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from _check_names("joint", scene.joints)
     yield from check_joints(scene.joints, scene, bodies)
+
+
+def check_events(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+    """Yield the faults of events: names that nothing has, and values that cannot change during a run."""
+    spawned = {event.single.name for event in scene.events if isinstance(event, Spawn) and event.single.name}
+    yield from _check_spawned_names(scene, bodies)
+    known = {
+        "body": {*bodies.names, *spawned},
+        "thing": set(scene.fixed_names),
+        "thrust": {thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)},
+        "drive": {drive.name or default_name("drive", k) for k, drive in enumerate(scene.drives)},
+        "generator": {name for name, _, _ in generators(scene)},
+    }
+    joins = [event.joint for event in scene.events if isinstance(event, Join)]
+    joints = {*scene.joint_arrays.names, *(joint.name for joint in joins if joint.name)}
+    for k, event in enumerate(scene.events):
+        for key, names in known.items():
+            name = getattr(event, key, None)
+            if name is not None and name not in names:
+                yield ("event", k, key), f"no {key} is named {name!r}; {_listed(names)}"
+        if isinstance(event, Unjoin) and event.joint not in joints:
+            yield ("event", k, "joint"), f"no joint is named {event.joint!r}; {_listed(joints)}"
+        if isinstance(event, Join):
+            for side, name in enumerate(event.joint.between):
+                if name not in known["body"]:
+                    yield ("event", k, "joint", "between", side), f"no body is named {name!r}; {_listed(known['body'])}"
+        if isinstance(event, SetParameter) and not is_settable(event.path):
+            yield ("event", k, "path"), f"{event.path!r} cannot be changed during a run; these can: {SETTABLE}"
+
+
+def _check_spawned_names(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+    seen = {*bodies.names, *scene.fixed_names}
+    for k, event in enumerate(scene.events):
+        if isinstance(event, Spawn) and event.single.name:
+            if event.single.name in seen:
+                yield ("event", k), f"a body or fixed object is already named {event.single.name!r}"
+            seen.add(event.single.name)
+
+
+def _listed(names: Collection[str]) -> str:
+    """Return known names as text."""
+    shown = ", ".join(map(repr, sorted(names)[:MAX_NAMED]))
+    return f"known names: {shown}{', …' if len(names) > MAX_NAMED else ''}" if shown else "there is none"
+
+
+MAX_NAMED = 10
+"""Names that a message lists"""
 
 
 def check_joints(joints: Sequence[Joint], scene: SceneDescription, bodies: Bodies) -> Iterator[LocatedMessage]:

@@ -31,7 +31,7 @@ from sandbox.scene.validate.geometry import (
     check_zones,
     with_placeholder_shapes,
 )
-from sandbox.scene.validate.references import check_attachments, check_play, check_surface
+from sandbox.scene.validate.references import check_attachments, check_events, check_play, check_surface
 
 MAX_SURFACES = 256
 MAX_NAMES = 10
@@ -76,6 +76,8 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_surface(scene, bodies)
     if scene.joints or scene.thrusts or scene.attractions or scene.drives:
         found += check_attachments(scene, bodies)
+    if scene.events:
+        found += check_events(scene, bodies)
     if scene.ropes:
         found += check_rope_ties(scene, bodies)
     return found if materials else [*found, *_check_surface_count(scene, bodies)]

@@ -204,7 +204,7 @@ def bodies_of_run(trajectory: Trajectory, scene: Scene, name: str = "<run>") -> 
     Raises:
         SceneError: the run has other bodies than its scene and actions make.
     """
-    bodies, actions = scene.bodies, actions_of_run(trajectory, name)
+    bodies, actions = scene.bodies, in_order((*actions_of_run(trajectory, name), *scene.events))
     spawned = [action.single for action in actions if isinstance(action, Spawn)]
     names = [str(name) for name in trajectory.names.tolist()]
     for single, body_name in zip(spawned, names[len(bodies) :], strict=False):  # a run that ended early lacks the last

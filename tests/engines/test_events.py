@@ -1,0 +1,153 @@
+"""Events: actions that a scene makes itself, at their times, on every engine, in every kind of run."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sandbox
+from sandbox.action import Explosion, Impulse, Switch
+from sandbox.engines.contract import Exhaustion
+from sandbox.engines.registry import ENGINES
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import dumps, from_document, loads
+from tests.scene.faults import faults_of
+
+pytestmark = pytest.mark.fail_slow(60)  # kernels compile
+
+every_engine = pytest.mark.parametrize("engine", sorted(ENGINES))
+
+
+def scene_of(*events: dict[str, Any], duration: float = 1.0, **tables: Any) -> Scene:
+    """Return a scene without gravity of a ball of 2 kg at rest at the origin."""
+    ball = {"name": "a", "position": [0.0, 0.0], "radius": 0.1, "mass": 2.0}
+    world = {"gravity": [0.0, 0.0], "duration": duration, **tables.pop("world", {})}
+    document = {"world": world, "solver": {"dt": 0.01}, "ball": [ball, *tables.pop("balls", [])], "event": [*events]}
+    return from_document({**document, **tables})
+
+
+def impulse(time: float, x: float, **more: Any) -> dict[str, Any]:
+    return {"kind": "impulse", "time": time, "body": "a", "impulse": [x, 0.0], **more}
+
+
+@every_engine
+def test_events_happen_in_order_at_the_first_step_from_their_time(engine: str) -> None:
+    """Written in any order; one between two steps waits for the next one."""
+    events = [impulse(0.605, -2.0), impulse(0.2, 2.0)]
+    run = sandbox.run(scene_of(*events), engine)
+    velocity = run.velocity[:, 0, 0]
+    moving = np.flatnonzero(velocity)
+    # The frame of 0.2 s is the state before the event, that of 0.21 s the first one after it; 0.605 s waits for 0.61.
+    assert run.time[moving].tolist() == pytest.approx(np.arange(0.21, 0.615, 0.01).tolist())
+    assert run.position[-1, 0, 0] == pytest.approx(1.0 * (0.61 - 0.2), abs=1e-6)  # 32-bit numbers of box2d
+
+
+@every_engine
+def test_explosion_pushes_bodies_away_and_less_the_farther_they_are(engine: str) -> None:
+    """The impulse is (1 − d/r)·J along the line from the centre; nothing happens beyond r, and to fixed bodies."""
+    balls = [
+        {"name": "near", "position": [0.6, 0.8], "radius": 0.1, "mass": 0.5},
+        {"name": "far", "position": [3.0, 0.0], "radius": 0.1},
+        {"name": "rock", "position": [-0.5, 0.0], "radius": 0.1, "fixed": True},
+    ]
+    blast = {"kind": "explosion", "time": 0.0, "position": [0.0, 0.0], "radius": 2.0, "impulse": 4.0}
+    run = sandbox.run(scene_of(blast, balls=balls, duration=0.1), engine)
+    # m/s; `a` is at the centre itself, where there is no direction
+    assert run.velocity[-1] == pytest.approx(np.array([[0, 0], [0.6 * 4.0, 0.8 * 4.0], [0, 0], [0, 0]]), abs=1e-5)
+
+
+def test_explosion_is_an_action_too() -> None:
+    simulation = sandbox.start(scene_of())
+    simulation.apply(Explosion(time=0.0, position=(-1.0, 0.0), radius=2.0, impulse=8.0))
+    simulation.step()
+    assert simulation.frame().velocity[0] == pytest.approx([8.0 * 0.5 / 2.0, 0.0])
+
+
+@every_engine
+def test_bodies_come_and_go(engine: str) -> None:
+    events = [
+        {"kind": "spawn", "time": 0.2, "ball": {"name": "b", "position": [1, 0], "velocity": [1, 0], "radius": 0.1}},
+        {"kind": "remove", "time": 0.5, "body": "a"},
+        impulse(0.6, 1.0),  # its body has left: nothing happens
+    ]
+    run = sandbox.run(scene_of(*events), engine)
+    assert run.names.tolist() == ["a", "b"]
+    assert run.retired_time[0] == pytest.approx(0.5, abs=0.011)
+    assert run.position[-1, 1] == pytest.approx([1.8, 0.0], abs=1e-5)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_steps_by_hand_many_at_once_and_from_a_later_state_agree(engine: str) -> None:
+    scene = scene_of(impulse(0.3, 1.0), impulse(0.7, 1.0), world={"gravity": [0.0, -9.81]})
+    run = sandbox.run(scene, engine, record_every=7)
+    by_hand = sandbox.start(scene, engine)
+    for _ in range(50):
+        by_hand.step()
+    resumed = type(by_hand).resumed(by_hand.checkpoint())
+    by_hand.apply(Switch(time=0.0, settings={"iterations": 12}))
+    for _ in range(50):
+        by_hand.step()
+        resumed.step()
+    assert run.position[-1].tolist() == by_hand.frame().position.tolist() == resumed.frame().position.tolist()
+
+
+def test_event_that_cannot_be_applied_ends_the_run_with_its_reason() -> None:
+    scene = scene_of({"kind": "join", "time": 0.3, "joint": {"kind": "weld", "between": ["a"]}})
+    run = sandbox.run(scene, "exact", strict=False)
+    assert run.status == "failed"
+    assert "the event 'join' of 0.3 s cannot be applied: exact refuses" in run.info["reason"]
+    with pytest.raises(Exhaustion):
+        simulation = sandbox.start(scene, "exact")
+        for _ in range(40):
+            simulation.step()
+
+
+def test_ensemble_and_truth_include_events() -> None:
+    scene = scene_of(impulse(0.5, 2.0))
+    ends = sandbox.ensemble(scene, 3, vary={"ball.*.velocity": 1e-12}, engine="reference")
+    assert ends.position[:, 0, 0] == pytest.approx([0.5] * 3, abs=1e-9)
+    comparison = sandbox.compare(scene, engines=["pymunk", "reference"])
+    assert "closed form" not in str(comparison.truth)
+    assert max(row.score.max_position for row in comparison.rows) < 1e-6
+
+
+def test_scene_with_events_is_written_and_read_again() -> None:
+    scene = scene_of(
+        impulse(0.3, 1.0),
+        {"kind": "spawn", "time": 0.5, "box": {"position": [3, 0], "size": [1, 1], "angle": math.pi / 8}},
+        {"kind": "set", "time": 0.6, "path": "world.gravity", "value": [0, -1]},
+    )
+    assert loads(dumps(scene)) == scene
+
+
+@pytest.mark.parametrize(
+    ("event", "path", "word"),
+    [
+        ('kind="impulse"\nbody="q"\nimpulse=[1,0]', "event[0].body", "'a'"),
+        ('kind="impulse"\nbody="a"', "event[0].impulse", "missing"),
+        ('kind="bang"', "event[0].kind", "explosion"),
+        ('kind="set"\npath="world.seed"\nvalue=1', "event[0].path", "world.gravity"),
+        ('kind="throttle"\nthrust="t"\nlevel=1', "event[0].thrust", "none"),
+        ('kind="unjoin"\njoint="j"', "event[0].joint", "none"),
+        ('kind="join"\njoint={kind="rod", between=["a","q"]}', "event[0].joint.between[1]", "'a'"),
+        ('kind="spawn"\nball={name="a", position=[0,0], radius=1}', "event[0]", "already named"),
+        ('kind="switch"', "event[0].kind", "explosion"),
+    ],
+)
+def test_invalid_events_are_refused(event: str, path: str, word: str) -> None:
+    document = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[event]]\ntime=1.0\n' + event
+    faults = faults_of(document)
+    assert any(each.path == path and word in each.message for each in faults), faults
+
+
+def test_impulse_without_a_time_is_refused() -> None:
+    faults = faults_of('[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[event]]\nkind="remove"\nbody="a"')
+    assert [each.path for each in faults] == ["event[0].time"]
+
+
+def test_events_of_python_are_actions() -> None:
+    ball = sandbox.Ball(name="a", position=(0.0, 0.0), radius=0.1)
+    world = sandbox.World(duration=0.2)
+    scene = sandbox.Scene(world=world, balls=[ball], events=[Impulse(time=0.1, body="a", impulse=(1.0, 0.0))])
+    assert sandbox.run(scene).velocity[-1, 0, 0] == 1.0
