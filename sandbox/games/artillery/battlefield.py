@@ -49,7 +49,7 @@ WEAPONS: tuple[Weapon, ...] = (
 )
 
 WRECK = Weapon("wreck", "shell", 4.0, 30.0, 0)
-"""Explosion of a destroyed tank."""
+"""Blast of a destroyed tank."""
 
 FRAGMENT_COUNT = 5
 """number of fragments of a cluster"""
@@ -186,7 +186,7 @@ TERRAIN_CLEARANCE = 0.01
 """m, clearance above the terrain at which buried tanks and new rollers are placed"""
 
 
-class Explosion(NamedTuple):
+class Blast(NamedTuple):
     """An explosion, for the view."""
 
     time: float
@@ -217,7 +217,7 @@ class Battlefield:
         self.tanks = Tanks(artillery, bodies.names)
         self.falling: list[tuple[float, tuple[LooseDirt, ...]]] = []
         """start of the fall, s, and the falling dirt"""
-        self.blasts: list[Explosion] = []
+        self.blasts: list[Blast] = []
         """explosions of this turn"""
         self.cues: list[str] = []
         """names of sounds"""
@@ -231,7 +231,7 @@ class Battlefield:
         dirt = weapon.kind == "dirt"
         change = (self.ground.with_heap if dirt else self.ground.without)(position, weapon.radius)
         self.cues.append("dirt" if dirt else "blast")
-        self.blasts.append(Explosion(time, position, weapon.radius, dirt))
+        self.blasts.append(Blast(time, position, weapon.radius, dirt))
         actions = self._replace_terrain(time, change)
         hurt = self.tanks.blast(shooter, position, weapon)
         return actions + self._remove_destroyed(time, [tank for tank in hurt if not tank.alive])

@@ -68,6 +68,8 @@ material = "steel"
         toml("joint", kind="weld", between=["a", "tri"], at=[1.0, 3.0], torque_strength=9.0),
         toml("joint", kind="prismatic", between=["a", "c"], axis=[0, 1], travel=[-1, 1], rate=1.0, max_force=9.0),
         toml("joint", kind="wheel", between=["c"], axis=[0, 1], at=[1, 3], travel=[-1, 1], stiffness=9.0, rate=1.0),
+        toml("event", time=9.0, kind="explosion", position=[0, 1], radius=2.0, impulse=0.1),
+        toml("event", time=9.0, kind="set", path="world.gravity", value=[0, -1]),
         toml("thrust", name="engine", body="ship", force=[0.0, 5.0], point=[0.0, -0.3], key="up"),
         toml("drive", name="flip", kind="stroke", body="bat", pivot=[7.5, 3.0], stops=[0.0, 1.0], rate=1.0, key="left"),
         toml("drive", name="plunger", kind="plunger", body="pin", direction=[0, 1], travel=1.0, speed=1.0, key="space"),
