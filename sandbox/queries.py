@@ -5,7 +5,7 @@
 
 They depend on the scene and on the state only, not on the engine that computed it, so that all engines agree bit for
 bit. Objects are the bodies that are present, planes, walls that are solid, and posts. Bodies that collide with nothing
-are not seen, nor are zones.
+are not seen, nor are zones and sensors.
 
 Every shape is a convex hull of corners, widened by a radius. Its boundary consists of arcs about the corners and of
 edges moved outward by the radius, and a disc is cast as a ray against shapes that are wider by its radius. A ray enters
@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.echo import short_repr
+from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -372,7 +373,7 @@ def _nearest(features: _Features, point: FloatArray) -> tuple[int, float, tuple[
     return int(features.owner[which]), float(distance[which]), (x, y)
 
 
-class _Hull(NamedTuple):
+class Hull(NamedTuple):
     """Convex hull of corners, widened by a radius."""
 
     owner: int
@@ -390,8 +391,8 @@ def _features_of(setup: Setup, frame: Frame | None, ignore: frozenset[str], cate
         ValueError: the scene has no object or category with a name.
     """
     scene = setup.scene
-    is_seen = _visibility(setup, ignore, categories)
-    hulls = [each for each in (*_body_hulls(setup, frame), *_static_hulls(scene)) if is_seen[each.owner]]
+    is_seen = visible_objects(scene, setup.bodies, ignore, categories)
+    hulls = [each for each in (*_body_hulls(setup, frame), *static_hulls(scene)) if is_seen[each.owner]]
     areas = [each for each in hulls if len(each.corners) > 2]
     lines = [each for each in hulls if len(each.corners) == 2]
     tails = [each.corners for each in (*areas, *lines)]
@@ -417,9 +418,20 @@ def _features_of(setup: Setup, frame: Frame | None, ignore: frozenset[str], cate
     )
 
 
-def _visibility(setup: Setup, ignore: frozenset[str], categories: frozenset[str]) -> dict[int, bool]:
-    """Return for each body and static object, by its index, whether it is seen."""
-    scene, bodies = setup.scene, setup.bodies
+def visible_objects(
+    scene: Scene, bodies: Bodies, ignore: frozenset[str], categories: frozenset[str]
+) -> dict[int, bool]:
+    """Return for each body and static object, by its index, whether it is seen, apart from whether it is present.
+
+    Args:
+        scene: the scene.
+        bodies: bodies of the scene, and those that were added.
+        ignore: names of bodies and static objects that are not seen.
+        categories: collision categories that are seen; empty means all.
+
+    Raises:
+        ValueError: the scene has no body, static object or category with a name.
+    """
     names = [*bodies.names, *scene.fixed_names[: len(scene.fixed)]]
     numbers = [*range(len(bodies)), *(-1 - k for k in range(len(scene.fixed)))]
     if unknown := ignore - set(names):
@@ -439,7 +451,7 @@ def _visibility(setup: Setup, ignore: frozenset[str], categories: frozenset[str]
     }
 
 
-def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[_Hull]:
+def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[Hull]:
     """Yield the hulls of the bodies that are present, where a frame has them, or else the setup."""
     bodies = setup.bodies
     state = bodies if frame is None else frame
@@ -449,16 +461,16 @@ def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[_Hull]:
     x, y = rotate(shapes.corner[:, 0], shapes.corner[:, 1], np.cos(angle[owner]), np.sin(angle[owner]))
     corners = position[owner] + np.column_stack((x, y))
     for k in np.flatnonzero(present[shapes.body]).tolist():
-        yield _Hull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
+        yield Hull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
 
 
-def _static_hulls(scene: Scene) -> Iterator[_Hull]:
+def static_hulls(scene: Scene) -> Iterator[Hull]:
     """Yield the hulls of walls, a segment each, and of posts."""
     for k, thing in enumerate(scene.fixed):
         if isinstance(thing, Post):
-            yield _Hull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
+            yield Hull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
         elif isinstance(thing, Wall):
             line = np.asarray([*thing.points, thing.points[0]] if thing.closed else thing.points, np.float64)
             for segment in np.stack((line[:-1], line[1:]), axis=1):
                 if (segment[0] != segment[1]).any():
-                    yield _Hull(-1 - k, segment, 0.5 * thing.thickness)
+                    yield Hull(-1 - k, segment, 0.5 * thing.thickness)

@@ -72,10 +72,12 @@ class Demand(StrEnum):
     GROUPS = "groups"
     ZONES = "zones"
     KINEMATIC = "kinematic bodies"
+    SENSORS = "sensors"
 
 
 BALLS = frozenset(
     {
+        Demand.SENSORS,  # detected by `sandbox.engines.sensors` on every engine
         Demand.TRANSLATION,
         Demand.ROTATION,
         Demand.GRAVITY,
@@ -214,6 +216,7 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         _count(kinematic, "body is kinematic", "bodies are kinematic", "no body is kinematic"),
     )
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
+    yield Demand.SENSORS, bool(scene.sensors), f"{len(scene.sensors):,}" if scene.sensors else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())
     yield (
