@@ -90,6 +90,7 @@ MOMENTS = {
     "games/curling": Moment(60.0, player="random"),
     "games/landing": Moment(4.8, trail=4.8),
     "games/rube_goldberg": Moment(6.0),
+    "games/sensors": Moment(3.7, trail=3.0, box=((-4.9, -1.0), (6.1, 4.9))),
     "games/table_tennis": Moment(0.72, trail=0.72, box=((-1.6, 0.1), (2.0, 1.7))),
     "joints/atwood": Moment(0.8, strobe=3),
     "joints/bridge": Moment(4.0),

@@ -300,6 +300,24 @@ def pieces_of(zone: Zone | Sensor) -> tuple[ZonePiece, ...]:
     return tuple(ZonePiece(tuple(part), 0.0) for part in convex_parts(anticlockwise(zone.points)))
 
 
+def placed_sensor(sensor: Sensor, origin: Point, angle: float) -> Sensor:
+    """Return a sensor of a body as one in the world.
+
+    Args:
+        sensor: with a shape in the frame of its body.
+        origin: of that frame, m.
+        angle: of that frame, rad.
+    """
+    cos, sin = math.cos(angle), math.sin(angle)
+    position, points = sensor.position, sensor.points
+    placed = {
+        "body": None,
+        "position": None if position is None else to_world(position, cos, sin, origin),
+        "points": None if points is None else tuple(to_world(each, cos, sin, origin) for each in points),
+    }
+    return sensor.model_copy(update=placed)
+
+
 @lru_cache(maxsize=1024)
 def middle_of(zone: Zone | Sensor) -> Point:
     """Return the centre of a zone or sensor, m: the centroid of a polygon, the midpoint of a strip's line."""
