@@ -591,8 +591,10 @@ class SwitchableSimulation:
 
         Example:
             >>> simulation = sandbox.start("sensors")
-            >>> simulation.sensed("feet")
-            ('floor',)
+            >>> while not simulation.sensed("sight"):
+            ...     simulation.step()
+            >>> simulation.sensed("sight"), round(simulation.time, 3)
+            (('ball',), 0.625)
         """
         number = number_of_sensor(self.scene, sensor)
         found = self._sensors.sensors(self.scene, self.bodies).detected(number, self.frame()).tolist()

@@ -90,7 +90,6 @@ MOMENTS = {
     "games/curling": Moment(60.0, player="random"),
     "games/landing": Moment(4.8, trail=4.8),
     "games/rube_goldberg": Moment(6.0),
-    "games/sensors": Moment(3.7, trail=3.0, box=((-4.9, -1.0), (6.1, 4.9))),
     "games/table_tennis": Moment(0.72, trail=0.72, box=((-1.6, 0.1), (2.0, 1.7))),
     "joints/atwood": Moment(0.8, strobe=3),
     "joints/bridge": Moment(4.0),
@@ -111,6 +110,7 @@ MOMENTS = {
     "tutorial/fast_ball": Moment(0.1, strobe=4),
     "tutorial/fireworks": Moment(1.4),
     "tutorial/overpass": Moment(2.4, trail=2.4),
+    "tutorial/sensors": Moment(3.7, trail=3.0, box=((-4.9, -1.0), (6.1, 4.9))),
     "tutorial/spaceship": Moment(4.8, trail=4.8),
 }
 """By scene; the thumbnails of artillery are made from the window."""
