@@ -144,6 +144,7 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.SENSORS, True, {"ball": [BALL], "sensor": [{"position": [9, 9], "radius": 1}]}, "1"),
 ]
 
 
