@@ -23,8 +23,8 @@ SOLID_KINDS = ("plane", "wall", "post", "pocket")
 
 
 def are_collisions(run: Trajectory) -> BoolArray:
-    """Return which contacts of a run are collisions or falls into pockets, (C,)."""
-    scene = run.info["scene"]
+    """Return which contacts of a run are collisions or falls into pockets, (C,); all in a run without a scene."""
+    scene = run.info.get("scene", {})
     if not scene.get("zone") and not scene.get("sensor"):
         return np.ones(len(run.contact_pair), np.bool_)
     return np.asarray(run.contact_pair[:, 1] >= -sum(len(scene.get(kind, ())) for kind in SOLID_KINDS))
