@@ -16,9 +16,12 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.echo import short_repr
+from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import kernel
+from sandbox.engines.contract import Exhaustion
 from sandbox.queries import Hull, static_hulls, visible_objects
+from sandbox.resource_limits import CONTACTS
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Sensor
@@ -29,7 +32,9 @@ from sandbox.trajectory import Contacts, Frame, SensorVisit
 
 @kernel
 def _is_separated(a: FloatArray, b: FloatArray) -> bool:
-    """Return whether a line along an edge of a hull, or across the ends of a segment, has another hull beyond it.
+    """Return whether another hull is beyond an edge of a hull, or touches its line from there.
+
+    Two hulls are apart if one of them is so. Parallel segments always are: their distance decides whether they overlap.
 
     Args:
         a: (V, 2) m, corners, counter-clockwise; one corner has no edge.
@@ -42,12 +47,11 @@ def _is_separated(a: FloatArray, b: FloatArray) -> bool:
         ax, ay = a[k, 0], a[k, 1]
         following = (k + 1) % count
         dx, dy = a[following, 0] - ax, a[following, 1] - ay
-        beyond, ahead = True, True
+        beyond = True
         for j in range(len(b)):
             x, y = b[j, 0] - ax, b[j, 1] - ay
             beyond = beyond and dy * x - dx * y >= 0.0
-            ahead = ahead and dx * x + dy * y <= 0.0
-        if beyond or (ahead and count == 2):
+        if beyond:
             return True
     return False
 
@@ -403,7 +407,11 @@ class SensorTracker:
             self._update(self.sensors(scene, bodies), frame)
 
     def step(self, scene: Scene, bodies: Bodies, frame: Frame) -> None:
-        """Update the visits at the end of a step."""
+        """Update the visits at the end of a step.
+
+        Raises:
+            Exhaustion: there are more visits since the last call of `take`, or of `visits`, than can be recorded.
+        """
         self._update(self.sensors(scene, bodies), frame)
         self._has_stepped = True
 
@@ -426,6 +434,9 @@ class SensorTracker:
                 length = math.hypot(dx, dy)
                 normal = (dx / length, dy / length) if 0.0 < length < math.inf else (0.0, 1.0)
                 self._open[index, sensor] = OpenVisit(frame.time, (x, y), normal)
+        kept = len(self._open) + max(len(self._ended), len(self._recorded or ()))
+        if kept > CONTACTS.value:
+            raise Exhaustion(too_many_contacts(kept))
 
     def take(self) -> Contacts:
         """Return the visits that were open at the end of a step since the last call, or are open now, as contacts."""

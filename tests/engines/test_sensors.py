@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Launch, Move, Remove, Spawn, Switch
+from sandbox.engines.contract import Exhaustion
 from sandbox.engines.registry import ENGINES, able
 from sandbox.engines.sensors import SceneSensors
 from sandbox.engines.switching import SwitchableSimulation
@@ -571,3 +572,12 @@ def test_many_bodies_are_detected_as_one_by_one() -> None:
     assert 10 < len(expected) < 390
     gone = replace(frame, present=np.arange(400) % 2 == 0)
     assert SceneSensors(scene, scene.bodies).detected(0, gone).tolist() == [k for k in expected if k % 2 == 0]
+
+
+def test_run_with_more_visits_than_can_be_recorded_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SANDBOX_MAX_CONTACTS", "3")
+    balls = [{"position": [0.1 * k, 0.0], "radius": 0.1, "collides": "fixed"} for k in range(4)]
+    sensor = {"position": [0.0, 0.0], "radius": 5.0}
+    scene = from_document({"world": {"duration": 0.1}, "ball": balls, "sensor": [sensor]})
+    with pytest.raises(Exhaustion, match="4 contacts"):
+        sandbox.start(scene).contacts()
