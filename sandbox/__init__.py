@@ -263,6 +263,7 @@ if TYPE_CHECKING:
     from sandbox.scene.description.fixed import (
         Plane as Plane,
         Post as Post,
+        Sensor as Sensor,
         Wall as Wall,
         Zone as Zone,
     )
@@ -341,6 +342,7 @@ if TYPE_CHECKING:
         Contacts as Contacts,
         Frame as Frame,
         RunFailedError as RunFailedError,
+        SensorVisit as SensorVisit,
         Trajectory as Trajectory,
     )
 
@@ -406,7 +408,7 @@ _NAMES = {
     "sandbox.scene.description.base": "BodySource BodySpec",
     "sandbox.scene.description.bodies": "BallPart Box BoxPart Capsule CapsulePart Compound Polygon PolygonPart",
     "sandbox.scene.description.discs": "Ball Emitter Grid Scatter",
-    "sandbox.scene.description.fixed": "Plane Post Wall Zone",
+    "sandbox.scene.description.fixed": "Plane Post Sensor Wall Zone",
     "sandbox.scene.description.forces": "Attraction PlungerDrive StrokeDrive Thrust TorqueDrive",
     "sandbox.scene.description.generators": "Cloth Ragdoll Rope RopeAttachment Stack",
     "sandbox.scene.description.joints": (
@@ -419,7 +421,7 @@ _NAMES = {
     "sandbox.scene.files.load": "dumps load loads",
     "sandbox.scene.geometry.shapes": "Shapes",
     "sandbox.queries": "NearestObject RayHit RayHits SceneQueries",
-    "sandbox.trajectory": "Contacts Frame RunFailedError Trajectory",
+    "sandbox.trajectory": "Contacts Frame RunFailedError SensorVisit Trajectory",
 }
 """Public names by the module that has them."""
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}

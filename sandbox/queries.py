@@ -1,15 +1,16 @@
-"""Spatial queries: ray casts, casts of discs and distances in one state of a scene.
+"""Spatial queries: ray casts, casts of discs and of convex shapes, and distances in one state of a scene.
 
     queries = SceneQueries(simulation.setup, simulation.frame())
     hits = queries.cast_rays(starts, ends)
 
 They depend on the scene and on the state only, not on the engine that computed it, so that all engines agree bit for
 bit. Objects are the bodies that are present, planes, walls that are solid, and posts. Bodies that collide with nothing
-are not seen, nor are zones.
+are not seen, nor are zones and sensors.
 
 Every shape is a convex hull of corners, widened by a radius. Its boundary consists of arcs about the corners and of
 edges moved outward by the radius, and a disc is cast as a ray against shapes that are wider by its radius. A ray enters
-a hull where it first enters one of these, so all of them are tested for all rays at once.
+a hull where it first enters one of these, so all of them are tested for all rays at once. A convex shape is cast as a
+ray of its origin against the Minkowski differences of the hulls and the shape.
 """
 
 import math
@@ -21,10 +22,12 @@ import numpy.typing as npt
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.echo import short_repr
+from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.filters import filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Post, Wall, mask_of
+from sandbox.scene.geometry.hulls import convex_hull, minkowski_difference
 from sandbox.scene.geometry.vectors import offset_from_segment, rotate
 from sandbox.trajectory import Frame
 
@@ -127,7 +130,8 @@ class SceneQueries:
             ValueError: the scene has no such object or category.
         """
         self._setup = Setup.of(start)
-        self._features = _features_of(self._setup, frame, frozenset(ignore), frozenset(categories))
+        self._hulls, self._planes = _seen_shapes(self._setup, frame, frozenset(ignore), frozenset(categories))
+        self._features = _features_of(self._hulls, self._planes, len(self._setup.bodies))
 
     def name_of(self, index: int) -> str:
         """Return the name of a body, or of the static object −1 − k.
@@ -150,7 +154,10 @@ class SceneQueries:
         Raises:
             ValueError: a coordinate is not finite, or the radius is negative or not finite.
         """
-        hits = self.cast_rays([start], [end], radius)
+        return self._first(self.cast_rays([start], [end], radius))
+
+    def _first(self, hits: RayHits) -> RayHit | None:
+        """Return the hit of the first ray."""
         if hits.target[0] == NOTHING:
             return None
         (x, y), (nx, ny) = hits.point[0].tolist(), hits.normal[0].tolist()
@@ -186,6 +193,62 @@ class SceneQueries:
             of_part = RayHits(found.fraction[part], found.target[part], found.point[part], found.normal[part])
             _cast(self._features, origins[part], ends[part] - origins[part], radius, of_part)
         return found
+
+    def cast_shape(
+        self,
+        corners: npt.ArrayLike,
+        start: Sequence[float],
+        end: Sequence[float],
+        *,
+        angle: float = 0.0,
+        radius: float = 0.0,
+    ) -> RayHit | None:
+        """Return the first object on the way of a convex shape that moves without turning; None if nothing is hit.
+
+        An object that the shape overlaps at the start is not hit.
+
+        Args:
+            corners: (V, 2) m, about the point that moves from start to end. The shape is their convex hull: one corner
+                and a radius are a disc, two a capsule.
+            start: (2,) m.
+            end: (2,) m.
+            angle: of the shape, rad.
+            radius: rounding of the shape, m.
+
+        Returns:
+            The hit, whose `point` is where the moving point is then.
+
+        Raises:
+            ValueError: a coordinate or the angle is not finite, there is no corner, or the radius is negative or not
+                finite.
+
+        Example:
+            >>> queries = sandbox.SceneQueries(sandbox.load("bounce"))
+            >>> hit = queries.cast_shape([(-0.5, -1.0), (0.5, -1.0), (0.5, 1.0), (-0.5, 1.0)], (3.0, 4.0), (3.0, 0.0))
+            >>> hit.name, hit.fraction, hit.point
+            ('ground', 0.75, (3.0, 1.0))
+        """
+        own = np.asarray(corners, np.float64).reshape(-1, 2)
+        origin, way = np.asarray(start, np.float64), np.asarray(end, np.float64) - np.asarray(start, np.float64)
+        if not len(own):
+            raise ValueError("corners: a shape needs at least one")
+        if not all(np.isfinite(each).all() for each in (own, origin, way, angle)):
+            raise ValueError("a shape has a coordinate or an angle that is not finite")
+        if not 0.0 <= radius < math.inf:
+            raise ValueError(f"radius: must be at least 0 and finite, is {radius:g}")
+        own = convex_hull(np.column_stack(rotate(own[:, 0], own[:, 1], np.cos(angle), np.sin(angle))))
+        low = np.minimum(origin, origin + way) + own.min(axis=0) - radius
+        high = np.maximum(origin, origin + way) + own.max(axis=0) + radius
+        near = [
+            Hull(each.owner, minkowski_difference(each.corners, own), each.radius)
+            for each in self._hulls
+            if (each.corners.min(axis=0) - each.radius <= high).all()
+            and (each.corners.max(axis=0) + each.radius >= low).all()
+        ]
+        planes = [each.raised(-float((own @ each.normal).min())) for each in self._planes]
+        found = RayHits(np.full(1, np.inf), np.full(1, NOTHING), np.full((1, 2), np.nan), np.full((1, 2), np.nan))
+        _cast(_features_of(near, planes, len(self._setup.bodies)), origin[None], way[None], radius, found)
+        return self._first(found)
 
     def nearest(self, point: Sequence[float]) -> NearestObject | None:
         """Return the object whose surface is nearest to a point, or that the point is deepest in; None without any.
@@ -372,7 +435,7 @@ def _nearest(features: _Features, point: FloatArray) -> tuple[int, float, tuple[
     return int(features.owner[which]), float(distance[which]), (x, y)
 
 
-class _Hull(NamedTuple):
+class Hull(NamedTuple):
     """Convex hull of corners, widened by a radius."""
 
     owner: int
@@ -383,24 +446,57 @@ class _Hull(NamedTuple):
     """m"""
 
 
-def _features_of(setup: Setup, frame: Frame | None, ignore: frozenset[str], categories: frozenset[str]) -> _Features:
-    """Return the features of all objects that are seen.
+class HalfPlane(NamedTuple):
+    """A half-plane."""
+
+    owner: int
+    """index of its object"""
+    point: FloatArray
+    """(2,) m, of its surface"""
+    normal: FloatArray
+    """(2,) unit normal"""
+
+    def raised(self, height: float) -> "HalfPlane":
+        """Return the half-plane whose surface is higher, m."""
+        return self._replace(point=self.point + height * self.normal)
+
+
+def _seen_shapes(
+    setup: Setup, frame: Frame | None, ignore: frozenset[str], categories: frozenset[str]
+) -> tuple[list[Hull], list[HalfPlane]]:
+    """Return the hulls and half-planes of all objects that are seen.
 
     Raises:
         ValueError: the scene has no object or category with a name.
     """
     scene = setup.scene
-    is_seen = _visibility(setup, ignore, categories)
-    hulls = [each for each in (*_body_hulls(setup, frame), *_static_hulls(scene)) if is_seen[each.owner]]
+    is_seen = visible_objects(scene, setup.bodies, ignore, categories)
+    hulls = [each for each in (*_body_hulls(setup, frame), *static_hulls(scene)) if is_seen[each.owner]]
+    normals = np.asarray([each.normal for each in scene.planes], np.float64).reshape(-1, 2)
+    normals /= np.hypot(*normals.T)[:, None]
+    planes = [
+        HalfPlane(-1 - k, np.asarray(plane.point, np.float64), normals[k])
+        for k, plane in enumerate(scene.planes)
+        if is_seen[-1 - k]
+    ]
+    return hulls, planes
+
+
+def _features_of(hulls: Sequence[Hull], planes: Sequence[HalfPlane], bodies: int) -> _Features:
+    """Return the features of objects.
+
+    Args:
+        hulls: of bodies, walls and posts.
+        planes: half-planes.
+        bodies: number of bodies of the scene.
+    """
     areas = [each for each in hulls if len(each.corners) > 2]
     lines = [each for each in hulls if len(each.corners) == 2]
     tails = [each.corners for each in (*areas, *lines)]
     sides = [np.roll(each, -1, axis=0) - each for each in tails]
     along = np.concatenate((np.empty((0, 2)), *sides))
-    planes = [(-1 - k, each) for k, each in enumerate(scene.planes) if is_seen[-1 - k]]
-    normal = np.asarray([each.normal for _, each in planes], np.float64).reshape(-1, 2)
     edge_owner = [each.owner for each in (*areas, *lines) for _ in each.corners]
-    owner = [each.owner for each in hulls for _ in each.corners] + edge_owner + [number for number, _ in planes]
+    owner = [each.owner for each in hulls for _ in each.corners] + edge_owner + [each.owner for each in planes]
     owners = np.asarray(owner, np.int64)
     return _Features(
         centre=np.concatenate((np.empty((0, 2)), *(each.corners for each in hulls))),
@@ -410,16 +506,27 @@ def _features_of(setup: Setup, frame: Frame | None, ignore: frozenset[str], cate
         outward=np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, None],
         width=np.asarray([each.radius for each in (*areas, *lines) for _ in each.corners], np.float64),
         area=np.asarray([len(each.corners) for each in areas], np.int64),
-        surface=np.asarray([each.point for _, each in planes], np.float64).reshape(-1, 2),
-        normal=normal / np.hypot(*normal.T)[:, None],
+        surface=np.asarray([each.point for each in planes], np.float64).reshape(-1, 2),
+        normal=np.asarray([each.normal for each in planes], np.float64).reshape(-1, 2),
         owner=owners,
-        order=np.argsort(np.where(owners >= 0, owners, len(setup.bodies) - 1 - owners), kind="stable"),
+        order=np.argsort(np.where(owners >= 0, owners, bodies - 1 - owners), kind="stable"),
     )
 
 
-def _visibility(setup: Setup, ignore: frozenset[str], categories: frozenset[str]) -> dict[int, bool]:
-    """Return for each body and static object, by its index, whether it is seen."""
-    scene, bodies = setup.scene, setup.bodies
+def visible_objects(
+    scene: Scene, bodies: Bodies, ignore: frozenset[str], categories: frozenset[str]
+) -> dict[int, bool]:
+    """Return for each body and static object, by its index, whether it is seen, apart from whether it is present.
+
+    Args:
+        scene: the scene.
+        bodies: bodies of the scene, and those that were added.
+        ignore: names of bodies and static objects that are not seen.
+        categories: collision categories that are seen; empty means all.
+
+    Raises:
+        ValueError: the scene has no body, static object or category with a name.
+    """
     names = [*bodies.names, *scene.fixed_names[: len(scene.fixed)]]
     numbers = [*range(len(bodies)), *(-1 - k for k in range(len(scene.fixed)))]
     if unknown := ignore - set(names):
@@ -439,7 +546,7 @@ def _visibility(setup: Setup, ignore: frozenset[str], categories: frozenset[str]
     }
 
 
-def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[_Hull]:
+def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[Hull]:
     """Yield the hulls of the bodies that are present, where a frame has them, or else the setup."""
     bodies = setup.bodies
     state = bodies if frame is None else frame
@@ -449,16 +556,16 @@ def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[_Hull]:
     x, y = rotate(shapes.corner[:, 0], shapes.corner[:, 1], np.cos(angle[owner]), np.sin(angle[owner]))
     corners = position[owner] + np.column_stack((x, y))
     for k in np.flatnonzero(present[shapes.body]).tolist():
-        yield _Hull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
+        yield Hull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
 
 
-def _static_hulls(scene: Scene) -> Iterator[_Hull]:
+def static_hulls(scene: Scene) -> Iterator[Hull]:
     """Yield the hulls of walls, a segment each, and of posts."""
     for k, thing in enumerate(scene.fixed):
         if isinstance(thing, Post):
-            yield _Hull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
+            yield Hull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
         elif isinstance(thing, Wall):
             line = np.asarray([*thing.points, thing.points[0]] if thing.closed else thing.points, np.float64)
             for segment in np.stack((line[:-1], line[1:]), axis=1):
                 if (segment[0] != segment[1]).any():
-                    yield _Hull(-1 - k, segment, 0.5 * thing.thickness)
+                    yield Hull(-1 - k, segment, 0.5 * thing.thickness)

@@ -32,6 +32,7 @@ from sandbox.echo import MAX_NAMED, printable, shorten
 from sandbox.resource_limits import CONTACTS, FREE_FRACTION, SESSION_SIZE, TooLargeError, free_memory
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Name
+from sandbox.scene.description.scene import first_sensor
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_session
@@ -54,6 +55,7 @@ SHAPES: dict[str, tuple[str | int, ...]] = {
     "retired_time": ("N",),
     "missed_pair": ("M", 2),
     "broken_time": ("J",),
+    "contact_end": ("C",),
     "energy": ("E",),
     "account": ("E", "K"),
     "spin": ("T", "N", 3),
@@ -65,7 +67,7 @@ SHAPES: dict[str, tuple[str | int, ...]] = {
 KINDS = {"names": "U", "info": "U", "contact_pair": "i8", "missed_pair": "i8", "layer": "i"}
 """Types of the arrays that are not float64: text, int64, and integers of any width."""
 
-OPTIONAL = frozenset({"broken_time", "energy", "account", "spin", "layer"})
+OPTIONAL = frozenset({"broken_time", "contact_end", "energy", "account", "spin", "layer"})
 """Arrays that are missing in runs of earlier versions, or of scenes without joints, energy accounting and so on."""
 
 EMPTY = {"spin": (0, 0, 3), "layer": (0, 0)}
@@ -406,10 +408,14 @@ def _check_contents(arrays: Mapping[str, Array], scene: Scene, info: Info) -> No
         times = arrays.get(name, np.empty(0))
         if not (np.isnan(times) | (np.isfinite(times) & (times >= 0.0))).all():
             raise ValueError(f"{name}: a time is neither nan nor a number ≥ 0")
+    ends = arrays.get("contact_end", np.empty(0))
+    if len(ends) and not (np.isnan(ends) | (np.isfinite(ends) & (ends >= arrays["contact_time"]))).all():
+        raise ValueError("contact_end: a time is neither nan nor a number ≥ contact_time")
     for name in ("contact_pair", "missed_pair"):
         pair = arrays[name]
-        lowest, highest = (0, -fixed), bodies - 1
-        if len(pair) and ((pair.min(axis=0) < lowest).any() or pair.max() > highest):
+        is_visit = pair[:, 1] <= first_sensor(scene)  # a sensor, with a body or static object
+        lowest = np.where(is_visit, -len(scene.fixed), 0)
+        if (pair[:, 0] < lowest).any() or (pair[:, 1] < -fixed).any() or pair.max(initial=-1) > bodies - 1:
             raise ValueError(f"{name}: refers to an object that the scene does not have")
     layer = arrays.get("layer", np.empty(0, np.int16))
     if layer.size and not (layer.min() >= -1 and layer.max() < len(scene.layers)):

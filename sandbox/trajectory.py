@@ -94,13 +94,26 @@ class ContactEvent(NamedTuple):
     time: float
     """s, time of the first touch"""
     pair: tuple[int, int]
-    """body indices, the lower first; a fixed object is −1 − k and comes second"""
+    """body indices, the lower first; a fixed object is −1 − k and comes second, as does a sensor with any object"""
     point: tuple[float, float]
     """m, contact point at the first touch"""
     normal: tuple[float, float]
     """unit vector at the first touch, from the first of the pair to the second"""
     impulse: tuple[float, float]
     """N·s, total impulse of the first of the pair on the second"""
+
+
+class SensorVisit(NamedTuple):
+    """A visit of a sensor: an object overlapped it at the end of each step from `begin` to before `end`."""
+
+    sensor: str
+    """name of the sensor"""
+    object: str
+    """name of the body or static object"""
+    begin: float
+    """s, end of the first step after which they overlapped, or the start of the recording"""
+    end: float
+    """s, end of the first step after which they did not; nan if they overlap still"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -203,7 +216,8 @@ class Trajectory(HtmlRepr):
     contact_time: FloatArray
     """(C,) s, time of the first touch"""
     contact_pair: IntArray
-    """(C, 2) body indices from 0; −1 − k for the k-th fixed object, in the order planes, walls, posts, pockets, zones
+    """(C, 2) body indices from 0; −1 − k for the k-th fixed object, in the order planes, walls, posts, pockets, zones,
+    sensors. Visits of zones and sensors have such a second index; the first is a body, or a static object in a sensor
     """
     contact_point: FloatArray
     """(C, 2) m, contact point at the first touch"""
@@ -229,6 +243,9 @@ class Trajectory(HtmlRepr):
     layer: IntArray = field(default_factory=lambda: np.empty((0, 0), np.int16))
     """(T, N) index of the collision layer of each body in `scene.layers`; −1 before a body is added. Empty if the scene
     has a single layer"""
+    contact_end: FloatArray = field(default_factory=lambda: np.empty(0))
+    """(C,) s, end of each visit of a sensor; nan for other contacts, and for visits that last to the end. Empty if the
+    scene has no sensors"""
     info: Mapping[str, Any] = field(default_factory=dict)
     """scene, engine, settings, actions, seed, status, reason, steps, seconds, work, energy_start, energy_end,
     joint_error (the largest constraint violation, relative to a length; None without joints), worst_joint (its joint,
@@ -247,6 +264,7 @@ class Trajectory(HtmlRepr):
         missed_time: FloatArray | None = None,
         missed_pair: IntArray | None = None,
         broken_time: FloatArray | None = None,
+        contact_end: FloatArray | None = None,
     ) -> Self:
         """Assemble a run from the arrays of its frames and its contacts.
 
@@ -260,6 +278,7 @@ class Trajectory(HtmlRepr):
             missed_time: (M,) s; default: no missed contacts.
             missed_pair: (M, 2); default: no missed contacts.
             broken_time: (J,) s; default: no joints.
+            contact_end: (C,) s; default: no sensors.
         """
         return cls(
             names=np.asarray(names, dtype=np.str_),
@@ -272,6 +291,7 @@ class Trajectory(HtmlRepr):
             missed_time=np.empty(0) if missed_time is None else missed_time,
             missed_pair=np.empty((0, 2), np.int64) if missed_pair is None else missed_pair,
             broken_time=np.empty(0) if broken_time is None else broken_time,
+            contact_end=np.empty(0) if contact_end is None else contact_end,
             info=info,
             **frames,
         )
@@ -355,6 +375,22 @@ class Trajectory(HtmlRepr):
             raise ValueError(f"the run had {len(self.broken_time):,} joints, the scene has {joints:,}")
         return np.where(np.isnan(self.broken_time), np.inf, self.broken_time)
 
+    @property
+    def sensor_visits(self) -> tuple[SensorVisit, ...]:
+        """Visits of sensors, by their begin."""
+        if not len(self.contact_end):
+            return ()
+        from sandbox.scene.description.scene import fixed_names_in
+
+        fixed, bodies = fixed_names_in(self.info["scene"]), self.names.tolist()
+        first = len(fixed) - len(self.info["scene"]["sensor"])
+        rows = zip(self.contact_time.tolist(), self.contact_pair.tolist(), self.contact_end.tolist(), strict=True)
+        return tuple(
+            SensorVisit(fixed[-1 - sensor], bodies[index] if index >= 0 else fixed[-1 - index], begin, end)
+            for begin, (index, sensor), end in rows
+            if -1 - sensor >= first
+        )
+
     def number(self, name: str) -> int:
         """Return the index of a body.
 
@@ -408,7 +444,7 @@ class Trajectory(HtmlRepr):
 
     def _write(self, stream: BinaryIO) -> None:
         """Write the compressed arrays."""
-        without = {"info", *(key for key in ("spin", "layer") if not len(getattr(self, key)))}
+        without = {"info", *(key for key in ("spin", "layer", "contact_end") if not len(getattr(self, key)))}
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
         np.savez_compressed(stream, **arrays)

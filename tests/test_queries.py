@@ -6,7 +6,8 @@ import numpy as np
 import pymunk
 import pytest
 import shapely
-from hypothesis import given, settings
+import shapely.affinity
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import sandbox
@@ -104,6 +105,85 @@ def test_first_hit_is_that_of_shapely(start: tuple[float, float], end: tuple[flo
     assert (end[0] - start[0]) * found.normal[0] + (end[1] - start[1]) * found.normal[1] <= 1e-9  # against the way
     for fraction in hits.values():  # no other object is hit earlier, but for a graze, whose depth is the square root
         assert found.fraction <= fraction + 6e-3 / line.length
+
+
+def moved(shape: shapely.Geometry, by: tuple[float, float]) -> shapely.Geometry:
+    return shapely.affinity.translate(shape, *by)
+
+
+@settings(max_examples=300)
+@given(
+    st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), min_size=1, max_size=6),
+    POINTS,
+    POINTS,
+    st.floats(-math.pi, math.pi),
+    st.sampled_from([0.0, 0.1]),
+)
+def test_first_hit_of_a_shape_is_that_of_shapely(
+    corners: list[tuple[float, float]],
+    start: tuple[float, float],
+    end: tuple[float, float],
+    angle: float,
+    radius: float,
+) -> None:
+    """At the hit the shape touches the object that is named; on the way there it overlaps no other."""
+    assume(math.dist(start, end) > 0.01)
+    core = shapely.affinity.rotate(shapely.MultiPoint(corners).convex_hull, angle, origin=(0.0, 0.0), use_radians=True)
+    shape = core.buffer(radius, quad_segs=ARC) if radius else core
+    found = SceneQueries(SCENE).cast_shape(corners, start, end, angle=angle, radius=radius)
+    last = end
+    if found is not None:
+        last = found.point
+        # Chords of arcs, of a sum of radii up to 0.5 m.
+        assert moved(shape, last).distance(OUTLINES[found.name]) < 1e-5
+        assert moved(shape, start).distance(OUTLINES[found.name]) > 0.0
+        assert last == pytest.approx([a + found.fraction * (b - a) for a, b in zip(start, end, strict=True)], abs=1e-12)
+    swept = shapely.union(moved(shape, start), moved(shape, last)).convex_hull  # of a convex shape
+    for name, outline in OUTLINES.items():
+        # The arrow is not convex, so that the shape can start inside the hull of its pieces; its pieces are hit as one.
+        if moved(shape, start).distance(outline) > 0.0 and (found is None or name != found.name):
+            assert swept.distance(outline.buffer(-1e-5)) > 0.0, name  # chords of arcs
+
+
+def test_box_stops_at_a_plane_and_passes_under_a_wall() -> None:
+    scene = scene_of(
+        """
+        [[plane]]
+        name = "ground"
+        point = [0.0, 0.0]
+        normal = [0.0, 2.0]
+        [[wall]]
+        name = "beam"
+        points = [[2.0, 1.0], [4.0, 1.0]]
+        thickness = 0.5
+        """
+    )
+    queries, box = SceneQueries(scene), [(-0.5, -0.25), (0.5, -0.25), (0.5, 0.25), (-0.5, 0.25)]
+    hit = queries.cast_shape(box, (0.0, 2.0), (0.0, -2.0))
+    assert hit is not None
+    assert (hit.name, hit.point, hit.normal) == ("ground", (0.0, 0.25), (0.0, 1.0))
+    upright = queries.cast_shape(box, (0.0, 2.0), (0.0, -2.0), angle=0.5 * math.pi, radius=0.25)
+    assert upright is not None
+    assert upright.point == pytest.approx((0.0, 0.75), abs=1e-12)  # rounding of the cosine
+    assert queries.cast_shape(box, (-1.0, 0.375), (9.0, 0.375)) is None
+    high = queries.cast_shape(box, (-1.0, 0.625), (9.0, 0.625))
+    assert high is not None
+    # The upper right corner, at (0.5, 0.25), meets the round end about (2, 1) with a radius of 0.25 m at y = 0.875.
+    assert (high.name, high.point[0]) == ("beam", pytest.approx(2.0 - math.sqrt(0.25**2 - 0.125**2) - 0.5, abs=1e-12))
+
+
+@pytest.mark.parametrize(
+    ("corners", "more"),
+    [
+        ([], {}),
+        ([(0.0, math.nan)], {}),
+        ([(0.0, 0.0)], {"radius": -1.0}),
+        ([(0.0, 0.0)], {"angle": math.inf}),
+    ],
+)
+def test_invalid_shapes_are_rejected(corners: list[tuple[float, float]], more: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"corner|finite|radius"):
+        SceneQueries(SCENE).cast_shape(corners, (0.0, 0.0), (1.0, 0.0), **more)
 
 
 @settings(max_examples=200)

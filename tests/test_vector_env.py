@@ -180,6 +180,7 @@ def test_spaces_and_metadata() -> None:
         (load("landing"), "pymunk"),
         (load("curling"), "reference"),
         (plain(more="[[ball]]\nposition = [9.0, 9.0]\nradius = 1.0"), "reference"),  # the ship can touch it
+        (plain(more="[[sensor]]\nposition = [9.0, 9.0]\nradius = 1.0"), "reference"),  # detects after every step
     ],
 )
 def test_what_cannot_be_compiled_is_refused(scene: Scene, engine: str) -> None:

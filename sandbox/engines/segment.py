@@ -9,6 +9,7 @@ from sandbox.action import ActionError, Force, Pull, Throttle
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
+from sandbox.engines.sensors import OpenVisit
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -39,6 +40,8 @@ class Checkpoint:
     """with all joints, numbered as `broken`"""
     plane_reach: PlaneReach | None
     """as `Simulation.plane_reach`"""
+    sensor_visits: Mapping[tuple[int, int], OpenVisit] | None
+    """visits of sensors that last, by the pairs of their contacts; None if they are not tracked"""
 
     @property
     def scene(self) -> Scene:

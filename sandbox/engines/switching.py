@@ -45,6 +45,7 @@ from sandbox.engines.mouse_joint import MouseJoints
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
+from sandbox.engines.sensors import SensorTracker, join_rows, number_of_sensor
 from sandbox.frame_table import FrameTable
 from sandbox.queries import RayHit, SceneQueries
 from sandbox.scene.compile.bodies import Bodies
@@ -59,7 +60,7 @@ from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.validate.references import check_joints, generators
-from sandbox.trajectory import Contacts, Frame
+from sandbox.trajectory import Contacts, Frame, SensorVisit
 
 
 class PersistentActions:
@@ -234,6 +235,7 @@ class SwitchableSimulation:
         self._earlier_contacts: list[Contacts] | None = None
         self._observer: Observer | None = None
         self._ledger = LedgerHandover()
+        self._sensors = SensorTracker()
 
     def __repr__(self) -> str:
         title = f" of {shorten(self.scene.title)!r}" if self.scene.title else ""
@@ -297,6 +299,7 @@ class SwitchableSimulation:
             pulls=self._pulls.pulls,
             setup=self.setup,
             plane_reach=self.plane_reach,
+            sensor_visits=self._sensors.open_visits,
         )
 
     @classmethod
@@ -337,6 +340,7 @@ class SwitchableSimulation:
             LedgerHandover(),
             MouseJoints(point.pulls),
         )
+        simulation._sensors = SensorTracker(point.sensor_visits)
         return simulation
 
     @property
@@ -434,7 +438,8 @@ class SwitchableSimulation:
         segment, before = self._segment, frames.steps
         if math.isfinite(self._events.next):
             steps = max(min(steps, math.ceil((self._events.next - self.time) / self.settings.dt - EVENT_ROUNDING)), 1)
-        if self._pulls.any or segment.before is not None:  # mouse joints act in each step; frames need other indices
+        # Mouse joints act in each step, sensors detect after each, and frames of a later segment have other indices.
+        if self._pulls.any or self._sensors.is_started or segment.before is not None:
             step_and_record(self, 1 if until_event else steps, frames)
             return
         try:
@@ -480,6 +485,8 @@ class SwitchableSimulation:
         except Exhaustion:
             self._segment.steps -= part
             raise
+        if self._sensors.is_started:
+            self._sensors.step(self.scene, self.bodies, self.frame())
 
     def apply(self, action: Action) -> None:
         """Apply an action at once. Its `time` is ignored.
@@ -696,14 +703,50 @@ class SwitchableSimulation:
         """
         return self.queries(ignore, categories).cast_ray(start, end, radius)
 
+    def sensed(self, sensor: str) -> tuple[str, ...]:
+        """Return the names of the objects that overlap a sensor in the present state: bodies, then static objects.
+
+        Args:
+            sensor: name of the sensor.
+
+        Raises:
+            ValueError: the scene has no sensor of that name.
+
+        Example:
+            >>> simulation = sandbox.start("sensors")
+            >>> while not simulation.sensed("sight"):
+            ...     simulation.step()
+            >>> simulation.sensed("sight"), round(simulation.time, 3)
+            (('ball',), 0.625)
+        """
+        number = number_of_sensor(self.scene, sensor)
+        found = self._sensors.sensors(self.scene, self.bodies).detected(number, self.frame()).tolist()
+        return tuple(self.bodies.names[k] if k >= 0 else self.scene.fixed_names[-1 - k] for k in found)
+
+    def sensor_visits(self) -> tuple[SensorVisit, ...]:
+        """Return the visits of sensors that ended since the last call, and those that last, by their begin.
+
+        The recording starts with the first call, which returns the visits that last.
+        """
+        self._start_sensors()
+        return self._sensors.visits(self.scene, self.bodies.names)
+
+    def _start_sensors(self) -> None:
+        if self.scene.sensors and not self._sensors.is_started:
+            self._sensors.start(self.scene, self.bodies, self.frame())
+
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording.
 
-        A contact that lasts through a change of engine becomes a new contact.
+        A contact that lasts through a change of engine becomes a new contact. A visit of a sensor has a row in each
+        call while it lasts, without impulse; its second index is that of the sensor, whose name is in
+        `scene.fixed_names`.
         """
+        self._start_sensors()
         earlier, self._earlier_contacts = self._earlier_contacts or [], []
         present = self._segment.contacts()
-        return Contacts.joined([*earlier, present]) if earlier else present
+        found = Contacts.joined([*earlier, present]) if earlier else present
+        return join_rows(found, self._sensors.take()) if self._sensors.is_started else found
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call, summed over all engines used."""

@@ -22,6 +22,8 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
 from sandbox.recording import Press
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.scene import first_sensor
 from sandbox.trajectory import Contacts, Frame
 
 __all__ = [
@@ -37,6 +39,7 @@ __all__ = [
     "Rules",
     "StepInfo",
     "UnsuitableSceneError",
+    "sensed_objects",
 ]
 
 
@@ -57,6 +60,21 @@ class StepInfo(NamedTuple):
     """contacts of the last step; a lasting contact appears at every step, with the time of its first touch"""
     actions: tuple[Action, ...]
     """actions of the player that were applied before this step, from controls, or from direct manipulation of bodies"""
+
+
+def sensed_objects(info: StepInfo, scene: Scene) -> dict[str, tuple[int, ...]]:
+    """Return what each sensor of a scene detects at the end of a step, by the names of the sensors.
+
+    Args:
+        info: of the step.
+        scene: the scene.
+
+    Returns:
+        Objects with the indices of `Contacts`: bodies from 0, and −1 − k for the k-th static object.
+    """
+    first, pairs = first_sensor(scene), info.contacts.pair.tolist()
+    names = scene.fixed_names[-1 - first :]
+    return {name: tuple(a for a, b in pairs if b == first - k) for k, name in enumerate(names)}
 
 
 class Control(NamedTuple):

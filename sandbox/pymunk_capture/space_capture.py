@@ -192,8 +192,10 @@ class SpaceElements:
         self.space, self._is_recorded = space, is_recorded
         self.omitted: list[str] = []
         self.inexact: list[str] = []
-        self._shapes = [shape for shape in space.shapes if shape.body is not None and not self._is_sensor(shape)]
+        self._shapes = [shape for shape in space.shapes if shape.body is not None and not shape.sensor]
+        self._sensors = [shape for shape in space.shapes if shape.body is not None and shape.sensor]
         used = [shape.body for shape in self._shapes]
+        used += [shape.body for shape in self._sensors if self.is_kinematic(_body_of(shape))]
         used += [body for constraint in space.constraints for body in (constraint.a, constraint.b)]
         self._bodies = list(
             dict.fromkeys(
@@ -221,13 +223,6 @@ class SpaceElements:
         """path of the table of each shape in the scene, such as `ball.body-1`; filled by `elements`"""
         self.joint_paths: dict[pymunk.Constraint, str] = {}
         """likewise of each joint, such as `joint[0]`"""
-
-    def _is_sensor(self, shape: pymunk.Shape) -> bool:
-        if shape.sensor:
-            self.omitted.append(
-                "sensor shapes, whose callbacks a scene does not have; a [[zone]] detects centres of bodies"
-            )
-        return bool(shape.sensor)
 
     def _unique_names(self, given: Mapping[pymunk.Body, str]) -> dict[pymunk.Body, str]:
         found: dict[pymunk.Body, str] = {}
@@ -291,6 +286,11 @@ class SpaceElements:
             if joint is not None:
                 self.joint_paths[constraint] = f"joint[{len(joints)}]"
                 joints.append(joint)
+        names = {*self.names.values()}
+        for shape in self._sensors:
+            values = self._sensor(shape, unique_name(f"sensor-{len(tables.get('sensor', ())) + 1}", names))
+            names.add(values["name"])
+            tables.setdefault("sensor", []).append(values)
         for body in self._origins:
             origin = {"name": self.names[body], "position": [0.0, 0.0], "radius": MIN_RADIUS, "fixed": True}
             tables.setdefault("ball", []).append(origin | {"collides": "none"})
@@ -336,6 +336,53 @@ class SpaceElements:
         assert isinstance(shape, pymunk.Segment)
         points = [point_of(shape.a), point_of(shape.b)]
         return "wall", {"points": points, "thickness": 2.0 * shape.radius} | values
+
+    def _sensor(self, shape: pymunk.Shape, name: str) -> KeyValues:
+        """Return the values of a sensor; that of a static body is fixed in the world."""
+        body = _body_of(shape)
+        values: KeyValues = {"name": name}
+        moves = body.body_type != pymunk.Body.STATIC
+        if moves:
+            values["body"] = self.names[body]
+
+        def placed(point: tuple[float, float]) -> list[float]:
+            return point_of(point if moves else body.local_to_world(point))
+
+        match shape:
+            case pymunk.Circle():
+                values |= {"position": placed(shape.offset), "radius": max(float(shape.radius), MIN_RADIUS)}
+            case pymunk.Segment():
+                values["points"] = [placed(shape.a), placed(shape.b)]
+                values["thickness"] = 2.0 * max(float(shape.radius), _smallest_radius(body))
+            case pymunk.Poly():
+                values["points"] = [placed(each) for each in shape.get_vertices()]
+                if shape.radius:
+                    self.inexact.append(f"{name} is without the rounding of its polygon, {shape.radius:g} m")
+        detects = self._detected_categories(shape)
+        if detects is None:
+            self.omitted.append(f"the filter of {name}, which detects what it overlaps")
+        elif detects:
+            values["detects"] = detects
+        return values
+
+    def _detected_categories(self, shape: pymunk.Shape) -> list[str] | None:
+        """Return the categories that a sensor shape detects; empty if it detects all, None if none state its filter."""
+        kind, known = FilterKind.of(shape), self._filters.values
+        group = shape.filter.group
+        if group and any(each.filter.group == group and each.body is not shape.body for each in self._shapes):
+            return None
+        others = {FilterKind.of(each) for each in self._shapes if each.body is not shape.body}
+        others = {each for each in others if not (kind.is_static and each.is_static)}  # one of the two has to move
+        detected = {each for each in others if kind.meets(each)}
+        if any(known[each].get("collides") == "none" for each in detected):
+            return None
+        if detected == others:
+            return []
+        ignored = {name for each in others - detected for name in known[each].get("categories", ())}
+        found = {name for each in detected for name in known[each].get("categories", ())} - ignored
+        is_exact = all(found & {*known[each].get("categories", ())} for each in detected)
+        is_exact &= all("categories" in known[each] for each in others - detected)
+        return sorted(found) if found and is_exact else None
 
     def _bodies_in_order(self, shapes: Sequence[pymunk.Shape]) -> Iterator[tuple[pymunk.Body, list[pymunk.Shape]]]:
         """Yield each body with its shapes, in the order of the shapes; bodies without shapes come last."""

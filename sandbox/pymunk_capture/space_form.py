@@ -122,8 +122,10 @@ class SpaceForm:
         if any(shape in self.shapes and shape in before.shapes for shape, _ in exchanged):
             yield "filters of shapes that the game changes"
         single = [values for shape, values in exchanged if (shape in self.shapes) != (shape in before.shapes)]
-        if any(values[0] not in explained and not values[2] for values in single):  # sensors are left out anyway
+        if any(values[0] not in explained and not values[2] for values in single):
             yield "shapes that the game adds to bodies or removes from them"
+        if any(values[2] for values in single):
+            yield "sensor shapes that the game adds or removes"
 
 
 TYPES = {pymunk.Body.DYNAMIC: "dynamic", pymunk.Body.KINEMATIC: "kinematic", pymunk.Body.STATIC: "static"}

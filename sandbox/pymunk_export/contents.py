@@ -8,10 +8,18 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.common.colliders import wall_segments
-from sandbox.engines.common.collision_bits import COLLIDES_ALL, COLLIDES_FIXED, STATIC, bits_of_body, bits_of_static
+from sandbox.engines.common.collision_bits import (
+    COLLIDES_ALL,
+    COLLIDES_FIXED,
+    STATIC,
+    bits_of_body,
+    bits_of_sensor,
+    bits_of_static,
+)
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, reach_of, shuffled
 from sandbox.engines.pymunk_adapter.contact_names import is_captured
+from sandbox.engines.sensors import sensor_names
 from sandbox.pymunk_export.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
@@ -19,7 +27,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.description.world import Settings
-from sandbox.scene.geometry.shapes import geometry_of
+from sandbox.scene.geometry.shapes import geometry_of, pieces_of
 
 
 def literal(value: object) -> str:
@@ -262,6 +270,23 @@ class Contents:
         chosen = self.filters.name(*bits, int(bodies.group[index]))
         material = self.surfaces.name(int(self.surfaces.of_shape[piece]), literal(bodies.names[index]))
         return [f"shape = {shape}", f"space.add(with_surface(shape, {material}, {chosen}))"]
+
+    def sensors(self) -> Iterator[str]:
+        """Yield the statements that create the shapes of the sensors."""
+        scene, bodies = self.setup.scene, self.setup.bodies
+        for sensor, name in zip(scene.sensors, sensor_names(scene), strict=True):
+            body, (x, y), moves = "space.static_body", (0.0, 0.0), False
+            if sensor.body is not None:
+                index = bodies.number_of[sensor.body]
+                body, moves = f"bodies[{literal(sensor.body)}]", not bodies.fixed[index]
+                x, y = geometry_of(bodies.elements[bodies.element[index]]).centre
+            chosen = self.filters.name(*bits_of_sensor(scene, sensor.detects, static=moves))
+            yield f"body = {body}"
+            yield f"sensors[{literal(name)}] = ["
+            for piece in pieces_of(sensor):
+                expression, values = _shape_of([(a - x, b - y) for a, b in piece.corners], piece.radius, "")
+                yield f"    as_sensor({expression.format(**values)}, {chosen}),"
+            yield "]"
 
     def joints(self) -> Iterator[Block]:
         """Yield the joints."""

@@ -12,6 +12,7 @@ from sandbox.echo import short_repr
 from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.pymunk_adapter.colliders import jointed_surfaces
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
+from sandbox.engines.sensors import SceneSensors
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import Demand, demands, on_floor
 from sandbox.scene.compile.scene import Scene
@@ -84,10 +85,23 @@ def _forces(setup: Setup) -> Iterator[Obstacle]:
         yield Obstacle("thrust", f"a thrust that begins or ends needs a clock: {_names(timed)}")
 
 
+def _undetectable(setup: Setup) -> list[str]:
+    """Return the bodies that a sensor can detect, and whose shapes a program leaves out of the space."""
+    if not setup.scene.sensors:
+        return []
+    sensors = SceneSensors(setup.scene, setup.bodies)
+    detectable = np.logical_or.reduce([sensors.detectable(k) for k in range(len(setup.scene.sensors))])
+    found = detectable & ~contact_matrix(setup).touches & ~setup.bodies.fixed
+    return [setup.bodies.names[k] for k in np.flatnonzero(found).tolist()]
+
+
 def _objects(setup: Setup) -> Iterator[Obstacle]:
     scene, joints = setup.scene, setup.joints
     if scene.zones:
         yield Obstacle("zone", f"zones are not part of pymunk: {_names(scene.zones)}")
+    hidden = _undetectable(setup)
+    if hidden:
+        yield Obstacle("sensor", f"no query finds bodies with which nothing collides: {_listed(hidden)}")
     one_way = [name for name, wall in zip(_wall_names(scene), scene.walls, strict=True) if wall.one_way]
     if one_way:
         yield Obstacle("wall", f"one-way walls need callbacks with a memory: {_listed(one_way)}")

@@ -65,6 +65,7 @@ def program_text(
     static = loops.write(list(contents.colliders()))
     bodies = loops.write(list(contents.bodies()))
     joints = loops.write(list(contents.joints()))
+    sensors = list(contents.sensors())
     parts = [
         *_settings(setup, PymunkEngine().resolve(setup, settings), step_reason, warnings),
         *_view(setup, view),
@@ -72,6 +73,7 @@ def program_text(
         *loops.tables,
         *_helpers(contents),
         *_make_space(contents, static, bodies, joints),
+        *_sensors(sensors),
         *_step(contents),
         *_main(contents),
     ]
@@ -320,6 +322,41 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
     yield from ("    return space, bodies", "")
 
 
+SENSED = '''
+def as_sensor(shape, shape_filter):
+    """Make a shape a sensor, and return it."""
+    shape.sensor = True
+    shape.filter = shape_filter
+    return shape
+
+
+def sensed(space, shapes):
+    """Return the bodies that overlap the shapes of a sensor; static colliders are bodies too."""
+    found = {}
+    for shape in shapes:
+        for hit in space.shape_query(shape):
+            overlaps = any(point.distance for point in hit.contact_point_set.points)
+            if hit.shape.body is not shape.body and overlaps:
+                found[hit.shape.body] = None
+    return list(found)
+'''
+
+
+def _sensors(statements: Sequence[str]) -> Iterator[str]:
+    if not statements:
+        return
+    yield SENSED
+    yield from (
+        "",
+        "def make_sensors(space, bodies):",
+        '    """Return the shapes of each sensor by its name; they stay outside the space."""',
+        "    sensors = {}",
+        *_indented(statements),
+        "    return sensors",
+        "",
+    )
+
+
 def _indented(lines: Sequence[str]) -> Iterator[str]:
     return (f"    {line}" if line else "" for line in lines)
 
@@ -368,7 +405,7 @@ def draw_hidden(space, options):
         color = options.shape_static_color if body.body_type == pymunk.Body.STATIC else options.shape_dynamic_color
         outline = options.shape_outline_color
         for shape in body.shapes:
-            if shape.space is not None:
+            if shape.space is not None or shape.sensor:
                 continue
             radius = shape.radius * SCALE
             if isinstance(shape, pymunk.Circle):

@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, Polygon
 
 from sandbox.arrays import FloatArray
 from sandbox.measure.analytic import ClosedForm, closed_form
+from sandbox.measure.metrics.contacts import are_collisions
 from sandbox.measure.metrics.energy import energies
 from sandbox.report.colours import COLOURS
 from sandbox.report.style import (
@@ -289,7 +290,7 @@ def _span(values: FloatArray) -> float:
 
 
 def _contacts(trajectory: Trajectory, numbers: list[int]) -> list[float]:
-    is_drawn = np.isin(trajectory.contact_pair, numbers).any(axis=1)
+    is_drawn = np.isin(trajectory.contact_pair, numbers).any(axis=1) & are_collisions(trajectory)
     return trajectory.contact_time[is_drawn].tolist() if 0 < is_drawn.sum() < MAX_CONTACTS else []
 
 

@@ -84,6 +84,12 @@ FEATURES: dict[str, Document] = {
     "kinematic body": {"box": [{**_box("c", 0.0), "position": [0.0, 1.5], "kinematic": True, "velocity": [0.5, 0.5]}]},
     "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},
     "zone": {"zone": [{"position": [0.0, 2.5], "radius": 2.0}]},
+    "sensors": {
+        "sensor": [
+            {"name": "s", "position": [0.0, 2.5], "radius": 1.0},
+            {"body": "a", "points": [[-0.4, -0.5], [0.4, -0.5]], "thickness": 0.1},
+        ]
+    },
     "holding zone": {"zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True, "gravity": [1.0, 1.0]}]},
     "layers": {
         "zone": [{"position": [0, 2.9], "radius": 1.0, "to_layer": "ramp"}],

@@ -64,6 +64,16 @@ MOMENT = (1.0**2 + 0.5**2) / 12
 GRAVITY: Document = {"gravity": [0.0, -10.0]}
 
 
+def visit(begin: float, end: float) -> Callable[[Trajectory], None]:
+    """Return a check of the only visit of a sensor, s."""
+
+    def check(run: Trajectory) -> None:
+        ((_, _, *times),) = run.sensor_visits
+        assert times == pytest.approx([begin, end], abs=DT + 1e-6)  # found at the end of a step; 32 bits of box2d
+
+    return check
+
+
 def position(x: float, y: float, body: int = 0, error: float = ERROR) -> Callable[[Trajectory], None]:
     """Return a check of the last position of a body, m."""
 
@@ -400,6 +410,11 @@ PROOFS: dict[Demand, Proof] = {
             zone=[{"points": [[0.5, -9.0], [1.5, -9.0], [1.5, 9.0], [0.5, 9.0]], "gravity": [0.0, -4.0]}],
         ),
         velocity(2.0, -2.0),
+    ),
+    # its right side reaches the sensor at x = 0.75, and its left side leaves it at x = 1.75
+    Demand.SENSORS: Proof(
+        scene(ball=[ball(vx=2.0)], sensor=[{"points": [[1.0, -1.0], [1.5, -1.0], [1.5, 1.0], [1.0, 1.0]]}]),
+        both(visit(0.375, 0.875), position(2.0, 0.0)),
     ),
 }
 

@@ -18,6 +18,7 @@ UNNAMED = {
     "wall": [{"points": [[20, 0], [20, 9]], "kick": {"speed": 1.0, "threshold": 0.1}}],
     "post": [{"position": [30, 0], "radius": 1}],
     "zone": [{"position": [-30, 4], "radius": 0.01}],
+    "sensor": [{"position": [-40, 4], "radius": 0.01}],
     "ball": [
         {"position": [0, 20], "radius": 0.01}, {"position": [1, 20], "radius": 0.01, "mass": 1000},
         {"position": [2, 20], "radius": 0.01},

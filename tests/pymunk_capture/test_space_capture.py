@@ -384,8 +384,58 @@ def test_joint_to_a_world_of_sensors_only() -> None:
     pivot.collide_bodies = False
     space.add(trigger, body, pymunk.Circle(body, 3), pivot)
     captured, differences = compare(space, 60)
-    assert all("sensor" in each for each in captured.omitted)
+    assert not captured.omitted
+    assert [(each.body, each.position, each.radius) for each in captured.scene.sensors] == [(None, (0.0, 0.0), 5.0)]
     assert max(differences) == 0.0
+
+
+def sensor(shape: pymunk.Shape, **filters: int) -> pymunk.Shape:
+    shape.sensor, shape.filter = True, pymunk.ShapeFilter(**filters)
+    return shape
+
+
+def test_sensor_shapes_are_sensors_that_detect_what_pymunk_does() -> None:
+    """Each sensor against a shape query of the space, after each of the steps of a fall past it."""
+    space = space_with_walls()
+    space.gravity = 0, -200
+    body, door = pymunk.Body(2, 100), pymunk.Body(body_type=pymunk.Body.STATIC)
+    body.position, body.angle, body.velocity = (5, 40), 0.3, (3, 0)
+    door.position, door.angle = (10, 25), 0.5
+    sensors = [
+        sensor(pymunk.Segment(body, (-4, -6), (4, -6), 2)),
+        sensor(pymunk.Circle(body, 20, (15, 0))),
+        sensor(pymunk.Poly.create_box(door, (6, 12))),
+    ]
+    space.add(body, pymunk.Poly.create_box(body, (8, 10)), door, *sensors)
+    captured = capture_space(space, dt=1 / 60)
+    assert not captured.omitted
+    assert [each.body for each in captured.scene.sensors] == ["body-1", "body-1", None]
+    simulation = sandbox.start(captured.scene, "pymunk")
+    detected = set()
+    for _ in range(120):
+        for name, shape in zip(("sensor-1", "sensor-2", "sensor-3"), sensors, strict=True):
+            # Pymunk counts shapes that touch; here none touches for a whole step.
+            hits = [found.shape for found in space.shape_query(shape) if found.shape is not None]
+            solid = [each for each in hits if not each.sensor and each.body is not shape.body]
+            assert bool(simulation.sensed(name)) == bool(solid)
+            detected |= {name} if solid else set()
+        space.step(1 / 60)
+        simulation.step()
+    assert detected == {"sensor-1", "sensor-2", "sensor-3"}
+
+
+def test_filter_of_a_sensor_shape_is_what_it_detects() -> None:
+    space = pymunk.Space()
+    for k, bits in enumerate((0b01, 0b10)):
+        body = pymunk.Body(1, 1)
+        body.position = 10 * k, 0
+        circle = pymunk.Circle(body, 2)
+        circle.filter = pymunk.ShapeFilter(categories=bits, mask=bits | 0b100)
+        space.add(body, circle)
+    space.add(sensor(pymunk.Circle(space.static_body, 50), categories=0b100, mask=0b10))
+    captured = capture_space(space, dt=0.01)
+    assert not captured.omitted
+    assert sandbox.start(captured.scene).sensed("sensor-1") == ("body-2",)
 
 
 @pytest.mark.parametrize("collide", [True, False])
@@ -496,7 +546,6 @@ def _velocity_function(body: pymunk.Body, gravity: tuple[float, float], damping:
             "groups of static",
         ),
         (lambda s, b, c: add_many_categories(s), "categories and masks of shape filters, of which more than 10 differ"),
-        (lambda s, b, c: setattr(c, "sensor", True), "sensor shapes"),
     ],
 )
 def test_what_a_scene_cannot_have_is_named(

@@ -18,11 +18,12 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.pymunk_adapter.colliders import SHUFFLED_FROM
 from sandbox.engines.registry import start
+from sandbox.engines.sensors import SceneSensors
 from sandbox.pymunk_capture.space_capture import from_pymunk
 from sandbox.pymunk_export import ProgramError, obstacles, program_text, with_divided_walls
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
-from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from tests.engines.stepping import advance
 from tests.pymunk_capture.test_space_capture import (
@@ -416,6 +417,69 @@ HOSTILE = (
     "MATERIAL_1",
     " ",
 )
+
+
+SENSING = """
+[world]
+gravity = [0.0, -9.81]
+[[plane]]
+name = "ground"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+categories = ["ground"]
+[[polygon]]
+name = "cart"
+position = [0.0, 1.0]
+velocity = [2.0, 0.0]
+points = [[-0.6, -0.3], [0.6, -0.3], [0.5, 0.2], [-0.6, 0.3]]
+restitution = 0.7
+categories = ["cart"]
+[[ball]]
+name = "ball"
+position = [1.5, 2.0]
+radius = 0.3
+restitution = 0.8
+categories = ["ball"]
+[[sensor]]
+name = "wheels"
+body = "cart"
+points = [[-0.6, -0.3], [0.6, -0.3]]
+thickness = 0.15
+detects = ["ground"]
+[[sensor]]
+name = "ahead"
+body = "cart"
+points = [[0.6, 0.0], [2.0, -0.6], [1.5, 0.0], [2.0, 0.8]]
+[[sensor]]
+name = "gate"
+position = [1.8, 0.6]
+radius = 0.5
+detects = ["ball"]
+"""
+
+
+def test_program_has_the_states_and_the_sensors_of_the_scene() -> None:
+    scene = loads(SENSING)
+    assert differing(scene) == []
+    program = executed(scene)
+    space, bodies = program["make_space"]()
+    sensors, simulation = program["make_sensors"](space, bodies), start(scene, "pymunk")
+    names, seen = {body: name for name, body in bodies.items()}, dict.fromkeys(sensors, 0)
+    evaluated = SceneSensors(scene, scene.bodies)
+    for _ in range(300):
+        simulation.step()
+        program["step"](space)
+        for number, (name, shapes) in enumerate(sensors.items()):
+            found = {names.get(body, "ground") for body in program["sensed"](space, shapes)}
+            indices = evaluated.detected(number, simulation.frame()).tolist()
+            assert found == {scene.bodies.names[k] if k >= 0 else scene.fixed_names[-1 - k] for k in indices}
+            seen[name] += bool(found)
+    assert all(10 < count < 290 for count in seen.values()), seen
+
+
+def test_body_that_a_program_leaves_out_of_the_space_is_no_target_of_a_sensor() -> None:
+    scene = loads("[[ball]]\nposition = [0, 0]\nradius = 1\n[[sensor]]\nposition = [0, 0]\nradius = 1")
+    assert [(each.path, "'ball-1'" in each.message) for each in obstacles(scene)] == [("sensor", True)]
 
 
 def test_hostile_names_are_only_data() -> None:

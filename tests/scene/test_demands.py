@@ -149,6 +149,7 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.EVENTS, True, {"ball": [NAMED], "event": [{"kind": "remove", "time": 1, "body": "a"}]}, "1"),
     (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.SENSORS, True, {"ball": [BALL], "sensor": [{"position": [9, 9], "radius": 1}]}, "1"),
 ]
 
 

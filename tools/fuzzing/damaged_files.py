@@ -59,6 +59,10 @@ normal = [0.0, 1.0]
 position = [0.5, 0.5]
 radius = 0.3
 to_layer = "up"
+[[sensor]]
+body = "a"
+points = [[0.0, -0.5], [0.0, 0.5]]
+thickness = 0.2
 [[ball]]
 name = "a"
 position = [0.0, 0.6]

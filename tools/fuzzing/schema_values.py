@@ -212,7 +212,7 @@ def names_for(key: str, document: Document) -> list[str]:
     if key in ("generator", "relaunch"):
         return names_of(document, *GENERATORS)
     if key == "thing":
-        return names_of(document, "wall", "post", "plane", "zone")
+        return names_of(document, "wall", "post", "plane", "zone", "sensor")
     if key in ("thrust", "drive"):
         return names_of(document, key)
     if key == "engine":

@@ -112,6 +112,7 @@ MOMENTS = {
     "tutorial/fast_ball": Moment(0.1, strobe=4),
     "tutorial/fireworks": Moment(1.4),
     "tutorial/overpass": Moment(2.4, trail=2.4),
+    "tutorial/sensors": Moment(3.7, trail=3.0, box=((-4.9, -1.0), (6.1, 4.9))),
     "tutorial/spaceship": Moment(4.8, trail=4.8),
 }
 """By scene; the thumbnails of artillery are made from the window."""

@@ -56,6 +56,21 @@ def collision_bits(
     return _repeated(kind, layers, categories, count), _repeated(kinds, layers, mask, count)
 
 
+def bits_of_sensor(scene: SceneDescription, detects: tuple[str, ...] | None, *, static: bool) -> tuple[int, int]:
+    """Return all categories, and those that a sensor detects on any layer.
+
+    Args:
+        scene: the scene.
+        detects: categories of the scene; None means all.
+        static: whether it detects static objects and fixed bodies too.
+    """
+    layers, count = (1 << len(scene.layers)) - 1, max(len(scene.categories), 1)
+    every = (1 << KINDS * count * len(scene.layers)) - 1
+    kinds = COLLIDES_ALL | COLLIDES_FIXED | (STATIC if static else 0)
+    wanted = (1 << count) - 1 if detects is None else mask_of(detects, scene.categories)
+    return every, _repeated(kinds, layers, wanted, count)
+
+
 def _repeated(kinds: int, layers: int, categories: int, count: int) -> int:
     """Return the bits of some kinds on some layers and in some categories."""
     return sum(kinds << KINDS * (max(count, 1) * layer + k) for layer in _ones(layers) for k in _ones(categories))

@@ -36,6 +36,7 @@ from sandbox.games.billiards.rules.registry import ruleset_named
 from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP, PlacedDisc, TableGeometry
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
+from sandbox.scene.description.scene import first_sensor
 from sandbox.scene.description.surface import Stroke
 from sandbox.trajectory import Contacts
 
@@ -266,7 +267,7 @@ class Match:
         cue, layout, first = self.layout.number[self.cue], self.layout, None
         for k in np.argsort(contacts.time, kind="stable").tolist():
             time, (a, b) = float(contacts.time[k]), contacts.pair[k].tolist()
-            if time < began or cue not in (a, b):
+            if time < began or cue not in (a, b) or b <= first_sensor(layout.scene):
                 continue
             if first is not None and time > first:
                 break

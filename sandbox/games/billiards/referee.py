@@ -159,7 +159,7 @@ def shot_events(
             continue
         if b >= 0:
             events.append(BallEvent(since, names[a], "ball", names[b]))
-        else:
+        elif -1 - b < static_count + len(layout.scene.pockets):  # sensors follow
             events.append(BallEvent(since, names[a], "cushion" if -1 - b < static_count else "pocket", fixed[-1 - b]))
     return tuple(events)
 

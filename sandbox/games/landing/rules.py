@@ -288,7 +288,7 @@ def _pad_position(scene: Scene) -> Point:
     Raises:
         UnsuitableSceneError: the pad is not a plane, a wall or a post.
     """
-    pad = dict(zip(scene.fixed_names, scene.fixed, strict=False)).get(PAD)  # names of pockets and zones follow
+    pad = dict(zip(scene.fixed_names, scene.fixed, strict=False)).get(PAD)  # names of pockets, zones and sensors follow
     match pad:
         case Wall():
             across, up = zip(*pad.points, strict=True)

@@ -18,6 +18,7 @@ from sandbox.formatting import format_fraction
 from sandbox.measure.analytic import solution
 from sandbox.measure.analytic.trajectory import solution_run
 from sandbox.measure.compare.self_convergence import RefinedRun, halve_step, preferred_settings, refine
+from sandbox.measure.metrics.contacts import are_collisions
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.invariants import momentum_drift
 from sandbox.measure.metrics.perturbation import PERTURBATION, agreement_time, perturb
@@ -451,7 +452,8 @@ def _predictable_until(scene: Scene, engine: str, settings: Settings, found: Tra
 
 def _has_simultaneous_impacts(run: Trajectory) -> bool:
     """Return whether a body has two impacts at one time. Impacts in a row of touching balls count too."""
-    order = np.argsort(run.contact_time, kind="stable")
+    hits = np.flatnonzero(are_collisions(run))
+    order = hits[np.argsort(run.contact_time[hits], kind="stable")]
     time, pair = run.contact_time[order], run.contact_pair[order]
     moment = np.cumsum(np.diff(time, prepend=-np.inf) > SIMULTANEOUS * np.maximum(time, 1.0))
     body = pair.ravel()

@@ -16,7 +16,7 @@ TableKey = tuple[str, int]
 """Table of a document: its heading and its index."""
 
 FIXED_KINDS = ("plane", "wall", "post")
-CONNECTIONS = ("joint", "attraction", "thrust", "drive")
+CONNECTIONS = ("joint", "attraction", "thrust", "drive", "sensor")
 SURFACE_KEYS = (
     "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides", "layer",
 )  # fmt: skip

@@ -15,6 +15,7 @@ from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.filters import filter_table, fixed_layers, reachable_layers
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
+from sandbox.scene.description.scene import first_sensor
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.trajectory import Trajectory
 
@@ -22,9 +23,9 @@ SOLID_KINDS = ("plane", "wall", "post", "pocket")
 
 
 def are_collisions(run: Trajectory) -> BoolArray:
-    """Return which contacts of a run are collisions or falls into pockets, (C,)."""
-    scene = run.info["scene"]
-    if not scene.get("zone"):
+    """Return which contacts of a run are collisions or falls into pockets, (C,); all in a run without a scene."""
+    scene = run.info.get("scene", {})
+    if not scene.get("zone") and not scene.get("sensor"):
         return np.ones(len(run.contact_pair), np.bool_)
     return np.asarray(run.contact_pair[:, 1] >= -sum(len(scene.get(kind, ())) for kind in SOLID_KINDS))
 
@@ -81,7 +82,7 @@ class ContactEpisode:
 def contact_episodes(
     run: Trajectory, scene: Scene, dt: float, reach: float, until: float
 ) -> dict[IndexPair, list[ContactEpisode]]:
-    """Return the contact episodes of each pair in the order of time.
+    """Return the contact episodes of each pair in the order of time, without visits of sensors.
 
     A row continues an episode if it follows within `MAX_EPISODE_GAP` steps, or if the clearance of the pair stays
     within `reach` in all frames between them.
@@ -94,7 +95,7 @@ def contact_episodes(
         until: start of the last row that counts, s.
     """
     order = np.lexsort((run.contact_time, run.contact_pair[:, 1], run.contact_pair[:, 0]))
-    order = order[run.contact_time[order] <= until]
+    order = order[(run.contact_time[order] <= until) & (run.contact_pair[order, 1] > first_sensor(scene))]
     pairs = run.contact_pair[order]
     cuts = np.flatnonzero((np.diff(pairs, axis=0) != 0).any(axis=1)) + 1
     found: dict[IndexPair, list[ContactEpisode]] = {}

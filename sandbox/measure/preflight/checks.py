@@ -23,6 +23,7 @@ from sandbox.measure.preflight.tunnelling import (
     entry_warnings,
     intervals,
     is_continuous,
+    sensor_warnings,
     tunnelling_risks,
 )
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
@@ -282,7 +283,12 @@ CHECKS: dict[str, Check] = {
     "duration": Check(lambda s: _duration(s.scene, s.settings)),
     "tunnelling": Check(_tunnelling),
     "depth": Check(_depth),
-    "entry": Check(lambda s: entry_warnings(s.scene, s.settings, s.matrix)),
+    "entry": Check(
+        lambda s: (
+            *entry_warnings(s.scene, s.settings, s.matrix),
+            *sensor_warnings(s.scene, s.settings, s.matrix),
+        )
+    ),
     "overlap": Check(lambda s: overlap_warnings(s.scene, s.matrix, s.close)),
     "iterations": Check(lambda s: _iterations(s.settings, s.matrix), frozenset({"pymunk"})),
     "rounding": Check(_rounding),

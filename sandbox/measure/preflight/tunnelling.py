@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.sensors import SceneSensors, sensor_names
 from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds
 from sandbox.scene.compile.bodies import Bodies
@@ -279,7 +280,7 @@ def entry_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> I
         return
     speeds, layers = top_speeds(scene, matrix)[noted], reachable_layers(scene, scene.bodies)[noted]
     names = scene.fixed_names[len(scene.fixed) + len(scene.pockets) :]
-    for zone, name in zip(scene.zones, names, strict=True):
+    for zone, name in zip(scene.zones, names, strict=False):  # sensors follow
         able = np.flatnonzero(layers & mask_of(zone.layers, scene.layers))
         if not len(able):
             continue
@@ -295,3 +296,34 @@ def entry_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> I
             f"dt <= {floor_3_digits(safe)} s is safe"
         )
         yield Diagnostic("entry", message, {"ball": body, "thing": name, "speed": speed, "odds": odds, "safe_dt": safe})
+
+
+def sensor_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each sensor past which the fastest body can move between the ends of two steps.
+
+    A body overlaps the sensor while its centre moves the width of both at least: the smallest width of the sensor, and
+    the diameter of the largest disc about the centre inside the body.
+    """
+    if not scene.sensors:
+        return
+    bodies, sensors = scene.bodies, SceneSensors(scene, scene.bodies)
+    speeds = top_speeds(scene, matrix)
+    for number, (sensor, name) in enumerate(zip(scene.sensors, sensor_names(scene), strict=True)):
+        able = np.flatnonzero(sensors.detectable(number) & np.isfinite(speeds))
+        if not len(able):
+            continue
+        own = 0.0 if sensor.body is None else float(speeds[bodies.number_of[sensor.body]])
+        speed, width = speeds[able] + own, width_of(sensor) + 2.0 * bodies.core[able]
+        k = int(np.argmax(speed / width))
+        odds = 1.0 - float(width[k]) / (float(speed[k]) * settings.dt) if speed[k] > 0.0 else 0.0
+        if odds <= ROUNDING or not math.isfinite(own):
+            continue
+        body, safe = bodies.names[able[k]], float(width[k] / speed[k])
+        message = (
+            f"{body!r} and the sensor {name!r} can approach at {speed[k]:.4g} m/s, {speed[k] * settings.dt:.3g} m per "
+            f"step, and pass each other undetected: they overlap over {width[k]:.3g} m, odds up to {100 * odds:.3g} %; "
+            f"dt <= {floor_3_digits(safe)} s is safe"
+        )
+        yield Diagnostic(
+            "entry", message, {"ball": body, "thing": name, "speed": float(speed[k]), "odds": odds, "safe_dt": safe}
+        )

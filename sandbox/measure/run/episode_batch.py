@@ -73,7 +73,7 @@ class EpisodeBatch:
             Refusal: the engine does not support the scene.
         """
         spec = find_spec(scene.play.game)
-        if spec is None or spec.vector_rules is None or is_random(scene) or scene.events:
+        if spec is None or spec.vector_rules is None or is_random(scene) or scene.events or scene.sensors:
             return None
         rules: VectorRules = import_part(spec.vector_rules)(scene, scene.bodies, count)
         simulation = start(scene, engine)

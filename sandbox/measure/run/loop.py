@@ -13,6 +13,7 @@ from sandbox.games.session import HeadlessGame
 from sandbox.measure.run.recorder import Recorder
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.description.base import MAX_STEPS
+from sandbox.scene.description.scene import first_sensor
 from sandbox.schedule import ROUNDING, Stretch
 from sandbox.trajectory import Contacts, Frame
 
@@ -120,7 +121,7 @@ class _StepLoop:
         self._reported = perf_counter()
         self._has_callbacks = any(each is not None for each in self._callbacks)
         self._steps_per_call = FIRST_STEPS
-        simulation.contacts()
+        self.queue.keep_visits(simulation.contacts())
         recorder.record(simulation.frame())
 
     def step_all(self) -> None:
@@ -254,6 +255,11 @@ class _ActionQueue:
     def done(self) -> tuple[Action, ...]:
         """All given actions, or with a game all that were applied."""
         return tuple(self._actions) if self._game is None else tuple(self._done)
+
+    def keep_visits(self, contacts: Contacts) -> None:
+        """Keep the visits of sensors among the contacts at the start, which may end in the first step."""
+        if self._simulation.scene.sensors:
+            self._pending.append(contacts.some(contacts.pair[:, 1] <= first_sensor(self._simulation.scene)))
 
     def contacts(self) -> Contacts:
         """Return all contacts of the run."""

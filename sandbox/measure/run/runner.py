@@ -36,7 +36,7 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import as_scene
 from sandbox.schedule import ROUNDING, Stretch, schedule
 from sandbox.signals import reraise_interrupt
-from sandbox.trajectory import Contacts, Trajectory
+from sandbox.trajectory import Contacts, SensorVisit, Trajectory
 
 
 @reraise_interrupt()
@@ -115,6 +115,7 @@ def run(
         return refused.raise_if_failed() if strict else refused
     resolved = simulation.settings
     bodies = len(setup.bodies) + scene.spawned_by_events + sum(isinstance(action, Spawn) for action in actions)
+    simulation.sensor_visits()  # recorded from now on
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
     timed_audit = TimedAudit(setup, simulation) if audit else None
 
@@ -138,6 +139,15 @@ def run(
     trajectory = _recorded_run(setup, simulation, recorder, end, timed_audit, info)
     simulation.close()
     return trajectory.raise_if_failed() if strict else trajectory
+
+
+def _visit_ends(contacts: Contacts, visits: Sequence[SensorVisit], simulation: SwitchableSimulation) -> FloatArray:
+    """Return the end of each contact that is a visit of a sensor, (C,) s; nan for others, and for visits that last."""
+    ends = {(each.object, each.sensor, each.begin): each.end for each in visits}
+    names = (*simulation.bodies.names, *reversed(simulation.scene.fixed_names))  # −1 − k counts from the end
+    pairs = [(names[a], names[b]) for a, b in contacts.pair.tolist()]
+    found = [ends.get((*pair, time), np.nan) for pair, time in zip(pairs, contacts.time.tolist(), strict=True)]
+    return np.asarray(found, np.float64)
 
 
 def _recorded_game(recording: Recording) -> HeadlessGame | None:
@@ -182,6 +192,7 @@ def _recorded_run(
         if row < len(broken):
             broken[row] = time
     missed_time, missed_pair = audit.missed if audit else (None, None)
+    visits = simulation.sensor_visits() if setup.scene.sensors else None
     trajectory = Trajectory.from_frames(
         {**recorder.arrays(len(bodies)), "layer": recorder.layers(len(bodies))},
         bodies.names,
@@ -191,6 +202,7 @@ def _recorded_run(
         missed_time=missed_time,
         missed_pair=missed_pair,
         broken_time=broken,
+        contact_end=None if visits is None else _visit_ends(end.contacts, visits, simulation),
     )
     trajectory = trajectory if audit is None else audit.with_slender_passages(trajectory)
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total

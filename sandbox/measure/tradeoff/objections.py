@@ -93,7 +93,7 @@ def _forecast(scene: Scene, engine: str, settings: Settings, fastest: FloatArray
         if each.kind == "depth" and exceeded > 1.0:
             yield each.message
         elif (odds := 1.0 - 1.0 / max(exceeded, 1.0)) > MAX_ODDS:
-            verb = "misses the zone" if each.kind == "entry" else "tunnels through"
+            verb = "misses" if each.kind == "entry" else "tunnels through"
             yield f"odds up to {format_percent(odds)} that {each.details['ball']!r} {verb} {_name(each)}"
 
 

@@ -201,7 +201,7 @@ def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[Model
     world, matrix = scene.world, contact_matrix(scene)
     pairs = _contact_pairs(contexts)
     if pairs is not None and matrix.touches.any():
-        if not len(pairs):
+        if not len(pairs) and not scene.sensors:  # sensors do not detect bodies that collide with nothing
             yield ModelChange(
                 'no collisions occur: collides = "none" for all moving bodies',
                 'the scene can also be simulated without collisions (collides = "none" for all moving bodies), '

@@ -142,6 +142,7 @@ def _scene_figures(scene: Scene) -> dict[str, Content]:
         "posts": len(scene.posts),
         "pockets": len(scene.pockets),
         "zones": len(scene.zones),
+        "sensors": len(scene.sensors),
         "joints": len(scene.joint_arrays),
     }
     count = format_plural(len(scene.bodies), "body", "bodies")

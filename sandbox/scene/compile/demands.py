@@ -77,10 +77,12 @@ class Demand(StrEnum):
     ZONES = "zones"
     KINEMATIC = "kinematic bodies"
     EVENTS = "events"
+    SENSORS = "sensors"
 
 
 BALLS = frozenset(
     {
+        Demand.SENSORS,  # detected by `sandbox.engines.sensors` on every engine
         Demand.TRANSLATION,
         Demand.ROTATION,
         Demand.GRAVITY,
@@ -228,6 +230,7 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     )
     yield Demand.EVENTS, bool(scene.events), f"{len(scene.events):,}" if scene.events else "none"
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
+    yield Demand.SENSORS, bool(scene.sensors), f"{len(scene.sensors):,}" if scene.sensors else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())
     yield (

@@ -91,8 +91,9 @@ class Scene(SceneDescription, HtmlRepr):
     def __repr__(self) -> str:
         """Return the title, the counts of elements and the key figures, as `str` does."""
         elements = {"plane": self.planes, "wall": self.walls, "post": self.posts, "pocket": self.pockets}
+        elements |= {"zone": self.zones, "sensor": self.sensors}
         counts = [format_plural(len(self.bodies), "body", "bodies")]
-        counts += [format_plural(len(each), kind) for kind, each in {**elements, "zone": self.zones}.items() if each]
+        counts += [format_plural(len(each), kind) for kind, each in elements.items() if each]
         if len(self.joint_arrays):
             counts.append(format_plural(len(self.joint_arrays), "joint", "joints"))
         x, y = self.world.gravity

@@ -1,4 +1,4 @@
-"""Static elements: planes, walls, posts and zones; collision layers and categories.
+"""Static elements: planes, walls, posts and zones; sensors; collision layers and categories.
 
 A visit of a zone begins when the centre of a body is inside the zone while the body is in one of the zone's layers. It
 ends when the centre is outside. A change of layer does not end it; each visit is recorded once. Bodies with
@@ -48,6 +48,12 @@ Width = Annotated[float, Field(gt=0, le=1e9)]
 
 ZonePoints = Annotated[tuple[Point, ...], Field(min_length=2, max_length=1000)]
 
+MAX_SENSORS = 1000
+"""Largest number of sensors of a scene, each of which is compared with all bodies after every step."""
+
+SensorCategories = Annotated[tuple[Name, ...], Field(min_length=1, max_length=32)]
+"""Collision categories, by name, at least one."""
+
 
 class Zone(Part):
     """An area that detects bodies: circle (`position`, `radius`), polygon (`points`), strip (`points`, `thickness`)."""
@@ -70,6 +76,32 @@ class Zone(Part):
     """A body that enters is held at the centre, one at a time, until an action moves it, as in a kicker."""
     gravity: Accepts[tuple[Acceleration, Acceleration] | None, Sequence[float] | None] = default(None)
     """gravity for bodies inside the zone and in its layers, m/s²; where zones overlap, the last one applies"""
+    colour: Colour | None = None
+    """colour in the window, `#rrggbb`"""
+
+
+class Sensor(Part):
+    """An area that detects shapes that overlap it, and acts on none: circle, polygon, or strip, as of a `[[zone]]`.
+
+    It is fixed in the world, or moves with a body. On a body that can move it detects all other bodies and static
+    objects, elsewhere bodies that can move. Bodies with `collides = "none"`, walls and posts that are not solid, and
+    other sensors are not detected.
+    """
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file"""
+    body: Name | None = None
+    """name of the body that it moves with; default: it is fixed in the world"""
+    position: OptionalPoint = default(None)
+    """centre of a circle, m, in the frame of the body, or in the world without one"""
+    radius: Radius | None = None
+    """radius of a circle, m"""
+    points: Accepts[ZonePoints | None, Coordinates | None] = default(None)
+    """corners of a polygon, or centre line of a strip, m, in the frame of the body, or in the world without one"""
+    thickness: Width | None = None
+    """full thickness of a strip, m"""
+    detects: Accepts[SensorCategories | None, Sequence[str] | None] = default(None)
+    """collision categories that it detects; default: all. An object without categories belongs to all."""
     colour: Colour | None = None
     """colour in the window, `#rrggbb`"""
 

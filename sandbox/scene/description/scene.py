@@ -14,7 +14,7 @@ from sandbox.scene.description.actions import Event, Spawn
 from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMaterial, Items, Part, default
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
-from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
+from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone
 from sandbox.scene.description.forces import AnyDrive, Attraction, Thrust
 from sandbox.scene.description.game_tables import with_game_tables
 from sandbox.scene.description.generators import Cloth, Ragdoll, Rope, Stack
@@ -75,6 +75,7 @@ class SceneDescription(_Header):
     thrusts: Items[Thrust] = default((), alias="thrust")
     drives: Items[AnyDrive] = default((), alias="drive")
     """Drive that moves a body between two positions: torque, stroke or plunger."""
+    sensors: Items[Sensor] = default((), alias="sensor")
     shots: Items[Shot] = default((), alias="shot")
     events: Items[Event] = default((), alias="event", max_length=MAX_EVENTS)
     """Actions that the scene makes itself, each before the first step that starts at its time or later."""
@@ -117,7 +118,7 @@ class SceneDescription(_Header):
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:
-        """Solid fixed objects in the order of their indices: planes, walls, posts. Pockets and zones follow."""
+        """Solid fixed objects in the order of their indices: planes, walls, posts. Pockets, zones, sensors follow."""
         return self.planes + self.walls + self.posts
 
     @cached_property
@@ -144,20 +145,31 @@ class SceneDescription(_Header):
 
     @cached_property
     def fixed_names(self) -> tuple[str, ...]:
-        """Names of the fixed objects, pockets and zones.
+        """Names of the fixed objects, pockets, zones and sensors.
 
         An object without a name is called by its kind and its position in the file, such as `wall-1`.
         """
-        kinds: dict[str, Sequence[HasMaterial | Pocket | Zone]] = {
+        kinds: dict[str, Sequence[HasMaterial | Pocket | Zone | Sensor]] = {
             "plane": self.planes,
             "wall": self.walls,
             "post": self.posts,
             "pocket": self.pockets,
             "zone": self.zones,
+            "sensor": self.sensors,
         }
         return tuple(
             each.name or default_name(kind, k) for kind, those in kinds.items() for k, each in enumerate(those)
         )
+
+
+FIXED_KINDS = ("plane", "wall", "post", "pocket", "zone", "sensor")
+"""Tables of the fixed objects, pockets, zones and sensors, in the order of their indices."""
+
+
+def fixed_names_in(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return `SceneDescription.fixed_names` of the document of a scene."""
+    tables = ((kind, k, each) for kind in FIXED_KINDS for k, each in enumerate(document.get(kind, ())))
+    return tuple(each.get("name") or default_name(kind, k) for kind, k, each in tables)
 
 
 def default_name(kind: str, index: int) -> str:
@@ -166,6 +178,11 @@ def default_name(kind: str, index: int) -> str:
 
 
 def zone_visits(pair: "IntArray", scene: SceneDescription) -> "BoolArray":
-    """Return which contacts, by their pairs (C, 2), are visits of zones and no collisions, (C,)."""
+    """Return which contacts, by their pairs (C, 2), are visits of zones or sensors and no collisions, (C,)."""
     found: BoolArray = pair[:, 1] < -len(scene.fixed) - len(scene.pockets)
     return found
+
+
+def first_sensor(scene: SceneDescription) -> int:
+    """Return the index that the first sensor has in pairs of contacts; that of the k-th, from 0, is smaller by k."""
+    return -1 - len(scene.fixed) - len(scene.pockets) - len(scene.zones)

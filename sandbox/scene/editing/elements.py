@@ -19,7 +19,7 @@ from sandbox.scene.files.toml_changes import Change, RemoveElement, RemoveValue,
 
 FIELD_OF = {str(field.alias): name for name, field in Scene.model_fields.items() if field.alias is not None}
 """Attribute of a scene, by the heading of its list of tables"""
-STATIC_TABLES = ("plane", "wall", "post", "zone", "pocket")
+STATIC_TABLES = ("plane", "wall", "post", "zone", "pocket", "sensor")
 
 
 @dataclass(frozen=True, order=True)
@@ -98,7 +98,7 @@ def differ_in_poses_only(scene: Scene, other: Scene) -> bool:
 
     It recognises scenes of `with_moved_bodies`, by identity.
     """
-    static = ("planes", "walls", "posts", "pockets", "zones", "surface", "play")
+    static = ("planes", "walls", "posts", "pockets", "zones", "sensors", "surface", "play")
     same_static = all(getattr(scene, name) is getattr(other, name) for name in static)
     return same_static and scene.bodies.shapes is other.bodies.shapes
 

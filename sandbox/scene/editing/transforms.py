@@ -12,7 +12,7 @@ from typing import Any, Literal
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.bodies import Attached, Compound, Polygon
-from sandbox.scene.description.fixed import Plane
+from sandbox.scene.description.fixed import Plane, Sensor
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.joints import Anchored, Groove, OnAxis, Pivot, Pulley, Weld
 from sandbox.scene.editing.elements import ElementKey, body_names, element_at, table_values
@@ -81,6 +81,8 @@ def transform_element(element: Part, by: Similarity, *, is_whole: bool = True) -
         by: the similarity.
         is_whole: transform also its shape and angle; otherwise only its place.
     """
+    if isinstance(element, Sensor) and element.body is not None:  # its shape is in the frame of the body
+        by = Similarity(mirrored=by.mirrored, scale=by.scale)
     if by.is_identity:
         return {}
     values: dict[str, Any] = {}
@@ -153,7 +155,7 @@ def _part(part: Attached, by: Similarity) -> dict[str, Any]:
 def transform_elements(
     scene: Scene, keys: Collection[ElementKey], by: Similarity
 ) -> Mapping[ElementKey, dict[str, Any]]:
-    """Return the new values of selected elements, and of the joints that hold only their bodies.
+    """Return the new values of selected elements, and of the joints and sensors that have only their bodies.
 
     A joint names bodies; its point in the world moves with them if all of its bodies are among them.
     """
@@ -167,6 +169,9 @@ def transform_elements(
     for index, drive in enumerate(scene.drives):
         if drive.body in moved:
             found[ElementKey("drive", index)] = transform_element(drive, by, is_whole=False)
+    for index, sensor in enumerate(scene.sensors):
+        if sensor.body in moved:
+            found[ElementKey("sensor", index)] = transform_element(sensor, by)
     for index, joint in enumerate(scene.joints):
         key = ElementKey("joint", index)
         found[key] = _joint_values(joint, moved, is_selected=key in keys, by=by)

@@ -281,7 +281,7 @@ _FAST = (
     "whether fast bodies miss contacts depends on the engine and [solver]: exact misses none, reference none with "
     'detection = "swept", box2d none with static objects; for pymunk, `sandbox check` states the dt'
 )
-_SENSOR = "bodies have no sensors; a [[zone]] detects bodies whose centre is inside it"
+_SENSOR = "a [[sensor]] detects the shapes that overlap it; its key `body` names the body that it moves with"
 _GRAVITY = "no body has a gravity of its own; world.gravity acts on all bodies, that of a [[zone]] on those inside it"
 _DAMPING = "no body has a damping of its own; world.damping and world.linear_drag act on all bodies"
 _ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
@@ -292,6 +292,7 @@ _ELSEWHERE = {
     "continuouscollision": _FAST,
     "sensor": _SENSOR,
     "trigger": _SENSOR,
+    "area": _SENSOR,
     "gravityscale": _GRAVITY,
     "lineardamping": _DAMPING,
     "angulardamping": _DAMPING,
@@ -364,7 +365,7 @@ _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - 
 _COMMON_LOCATIONS = {("world",), ("solver",), ("play",)}
 """Tables that every scene has: one that is no table at all is taken as left out."""
 
-REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",)}
+REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",), ("sensor",)}
 """Tables that refer to bodies, and to which nothing refers: faulty ones are omitted."""
 
 PARTS = ("ball", "box", "capsule", "polygon")

@@ -1,4 +1,4 @@
-"""Distances of convex hulls."""
+"""Distances and Minkowski differences of convex hulls."""
 
 import numpy as np
 
@@ -7,6 +7,46 @@ from sandbox.scene.geometry.vectors import offset_from_segment
 
 CHUNK = 1_000_000
 """Frames × corners × corners that are processed at once."""
+
+
+def convex_hull(points: FloatArray) -> FloatArray:
+    """Return the corners of the convex hull of points, (V, 2) m, counter-clockwise, without those within an edge.
+
+    By monotone chains (Andrew 1979). One corner is a point, two are a segment.
+
+    Args:
+        points: (K, 2) m, at least one.
+    """
+    ordered = np.unique(points, axis=0).tolist()
+    if len(ordered) < 3:
+        return np.asarray(ordered, np.float64)
+    chains = [_chain(ordered), _chain(ordered[::-1])]
+    return np.asarray(chains[0][:-1] + chains[1][:-1], np.float64)
+
+
+def _chain(ordered: list[list[float]]) -> list[list[float]]:
+    """Return the points of a chain that turns to the left at each of them."""
+    chain: list[list[float]] = []
+    for x, y in ordered:
+        while len(chain) > 1:
+            (ax, ay), (bx, by) = chain[-2:]
+            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                break
+            chain.pop()
+        chain.append([x, y])
+    return chain
+
+
+def minkowski_difference(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the corners of the set of differences of the points of two convex hulls, (V, 2) m, counter-clockwise.
+
+    Where the second hull is moved by a vector in it, the hulls touch or overlap.
+
+    Args:
+        first: (A, 2) m, corners.
+        second: (B, 2) m, corners.
+    """
+    return convex_hull((first[:, None] - second).reshape(-1, 2))
 
 
 def hull_distance(first: FloatArray, second: FloatArray) -> FloatArray:

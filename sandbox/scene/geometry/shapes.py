@@ -1,4 +1,4 @@
-"""Convex pieces of bodies with their mass properties, and the areas of zones.
+"""Convex pieces of bodies with their mass properties, and the areas of zones and sensors.
 
 A piece is the convex hull of its corners, widened by its radius: one corner is a disc, two are a capsule, three or more
 a polygon. So one narrow phase and one drawing routine serve all of them. Pieces are in the frame of their body, about
@@ -28,7 +28,7 @@ from sandbox.scene.description.bodies import (
     PolygonPart,
 )
 from sandbox.scene.description.discs import Disc
-from sandbox.scene.description.fixed import Zone
+from sandbox.scene.description.fixed import Sensor, Zone
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.geometry.polygon import (
     Moments,
@@ -286,8 +286,8 @@ class ZonePiece(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def pieces_of(zone: Zone) -> tuple[ZonePiece, ...]:
-    """Return the pieces of a zone that has a shape.
+def pieces_of(zone: Zone | Sensor) -> tuple[ZonePiece, ...]:
+    """Return the pieces of a zone or sensor that has a shape.
 
     Raises:
         OutlineError: its outline cannot be divided into convex pieces.
@@ -300,9 +300,27 @@ def pieces_of(zone: Zone) -> tuple[ZonePiece, ...]:
     return tuple(ZonePiece(tuple(part), 0.0) for part in convex_parts(anticlockwise(zone.points)))
 
 
+def placed_sensor(sensor: Sensor, origin: Point, angle: float) -> Sensor:
+    """Return a sensor of a body as one in the world.
+
+    Args:
+        sensor: with a shape in the frame of its body.
+        origin: of that frame, m.
+        angle: of that frame, rad.
+    """
+    cos, sin = math.cos(angle), math.sin(angle)
+    position, points = sensor.position, sensor.points
+    placed = {
+        "body": None,
+        "position": None if position is None else to_world(position, cos, sin, origin),
+        "points": None if points is None else tuple(to_world(each, cos, sin, origin) for each in points),
+    }
+    return sensor.model_copy(update=placed)
+
+
 @lru_cache(maxsize=1024)
-def middle_of(zone: Zone) -> Point:
-    """Return the centre of a zone, m: the centroid of a polygon, the midpoint of a strip's line."""
+def middle_of(zone: Zone | Sensor) -> Point:
+    """Return the centre of a zone or sensor, m: the centroid of a polygon, the midpoint of a strip's line."""
     if zone.points is None:
         assert zone.position is not None
         return zone.position
@@ -339,6 +357,6 @@ def _contains(piece: ZonePiece, point: Point) -> bool:
     return distance < piece.radius
 
 
-def width_of(zone: Zone) -> float:
-    """Return the approximate smallest width of a zone, m; a body that moves farther in one substep can miss it."""
+def width_of(zone: Zone | Sensor) -> float:
+    """Return the approximate smallest width of a zone or sensor, m; a body that moves farther at once can miss it."""
     return min(2.0 * piece.radius if len(piece.corners) < 3 else _width(piece.corners) for piece in pieces_of(zone))

@@ -1,4 +1,4 @@
-"""Checks of polygons, zones, layers and repeated elements.
+"""Checks of polygons, zones, sensors, layers and repeated elements.
 
 Static colliders repeated at one position are limited, because a tree of bounding boxes, which most engines use, cannot
 separate equal boxes: inserting n of them takes O(n²).
@@ -13,7 +13,16 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Point
 from sandbox.scene.description.bodies import AnyPart, BallPart, BoxPart, CapsulePart, Compound, PolygonPart
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.description.fixed import MAX_CATEGORIES, MAX_LAYERS, MAX_ZONES, Plane, Wall, Zone
+from sandbox.scene.description.fixed import (
+    MAX_CATEGORIES,
+    MAX_LAYERS,
+    MAX_SENSORS,
+    MAX_ZONES,
+    Plane,
+    Sensor,
+    Wall,
+    Zone,
+)
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.polygon import OutlineError, anticlockwise, extent_of, outline_fault, signed_area
 from sandbox.scene.geometry.shapes import contains, geometry_of, middle_of
@@ -192,13 +201,25 @@ def check_zones(scene: Scene) -> Iterator[LocatedMessage]:
     if len(scene.zones) > MAX_ZONES:
         yield ("zone", MAX_ZONES), f"a scene has at most {MAX_ZONES:,} zones"
     for k, zone in enumerate(scene.zones):
-        wrong = list(_check_zone_shape(k, zone))
+        wrong = list(_check_area(("zone", k), zone))
         yield from wrong
         if not wrong and zone.holds and not contains(zone, middle_of(zone)):
             x, y = middle_of(zone)
             yield ("zone", k, "holds"), f"its centre, ({x:g}, {y:g}) m, is outside the zone, so it cannot hold a body"
     if scene.zones and scene.surface is not None:
         yield ("zone", 0), "zones are not supported in a scene with a [surface]; remove one of the two"
+
+
+def check_sensors(scene: Scene) -> Iterator[LocatedMessage]:
+    """Yield the faults of sensors, except those of their bodies."""
+    if len(scene.sensors) > MAX_SENSORS:
+        yield ("sensor", MAX_SENSORS), f"a scene has at most {MAX_SENSORS:,} sensors"
+    for k, sensor in enumerate(scene.sensors):
+        yield from _check_area(("sensor", k), sensor)
+        for n, name in enumerate(sensor.detects or ()):
+            if name not in scene.categories:
+                known = ", ".join(map(repr, scene.categories)) or "none"
+                yield ("sensor", k, "detects", n), f"no object names the category {name!r}; those of the scene: {known}"
 
 
 def check_layers(scene: Scene) -> Iterator[LocatedMessage]:
@@ -222,8 +243,8 @@ def check_categories(scene: Scene) -> Iterator[LocatedMessage]:
         )
 
 
-def _check_zone_shape(k: int, zone: Zone) -> Iterator[LocatedMessage]:
-    at: Location = ("zone", k)
+def _check_area(at: Location, zone: Zone | Sensor) -> Iterator[LocatedMessage]:
+    """Yield the faults of the shape of a zone or sensor."""
     if zone.points is None:
         if zone.position is None or zone.radius is None:
             yield at, "has no shape; add `position` and `radius`, or `points`, or `points` and `thickness`"

@@ -43,12 +43,13 @@ SMALLEST_CLICK = 1e-6
 
 
 def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
-    """Return the faults of joints, thrusts, attractions and drives."""
+    """Return the faults of joints, thrusts, attractions and drives, and of the bodies of sensors."""
     return [
         *_check_joints(scene, bodies),
         *_check_thrusts(scene, bodies),
         *_check_attractions(scene, bodies),
         *_check_drives(scene, bodies),
+        *_check_sensor_bodies(scene, bodies),
     ]
 
 
@@ -215,6 +216,12 @@ def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]
             yield ("attraction", k, "toward"), f"no body is named {toward!r}; {_known(bodies)}"
 
 
+def _check_sensor_bodies(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+    for k, sensor in enumerate(scene.sensors):
+        if sensor.body is not None and sensor.body not in bodies.number_of:
+            yield ("sensor", k, "body"), f"no body is named {sensor.body!r}; {_known(bodies)}"
+
+
 def _check_drives(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from _check_names("drive", scene.drives)
     singles, seen = single_bodies(scene), set[str]()
@@ -305,11 +312,11 @@ def check_play(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
 
 
 def _check_parts(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
-    """Check that each part names an existing body, collider or zone, and that no name occurs twice."""
+    """Check that each part names an existing body, collider, zone or sensor, and that no name occurs twice."""
     known, seen = {*bodies.names, *scene.fixed_names}, set[str]()
     for k, part in enumerate(scene.play.parts):
         if part.name not in known:
-            yield ("play", "part", k, "name"), f"no body, fixed object or zone is named {part.name!r}"
+            yield ("play", "part", k, "name"), f"no body, fixed object, zone or sensor is named {part.name!r}"
         if part.name in seen:
             yield ("play", "part", k, "name"), f"{part.name!r} already has a part; remove one of the two"
         seen.add(part.name)

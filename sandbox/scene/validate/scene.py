@@ -28,6 +28,7 @@ from sandbox.scene.validate.geometry import (
     check_layers,
     check_outlines,
     check_repeats,
+    check_sensors,
     check_zones,
     with_placeholder_shapes,
 )
@@ -51,6 +52,8 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
     found = [*materials, *_check_planes_and_walls(scene)]
     if scene.zones:
         found += check_zones(scene)
+    if scene.sensors:
+        found += check_sensors(scene)
     if len(scene.layers) > 1:
         found += check_layers(scene)
     if scene.categories:
@@ -74,7 +77,7 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_play(scene, bodies)
     if _has_surface_keys(scene):
         found += check_surface(scene, bodies)
-    if scene.joints or scene.thrusts or scene.attractions or scene.drives:
+    if scene.joints or scene.thrusts or scene.attractions or scene.drives or scene.sensors:
         found += check_attachments(scene, bodies)
     if scene.events:
         found += check_events(scene, bodies)
@@ -278,9 +281,9 @@ def _check_names(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
         seen.add(name)
     pockets = [("pocket", k) for k in range(len(scene.pockets))]
     zones = [("zone", k) for k in range(len(scene.zones))]
-    for name, location in zip(
-        scene.fixed_names, [*(location for location, _ in _static_colliders(scene)), *pockets, *zones], strict=True
-    ):
+    sensors = [("sensor", k) for k in range(len(scene.sensors))]
+    locations = [*(location for location, _ in _static_colliders(scene)), *pockets, *zones, *sensors]
+    for name, location in zip(scene.fixed_names, locations, strict=True):
         if name in seen:
             yield (*location, "name"), _name_taken(name)
         seen.add(name)

@@ -50,7 +50,7 @@ CERTAIN_KINDS = frozenset({"overlap", "anchors", "joint_start", "duration", FAIL
 """Kinds of problems that occur in any case, and not only at some phases or speeds."""
 TITLES = {
     "depth": "deep contact",
-    "entry": "missed zone",
+    "entry": "missed entry",
     "iterations": "few iterations",
     "kick_threshold": "kick at rest",
     "anchors": "swapped anchors",

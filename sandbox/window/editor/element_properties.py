@@ -15,7 +15,7 @@ from sandbox.scene.editing.fields import fields_of
 from sandbox.scene.errors import Location
 from sandbox.window.editor.property_rows import PropertyRow, PropertySection
 
-ATTACHED_TABLES = ("drive", "shot")
+ATTACHED_TABLES = ("drive", "shot", "sensor")
 """Elements without a place of their own, which are shown with their body"""
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Point
 from sandbox.scene.description.bodies import Polygon
+from sandbox.scene.description.fixed import Sensor
 from sandbox.scene.editing.elements import ElementKey, bodies_of, element_at, exists
 from sandbox.window.editor.gestures import (
     Gesture,
@@ -96,7 +97,7 @@ def _vertex_handles(scene: Scene, selection: Sequence[ElementKey]) -> list[EditH
         return []
     element = element_at(scene, selection[0])
     points = getattr(element, "points", None)
-    if not points or len(points) > MAX_VERTICES:
+    if not points or len(points) > MAX_VERTICES or (isinstance(element, Sensor) and element.body is not None):
         return []
     dx, dy = element.position if isinstance(element, Polygon) else (0.0, 0.0)
     if isinstance(element, Polygon) and element.angle:

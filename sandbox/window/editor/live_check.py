@@ -23,7 +23,7 @@ from sandbox.measure.preflight.tunnelling import ANOTHER, ANOTHER_BODY
 from sandbox.scene.compile.demands import Demand, demands
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_STEPS, BodySpec, Point
-from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall
 from sandbox.scene.description.joints import Anchored, Rod
 from sandbox.scene.editing.elements import (
     STATIC_TABLES,
@@ -232,11 +232,12 @@ def _iteration_remedies(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy
 
 def _thickness(scene: Scene, diagnostic: Diagnostic) -> Iterator[Remedy]:
     """Yield a larger thickness of a wall, or of a strip that detects bodies, if there is room for it."""
-    details, h = diagnostic.details, scene.solver.h
+    details = diagnostic.details
     key = _static_element(scene, str(details["thing"]))
     if key is None or details.get("others"):
         return
-    element, travel = element_at(scene, key), float(details["speed"]) * h
+    element = element_at(scene, key)
+    travel = float(details["speed"]) * (scene.solver.dt if isinstance(element, Sensor) else scene.solver.h)
     thickness = getattr(element, "thickness", None)
     points = getattr(element, "points", None)
     if thickness is None or points is None:

@@ -8,7 +8,7 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
-from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
+from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.description.joints import Anchored, Groove, Joined, OnAxis, Pivot, Pulley, Weld
 from sandbox.scene.description.surface import Pocket
@@ -20,6 +20,7 @@ from sandbox.scene.editing.elements import (
     elements_of_table,
     exists,
 )
+from sandbox.scene.geometry.shapes import placed_sensor
 from sandbox.trajectory import Frame
 from sandbox.window.hit_test import hulls_of, segment_distance, signed_distance
 
@@ -70,9 +71,9 @@ def elements_at(scene: Scene, point: Point, tolerance: float) -> list[ElementKey
     bodies = [element_of_body(scene, body) for body in bodies_at(scene, point, tolerance)]
     others = [
         ElementKey(table, index)
-        for table in ("post", "pocket", "wall", "zone", "plane")
+        for table in ("post", "pocket", "wall", "zone", "sensor", "plane")
         for index, element in reversed(list(enumerate(elements_of_table(scene, table))))
-        if _distance(element, point) <= tolerance
+        if _distance(_in_world(scene, element), point) <= tolerance
     ]
     return list(dict.fromkeys([*pivots, *bodies, *lines, *others]))
 
@@ -82,7 +83,7 @@ def elements_within(scene: Scene, corner: Point, opposite: Point) -> list[Elemen
     low = min(corner[0], opposite[0]), min(corner[1], opposite[1])
     high = max(corner[0], opposite[0]), max(corner[1], opposite[1])
     found = []
-    for table in (*scene.kinds, "post", "pocket", "wall", "zone"):
+    for table in (*scene.kinds, "post", "pocket", "wall", "zone", "sensor"):
         for index in range(len(elements_of_table(scene, table))):
             box = bounds_of(scene, ElementKey(table, index))
             if box is not None and all(low[k] <= box[0][k] and box[1][k] <= high[k] for k in (0, 1)):
@@ -125,12 +126,13 @@ def _outline(scene: Scene, key: ElementKey, element: Part) -> FloatArray | None:
             for hull in hulls_of(scene.bodies, frame, k):
                 rows += [hull.corners - hull.radius, hull.corners + hull.radius]
         return np.concatenate(rows)
+    element = _in_world(scene, element)
     match element:
         case Post() | Pocket():
             return _disc(element.position, element.radius)
         case Wall():
             return np.concatenate([_disc(point, 0.5 * element.thickness) for point in element.points])
-        case Zone():
+        case Zone() | Sensor():
             if element.points is not None:
                 margin = 0.5 * (element.thickness or 0.0)
                 return np.concatenate([_disc(point, margin) for point in element.points])
@@ -140,6 +142,14 @@ def _outline(scene: Scene, key: ElementKey, element: Part) -> FloatArray | None:
         case _:
             ends = [end for line in attachment_lines(scene, element) for end in line]
             return np.asarray(ends, np.float64) if ends else None
+
+
+def _in_world(scene: Scene, element: Part) -> Part:
+    """Return a sensor of a body as one in the world, where it is at the start; other elements as they are."""
+    if not isinstance(element, Sensor) or element.body is None:
+        return element
+    pose = body_pose(scene, element.body)
+    return element if pose is None else placed_sensor(element, *pose)
 
 
 def _disc(centre: Point, radius: float) -> FloatArray:
@@ -158,9 +168,9 @@ def _distance(element: Part, point: Point) -> float:
             return abs(height)  # only the surface is picked, as the solid fills half of the view
         case Wall():
             return _polyline_distance(element.points, element.closed, x, y) - 0.5 * element.thickness
-        case Zone(points=None):
+        case Zone(points=None) | Sensor(points=None):
             return math.dist(element.position or (0.0, 0.0), point) - (element.radius or 0.0)
-        case Zone():
+        case Zone() | Sensor():
             assert element.points is not None
             if element.thickness is not None:
                 return _polyline_distance(element.points, False, x, y) - 0.5 * element.thickness

@@ -25,6 +25,7 @@ from sandbox.games.session import GameSession
 from sandbox.recording import RecordedGame, Recording
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
@@ -368,7 +369,9 @@ class Session:
         self._breaks.update(self.simulation.broken)
         self._contacts.append(self._contacts_of_step())
         del self._contacts[:-MAX_PENDING_CONTACTS]
-        self._contact_free.update(self._contacts[-1], self.simulation.settings)
+        contacts = self._contacts[-1]
+        touching = contacts.some(~zone_visits(contacts.pair, self.scene))
+        self._contact_free.update(touching, self.simulation.settings)
         if self._exhausted:  # the state lies within a step, so it is none of the session's
             return
         self._compare_with_history(self._frame)

@@ -31,6 +31,7 @@ from sandbox.window.render.overlays import OverlayRenderer
 from sandbox.window.render.palette import BACKGROUND, CLEAR, INK, SKY, TOUCHING, ColourArray, colour_of, mix_colours
 from sandbox.window.render.particles import MAX_POINT_SIZE, LifetimeColours, Packed, ParticleRenderer, packed_pixels
 from sandbox.window.render.polygons import PolygonRenderer
+from sandbox.window.render.sensors import SensorRenderer
 from sandbox.window.render.static_geometry import (
     LayerRenderer,
     draw_attractions,
@@ -91,6 +92,7 @@ class Renderer:
         self._polygons = PolygonRenderer()
         self._layers = LayerRenderer()
         self._lamps = LampRenderer()
+        self._sensors = SensorRenderer()
         self._games = GameViews()
         self._overlays = OverlayRenderer(self._discs, self._points, self._polygons)
         self._background: tuple[CachedBackground, pygame.Surface] | None = None
@@ -153,6 +155,7 @@ class Renderer:
             has_points=sizes.side > 0,
         )
         game = self._games.view_of(snapshot.scene)
+        self._sensors.draw(canvas, snapshot)
         self._overlays.below(view)
         if game is not None:
             game.below(view)

@@ -11,7 +11,7 @@ import pygame
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
+from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
@@ -369,18 +369,17 @@ ZONE_LINE_WIDTH = 1.5
 
 def draw_zones(canvas: Canvas, scene: Scene) -> None:
     """Draw the visible zones of a scene."""
-    antialias = canvas.antialias
     for zone in scene.zones:
-        distance, within = _distance(zone, canvas.camera)
-        box = within.inflate(4, 4).clip(canvas.surface.get_clip())
-        colour = colour_of_zone(zone)
-        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, ZONE_FILL_OPACITY, antialias), box)
-        draw_sdf(
-            canvas.surface,
-            distance,
-            ShapeStyle(None, colour, ZONE_LINE_WIDTH * canvas.ui_scale, ZONE_LINE_OPACITY, antialias),
-            box,
-        )
+        draw_area(canvas, zone, colour_of_zone(zone), ZONE_FILL_OPACITY, ZONE_LINE_OPACITY)
+
+
+def draw_area(canvas: Canvas, area: Zone | Sensor, colour: RgbColour, fill: float, line: float) -> None:
+    """Draw a zone or a sensor in the world, with the opacities of its area and of its outline."""
+    distance, within = _distance(area, canvas.camera)
+    box = within.inflate(4, 4).clip(canvas.surface.get_clip())
+    draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, fill, canvas.antialias), box)
+    width = ZONE_LINE_WIDTH * canvas.ui_scale
+    draw_sdf(canvas.surface, distance, ShapeStyle(None, colour, width, line, canvas.antialias), box)
 
 
 def colour_of_zone(zone: Zone) -> RgbColour:
@@ -394,8 +393,8 @@ def colour_of_zone(zone: Zone) -> RgbColour:
     return FAINT if zone.gravity is None else SKY
 
 
-def _distance(zone: Zone, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
-    """Return the signed distance from a zone, px, and its bounding box."""
+def _distance(zone: Zone | Sensor, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
+    """Return the signed distance from a zone or sensor, px, and its bounding box."""
     if zone.points is None:
         assert zone.position is not None and zone.radius is not None
         corners, reach = _pixels((zone.position,), camera), zone.radius * camera.scale

@@ -1,19 +1,22 @@
 """Headless games: policies and rules act between steps, and recordings replay to the same state."""
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sandbox.action import Impulse
+from sandbox.action import Action, Impulse
 from sandbox.engines.registry import ENGINES, start
-from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError, sensed_objects
 from sandbox.games.players import POLICIES, RandomInput, ScriptedInput
 from sandbox.games.session import HeadlessGame
 from sandbox.measure.run.runner import run
 from sandbox.measure.run.sessions import play_out, rerun
 from sandbox.recording import Recording
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
 from tests.toy_game import TOY, Toy, toy_scene
@@ -154,3 +157,31 @@ def test_scene_without_a_game_cannot_be_played() -> None:
     with pytest.raises(UnsuitableSceneError, match="has no game with rules"):
         play_out(scene)
     assert "game" not in run(scene, audit=False).info
+
+
+class SensingToy(Toy):
+    """Counts the steps after which the sensor detects the ball, and its visits by the times of their rows."""
+
+    def __init__(self, scene: Scene, bodies: Bodies) -> None:
+        super().__init__(scene, bodies)
+        self._scene, self.sensed_steps, self.begins = scene, 0, set[float]()
+
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
+        self.sensed_steps += 0 in sensed_objects(info, self._scene)["near"]
+        self.begins |= {each.time for each in info.contacts if each.pair == (0, -2)}
+        return super().on_step(info)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rules_receive_what_sensors_detect_after_each_step(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", SensingToy)
+    scene = loads(TOY + '[[sensor]]\nname = "near"\npoints = [[-9, 0], [9, 0], [9, 0.3], [-9, 0.3]]\n')
+    rules = SensingToy(scene, scene.bodies)
+    game = HeadlessGame(rules, None, "none")
+    trajectory = run(scene, engine, audit=False, bout=game)
+    visits = trajectory.sensor_visits
+    assert len(visits) > 1
+    assert rules.begins == {each.begin for each in visits}
+    # An action of the rules acts between the end of a step, when sensors detect, and the recorded frame; none moves it.
+    inside = trajectory.position[:, 0, 1] - 0.2 < 0.3
+    assert rules.sensed_steps == int(inside.sum())

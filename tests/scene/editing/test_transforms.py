@@ -12,6 +12,7 @@ from sandbox.scene.editing.elements import ElementKey, all_elements, bodies_of, 
 from sandbox.scene.editing.transforms import CANNOT_ROTATE, Similarity, transform_elements
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import SetValue, with_changes
+from sandbox.scene.geometry.shapes import placed_sensor
 
 TEXT = """
 [[ball]]
@@ -67,6 +68,9 @@ position = [3.0, -1.0]
 radius = 0.3
 [[zone]]
 points = [[9.0, 9.0], [10.0, 9.0], [10.0, 11.0]]
+[[sensor]]
+points = [[9.0, -9.0], [10.0, -9.0]]
+thickness = 0.2
 """
 SCENE = loads(TEXT)
 KEYS = [key for key, _ in all_elements(SCENE)]
@@ -110,6 +114,9 @@ def test_bodies_and_static_elements_are_mapped(by: Similarity) -> None:
     wall, zone = np.asarray(SCENE.walls[0].points), np.asarray(SCENE.zones[0].points)
     assert np.abs(np.asarray(moved.walls[0].points) - image(by, wall)).max() < ROUNDING
     assert np.abs(np.asarray(moved.zones[0].points) - image(by, zone)).max() < ROUNDING
+    sensor = np.asarray(SCENE.sensors[0].points)
+    assert np.abs(np.asarray(moved.sensors[0].points) - image(by, sensor)).max() < ROUNDING
+    assert moved.sensors[0].thickness == pytest.approx(0.2 * by.scale)
     assert moved.walls[0].thickness == pytest.approx(0.1 * by.scale)
     assert moved.posts[0].radius == pytest.approx(0.3 * by.scale)
     # The surface of the plane is mapped: a point of it, and the direction along it.
@@ -133,6 +140,29 @@ def test_masses_follow_the_size_where_a_density_is_stated() -> None:
     keys = [ElementKey("ball", 0), ElementKey("box", 0)]
     moved = after(Similarity(scale=2.0), keys, text)
     assert moved.bodies.mass.tolist() == pytest.approx([8.0 * math.pi, 3.0])
+
+
+@given(SIMILARITIES)
+def test_sensor_of_a_body_keeps_its_place_on_the_body(by: Similarity) -> None:
+    text = """
+    [[box]]
+    name = "a"
+    position = [1.0, 2.0]
+    size = [1.0, 1.0]
+    angle = 0.4
+    [[sensor]]
+    body = "a"
+    points = [[-0.5, -0.5], [0.5, -0.7]]
+    thickness = 0.2
+    """
+    moved = after(by, [ElementKey("box", 0)], text)
+    before = loads(text)
+    places = [
+        np.asarray(placed_sensor(each.sensors[0], each.boxes[0].position, each.boxes[0].angle).points)
+        for each in (before, moved)
+    ]
+    assert np.abs(places[1] - image(by, places[0])).max() < ROUNDING
+    assert moved.sensors[0].thickness == pytest.approx(0.2 * by.scale)
 
 
 def test_stack_turns_about_its_base() -> None:
