@@ -46,6 +46,7 @@ JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.JOINT_BIAS: {"kind": "pivot", "at": [0, 0], "bias": 0},
 }
 
+PATH = {"points": [[0, 0], [1, 0]], "speed": 1}
 CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.TRANSLATION, True, {"ball": [BALL, BALL, ROCK]}, "2 bodies move"),
     (Demand.TRANSLATION, True, {"ball": [BALL]}, "1 body moves"),
@@ -141,6 +142,7 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
     (Demand.CATEGORIES, True, {"ball": [{**BALL, "categories": ["player"], "mask": ["enemy"]}]}, "player, enemy"),
     (Demand.KINEMATIC, True, {"ball": [{**BALL, "kinematic": True}]}, "1 body is kinematic"),
+    (Demand.PATHS, True, {"ball": [{**BALL, "kinematic": True, "path": PATH}]}, "1 body moves along a path"),
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),

@@ -65,6 +65,7 @@ OWN = frozenset(
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
     }
 )
 

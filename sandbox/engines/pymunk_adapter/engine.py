@@ -45,6 +45,7 @@ OWN = frozenset(
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
     }
 )
 

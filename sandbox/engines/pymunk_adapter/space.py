@@ -27,7 +27,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 )
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
-from sandbox.engines.pymunk_adapter.drives import SpaceDrives
+from sandbox.engines.pymunk_adapter.drives import SpaceDrives, SpacePaths
 from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
@@ -85,6 +85,7 @@ class SpaceBodies:
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
+        self._paths = SpacePaths(setup.time, settings.h)
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
@@ -243,6 +244,8 @@ class SpaceBodies:
         self._by_name[name], self._name_of[index] = body, name
         if driven:
             self.drives.join(name, index, body, state)
+        elif index in bodies.paths:
+            self._paths.join(index, bodies.paths[index], body)
         elif not (fixed or kinematic):
             if self.field.attracts:
                 self.field.apply_to(name, body, self._by_name)
@@ -292,6 +295,7 @@ class SpaceBodies:
             self.joints.remove(index)
             self._resting.pop(index, None)
             self.drives.leave(index)
+            self._paths.leave(index)
             member = self._members.pop(index)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
@@ -374,7 +378,9 @@ class SpaceBodies:
         self._state = None
 
     def _set_forces(self, time: float) -> None:
-        """Set the forces of a substep that starts at a time, s: constant forces, thrusts and those of the air."""
+        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and forces of the air."""
+        if self._paths:
+            self._paths.before(time)
         if self.air.flows:
             self.thrusts.update_loads(time, self._h)
             self._apply_air(*self._read())
@@ -439,7 +445,7 @@ class SpaceBodies:
             polygons=self._polygons,
             until_contact=until_contact,
             warm_start=contacts.take_warm_start if lists_contacts else None,
-            before_substep=before_substep if self.thrusts or self.constant_forces else None,
+            before_substep=before_substep if self.thrusts or self.constant_forces or self._paths else None,
             needs_check=self._state_check(),
         )
         # The states are valid until the next batch, like those that the reader returns.

@@ -125,6 +125,7 @@ class ReferenceEngine:
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
     }
     knows_impulses: bool = True
     epsilon: float = 2.0**-52

@@ -72,6 +72,7 @@ class Demand(StrEnum):
     GROUPS = "groups"
     ZONES = "zones"
     KINEMATIC = "kinematic bodies"
+    PATHS = "paths"
 
 
 BALLS = frozenset(
@@ -213,6 +214,9 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         kinematic > 0,
         _count(kinematic, "body is kinematic", "bodies are kinematic", "no body is kinematic"),
     )
+    on_path = len(bodies.paths)
+    why = _count(on_path, "body moves along a path", "bodies move along paths", "no body has a path")
+    yield Demand.PATHS, on_path > 0, why
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())
@@ -329,6 +333,7 @@ def demands_of_body(single: BodySpec) -> frozenset[Demand]:
     stated = (
         (Demand.GROUPS, single.group is not None),
         (Demand.KINEMATIC, single.kinematic),
+        (Demand.PATHS, single.path is not None),
         (Demand.LIFT, single.lift != 0.0),
     )
     return frozenset(demand for demand, is_stated in stated if is_stated)

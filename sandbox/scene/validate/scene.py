@@ -8,6 +8,7 @@ import numpy as np
 from sandbox.scene.compile.bodies import Bodies, elements_of
 from sandbox.scene.compile.contacts import index_surfaces, surface_parts
 from sandbox.scene.compile.generators import GeneratorError
+from sandbox.scene.compile.paths import path_faults
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
 from sandbox.scene.description.fixed import Post, Wall
@@ -30,6 +31,7 @@ from sandbox.scene.validate.geometry import (
     check_repeats,
     check_zones,
     with_placeholder_shapes,
+    without_paths,
 )
 from sandbox.scene.validate.references import check_attachments, check_play, check_surface
 
@@ -49,6 +51,10 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
     if scene.polygons or scene.compounds:
         shapeless += check_outlines(scene)
     found = [*materials, *_check_planes_and_walls(scene)]
+    if with_path := [each for each in _elements(scene) if isinstance(each[1], BodySpec) and each[1].path is not None]:
+        faults = list(_check_paths(with_path))
+        scene = without_paths(scene) if faults else scene  # the other checks need the bodies
+        found += faults
     if scene.zones:
         found += check_zones(scene)
     if len(scene.layers) > 1:
@@ -179,6 +185,13 @@ def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
             yield from (((*location, key), message) for key, message in _check_immovable(element))
         elif isinstance(element, Stack):
             yield from (((*location, key), message) for key, message in _check_at_rest(element))
+
+
+def _check_paths(elements: list[tuple[Location, BodySource]]) -> Iterator[LocatedMessage]:
+    """Yield the faults of paths."""
+    for location, single in elements:
+        assert isinstance(single, BodySpec)
+        yield from (((*location, *key), message) for key, message in path_faults(single))
 
 
 def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:

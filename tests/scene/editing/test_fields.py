@@ -372,8 +372,10 @@ def test_valid_text(model: type[BaseModel], key: str, text: str, value: Any) -> 
 def test_model_accepts_a_parsed_value_of_a_box(data: st.DataObject) -> None:
     spec = data.draw(st.sampled_from([spec for spec in fields_of(Box) if spec.kind in ("number", "numbers")]))
     value = parse(spec, format_value(spec, data.draw(in_range(spec))))
-    document = {"position": (0.0, 0.0), "size": (1.0, 1.0)}
+    document, added = {"position": (0.0, 0.0), "size": (1.0, 1.0)}, tuple(value) if isinstance(value, list) else value
+    for key in reversed(spec.key.split(".")):  # of a table within the table
+        added = {key: added}
     try:
-        Box.model_validate({**document, spec.key: tuple(value) if isinstance(value, list) else value})
+        Box.model_validate({**document, **added})
     except ValidationError as error:
         assert spec.key == "velocity", error  # its length is limited, not its components
