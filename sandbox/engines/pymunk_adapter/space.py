@@ -378,7 +378,7 @@ class SpaceBodies:
         self._state = None
 
     def _set_forces(self, time: float) -> None:
-        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and forces of the air."""
+        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and the air."""
         if self._paths:
             self._paths.before(time)
         if self.air.flows:

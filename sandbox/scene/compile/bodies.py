@@ -315,7 +315,7 @@ def centre_of(single: BodySpec) -> Point:
     return to_world(centre, math.cos(single.angle), math.sin(single.angle), single.position)
 
 
-def _start_pose(single: BodySpec) -> tuple[Point, float]:
+def start_pose(single: BodySpec) -> tuple[Point, float]:
     """Return the position of a body's centre of mass, m, and its angle, rad, at time 0."""
     if single.path is None:
         return centre_of(single), single.angle
@@ -325,7 +325,7 @@ def _start_pose(single: BodySpec) -> tuple[Point, float]:
 
 def layout_of_singles(singles: list[BodySpec]) -> Layout:
     """Return the start state of single bodies, each with its own prototype."""
-    poses = [_start_pose(each) for each in singles]
+    poses = [start_pose(each) for each in singles]
     spins = [(0.0, 0.0, 0.0) if each.fixed else _spin(each) for each in singles]
     return Layout(
         position=_rows([position for position, _ in poses]),

@@ -28,6 +28,10 @@ PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 """Largest acceleration on a smooth leg, in units of its length / duration²"""
 
 
+ARC_PIECES = 16
+"""Straight pieces of the course of a leg on which the body turns"""
+
+
 def smooth(u: float) -> float:
     """Return the fraction of a smooth leg that is done after a fraction u of its duration."""
     return u * u * u * (u * (u * 6.0 - 15.0) + 10.0)
@@ -138,11 +142,22 @@ class PathMotion:
         lx, ly = rotate(cx - pivot[0], cy - pivot[1], math.cos(angle + turn), math.sin(angle + turn))
         return PathPose(px + qx + x + lx, py + qy + y + ly, angle + turn)
 
-    def line(self) -> list[Point]:
-        """Return the positions of the pivot at the points of the path, m, in the order of a cycle."""
-        (px, py), angle = self._position, self._angle
-        qx, qy = rotate(*self.path.pivot, math.cos(angle), math.sin(angle))
-        return [(px + qx + stop.x, py + qy + stop.y) for stop in cycle_of(self.path)]
+    def stops(self) -> list[Point]:
+        """Return the positions of the centre of mass at the points of the path, m."""
+        return [self._pose_at(*stop)[:2] for stop in stops_of(self.path)]
+
+    def course(self) -> list[Point]:
+        """Return the course of the centre of mass through all points, m: a polyline, with arcs where the body turns."""
+        stops = stops_of(self.path)
+        if self.path.repeat == "loop":
+            stops.append(stops[0])
+        found = [self._pose_at(*stops[0])[:2]]
+        for tail, head in pairwise(stops):
+            count = ARC_PIECES if head.angle != tail.angle else 1
+            for k in range(1, count + 1):
+                s = k / count
+                found.append(self._pose_at(*((1.0 - s) * a + s * b for a, b in zip(tail, head, strict=True)))[:2])
+        return found
 
     @property
     def max_speed(self) -> float:
