@@ -92,6 +92,9 @@ def _objects(setup: Setup) -> Iterator[Obstacle]:
     if one_way:
         yield Obstacle("wall", f"one-way walls need callbacks with a memory: {_listed(one_way)}")
     bodies = setup.bodies
+    if bodies.one_way:
+        names = _listed([bodies.names[index] for index in bodies.one_way])
+        yield Obstacle("", f"one-way bodies need callbacks with a memory: {names}")
     if bodies.paths:
         names_on_paths = _listed([bodies.names[index] for index in bodies.paths])
         yield Obstacle("", f"a path needs a clock, which the game has, and its velocity in each step: {names_on_paths}")

@@ -363,6 +363,11 @@ PROOFS: dict[Demand, Proof] = {
         ),
         both(position(0.425 - 3.0 * 0.575, 0.0), position(0.8, 0.0, body=1)),
     ),
+    # a box that is solid from the right: the ball passes through it
+    Demand.ONE_WAY_BODIES: Proof(
+        scene(ball=[ball(vx=2.0, restitution=1.0)], box=[box(1.0, restitution=1.0, fixed=True, one_way=[1.0, 0.0])]),
+        position(2.0, 0.0),
+    ),
     # gravity within 0.5 m around x = 1: 0.5 s at −4 m/s²
     Demand.ZONES: Proof(
         scene(

@@ -143,6 +143,7 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.CATEGORIES, True, {"ball": [{**BALL, "categories": ["player"], "mask": ["enemy"]}]}, "player, enemy"),
     (Demand.KINEMATIC, True, {"ball": [{**BALL, "kinematic": True}]}, "1 body is kinematic"),
     (Demand.PATHS, True, {"ball": [{**BALL, "kinematic": True, "path": PATH}]}, "1 body moves along a path"),
+    (Demand.ONE_WAY_BODIES, True, {"ball": [{**BALL, "fixed": True, "one_way": [0, 1]}]}, "1 one-way body"),
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),

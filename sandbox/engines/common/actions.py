@@ -456,6 +456,8 @@ def _spawn(action: Spawn, target: ActionTarget) -> None:
         raise ActionError(f"no layer is named {single.layer!r}; layers: {', '.join(scene.layers)}")
     if single.path is not None:
         raise ActionError(f"{name!r} has a path, which begins with the scene; it cannot be added during a run")
+    if single.one_way is not None:
+        raise ActionError(f"{name!r} is a one-way body, which cannot be added during a run")
     unknown = [name for name in (*(single.categories or ()), *(single.mask or ())) if name not in scene.categories]
     if unknown:
         known = ", ".join(scene.categories) or "none"

@@ -46,6 +46,7 @@ OWN = frozenset(
         Demand.DRIVES,
         Demand.KINEMATIC,
         Demand.PATHS,
+        Demand.ONE_WAY_BODIES,
     }
 )
 

@@ -126,6 +126,7 @@ class ReferenceEngine:
         Demand.DRIVES,
         Demand.KINEMATIC,
         Demand.PATHS,
+        Demand.ONE_WAY_BODIES,
     }
     knows_impulses: bool = True
     epsilon: float = 2.0**-52

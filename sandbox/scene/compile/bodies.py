@@ -256,6 +256,19 @@ class Bodies:
         return {n: motions[element] for n, element in enumerate(elements) if element in motions}
 
     @cached_property
+    def one_way(self) -> dict[int, Point]:
+        """Direction in its frame from which each one-way body is solid, of length 1, by its index."""
+        directions: dict[int, Point] = {}
+        for k, each in enumerate(self.elements):
+            if isinstance(each, BodySpec) and each.one_way is not None:
+                x, y = each.one_way
+                length = math.hypot(x, y)
+                directions[k] = x / length, y / length
+        if not directions:
+            return {}
+        return {n: directions[element] for n, element in enumerate(self.element.tolist()) if element in directions}
+
+    @cached_property
     def lift(self) -> FloatArray:
         """(N,) lift coefficient of each: s of the acceleration s ω ẑ × w."""
         each = [e.lift if isinstance(e, BodySpec) else 0.0 for e in self.elements]

@@ -73,6 +73,7 @@ class Demand(StrEnum):
     ZONES = "zones"
     KINEMATIC = "kinematic bodies"
     PATHS = "paths"
+    ONE_WAY_BODIES = "one-way bodies"
 
 
 BALLS = frozenset(
@@ -217,6 +218,8 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     on_path = len(bodies.paths)
     why = _count(on_path, "body moves along a path", "bodies move along paths", "no body has a path")
     yield Demand.PATHS, on_path > 0, why
+    one_way = len(bodies.one_way)
+    yield Demand.ONE_WAY_BODIES, one_way > 0, _count(one_way, "one-way body", "one-way bodies", "none")
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())
@@ -334,6 +337,7 @@ def demands_of_body(single: BodySpec) -> frozenset[Demand]:
         (Demand.GROUPS, single.group is not None),
         (Demand.KINEMATIC, single.kinematic),
         (Demand.PATHS, single.path is not None),
+        (Demand.ONE_WAY_BODIES, single.one_way is not None),
         (Demand.LIFT, single.lift != 0.0),
     )
     return frozenset(demand for demand, is_stated in stated if is_stated)

@@ -311,6 +311,9 @@ class BodySpec(BodySource):
     """Moves at its velocity and angular velocity, which no collision or force changes, as if infinitely heavy."""
     path: BodyPath | None = None
     """motion of a kinematic body over time, instead of constant velocities"""
+    one_way: Accepts[Vector | None, Sequence[float] | None] = default(None)
+    """direction in the frame of a fixed or kinematic body from which it is solid, such as [0, 1] for a platform; bodies
+    that come from elsewhere pass"""
     moment: Moment | None = None
     """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""
     fixed_rotation: bool = False

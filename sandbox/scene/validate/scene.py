@@ -10,7 +10,8 @@ from sandbox.scene.compile.contacts import index_surfaces, surface_parts
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.paths import path_faults
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
+from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial, Vector
+from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.world import Material, Pair
@@ -201,8 +202,20 @@ def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
         yield "kinematic", "cannot be combined with `fixed`; remove one of the two"
     if single.kinematic and single.fixed_rotation:
         yield "fixed_rotation", "has no effect on a kinematic body, which nothing turns; remove it"
+    if single.one_way is not None:
+        yield from _check_one_way(single, single.one_way)
     if single.lift and (single.fixed or single.kinematic):
         yield "lift", f"has no effect on a {'fixed' if single.fixed else 'kinematic'} body; remove it"
+
+
+def _check_one_way(single: BodySpec, direction: Vector) -> Iterator[tuple[str, str]]:
+    """Yield the faults of a one-way body."""
+    if not (single.fixed or single.kinematic):
+        yield "one_way", "needs `fixed = true` or `kinematic = true`: a body that others push is solid on all sides"
+    if isinstance(single, Compound):
+        yield "one_way", "is not supported for a [[body]] of several shapes; use a box, capsule, polygon or ball"
+    if not any(direction):
+        yield "one_way", f"{list(direction)} has no direction; use a vector such as [0, 1], solid from above"
 
 
 def _check_at_rest(source: BodySpec | Stack) -> Iterator[tuple[str, str]]:
@@ -239,6 +252,9 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
         for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
             if getattr(collider, key, usual) != usual:
                 yield (*location, key), "is not supported in a scene with a [surface] or pockets; remove it"
+    for location, element in _elements(scene):
+        if isinstance(element, BodySpec) and element.one_way is not None:
+            yield (*location, "one_way"), "is not supported in a scene with a [surface] or pockets; remove it"
     tables: dict[str, Sequence[Material | Pair | BodySource]] = {
         "material": scene.materials,
         "pair": scene.pairs,

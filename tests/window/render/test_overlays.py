@@ -234,7 +234,7 @@ def test_course_of_a_path_is_drawn_in_the_joints_overlay():
     model = scene(box=[{**box, "path": path}])
     left, top, right, bottom = pixel_box(overlay_pixels(model, "joints"))
     assert left >= 36 and right == pytest.approx(163, abs=2)  # from 2 m inside the box to a disc of 3 px around 160 px
-    assert 55 <= top and bottom <= 65
+    assert top >= 55 and bottom <= 65
     dots = overlay_pixels(model, "joints")[70:150, 60]
     assert 0.3 < dots.mean() < 0.9  # a dotted line, with antialiased ends
     door = scene(box=[{**box, "path": {"angles": [0.0, 3.0], "pivot": [2.0, 0.0], "period": 1.0}}])
