@@ -95,9 +95,6 @@ def _objects(setup: Setup) -> Iterator[Obstacle]:
     if bodies.one_way:
         names = _listed([bodies.names[index] for index in bodies.one_way])
         yield Obstacle("", f"one-way bodies need callbacks with a memory: {names}")
-    if bodies.paths:
-        names_on_paths = _listed([bodies.names[index] for index in bodies.paths])
-        yield Obstacle("", f"a path needs a clock, which the game has, and its velocity in each step: {names_on_paths}")
     if np.isfinite(setup.bodies.lifetime).any():
         yield Obstacle("emitter", "bodies with a lifetime are removed by a clock")
     breakable = [joints.names[k] or f"number {k + 1}" for k in np.flatnonzero(np.isfinite(joints.strength)).tolist()]

@@ -13,7 +13,7 @@ The pose depends on the time only, so that it has no error that grows with the n
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -78,9 +78,11 @@ def cycle_of(path: BodyPath) -> list[Stop]:
     return stops
 
 
-class _Leg(NamedTuple):
+class Leg(NamedTuple):
     """Way between two stops."""
 
+    begin: float
+    """s, since `path.start`"""
     duration: float
     """s"""
     tail: Stop
@@ -93,21 +95,22 @@ class PathMotion:
     def __init__(self, single: BodySpec) -> None:
         assert single.path is not None
         self.path = path = single.path
-        self._position, self._angle = single.position, single.angle
-        self._centre = geometry_of(single).centre
-        self._ease: Callable[[float], float] | None = smooth if path.easing == "smooth" else None
-        self._legs = _legs(path)
-        self._begins, self.cycle = self._schedule()
-        """s, times since `path.start` at which legs begin, and at which the cycle ends"""
-
-    def _schedule(self) -> tuple[list[float], float]:
-        begins, time = [], 0.0
-        for leg in self._legs:
-            begins.append(time)
-            time += leg.duration + self.path.pause
-        if self.path.period is not None and self.path.repeat != "once":
-            time = self.path.period  # which the sum is up to rounding
-        return begins, time
+        (px, py), (cx, cy), (qx, qy) = single.position, geometry_of(single).centre, path.pivot
+        self.angle = angle = single.angle
+        """rad, without a turn"""
+        cos, sin = math.cos(angle), math.sin(angle)
+        dx, dy = rotate(cx, cy, cos, sin) if cx or cy else (0.0, 0.0)
+        self.centre: Point = (px + dx, py + dy)
+        """position of the centre of mass without displacement and turn, m"""
+        dx, dy = rotate(qx, qy, cos, sin)
+        self.pivot: Point = (px + dx, py + dy)
+        """position of the pivot without displacement, m"""
+        self.lever: Point = (cx - qx, cy - qy)
+        """the centre of mass from the pivot, in the frame of the body, m"""
+        self.is_smooth = path.easing == "smooth"
+        self.legs, self.cycle = _schedule(path)
+        """s, duration of a cycle"""
+        self._begins = [leg.begin for leg in self.legs]
 
     def pose(self, time: float) -> PathPose:
         """Return the pose at a time of the scene, s."""
@@ -117,30 +120,24 @@ class PathMotion:
         """Return the displacement, m, and the turn, rad, at a time, s."""
         elapsed = time - self.path.start
         if elapsed <= 0.0:
-            return self._legs[0].tail
+            return self.legs[0].tail
         if self.path.repeat != "once":
             elapsed = math.fmod(elapsed, self.cycle)
-        k = bisect_right(self._begins, elapsed) - 1
-        duration, tail, head = self._legs[k]
-        passed = elapsed - self._begins[k]
+        begin, duration, tail, head = self.legs[bisect_right(self._begins, elapsed) - 1]
+        passed = elapsed - begin
         if passed >= duration:
             return head
-        s = passed / duration
-        if self._ease is not None:
-            s = self._ease(s)
+        s = smooth(passed / duration) if self.is_smooth else passed / duration
         rest = 1.0 - s
         return rest * tail[0] + s * head[0], rest * tail[1] + s * head[1], rest * tail[2] + s * head[2]
 
     def _pose_at(self, x: float, y: float, turn: float) -> PathPose:
         """Return the pose at a displacement, m, and a turn, rad."""
-        (px, py), (cx, cy), pivot, angle = self._position, self._centre, self.path.pivot, self._angle
         if not turn:
-            if cx or cy:
-                cx, cy = rotate(cx, cy, math.cos(angle), math.sin(angle))
-            return PathPose(px + cx + x, py + cy + y, angle)
-        qx, qy = rotate(*pivot, math.cos(angle), math.sin(angle))
-        lx, ly = rotate(cx - pivot[0], cy - pivot[1], math.cos(angle + turn), math.sin(angle + turn))
-        return PathPose(px + qx + x + lx, py + qy + y + ly, angle + turn)
+            return PathPose(self.centre[0] + x, self.centre[1] + y, self.angle)
+        angle = self.angle + turn
+        dx, dy = rotate(*self.lever, math.cos(angle), math.sin(angle))
+        return PathPose(self.pivot[0] + x + dx, self.pivot[1] + y + dy, angle)
 
     def stops(self) -> list[Point]:
         """Return the positions of the centre of mass at the points of the path, m."""
@@ -162,32 +159,44 @@ class PathMotion:
     @property
     def max_speed(self) -> float:
         """Bound of the speed of the centre of mass, m/s."""
-        lever = math.dist(self._centre, self.path.pivot)
-        peak = PEAK_SPEED[self.path.easing]
-        return max(
-            peak * (math.dist(leg.tail[:2], leg.head[:2]) + lever * abs(leg.head.angle - leg.tail.angle)) / leg.duration
-            for leg in self._legs
-        )
+        radius = math.hypot(*self.lever)
+        speeds = [
+            (math.dist(leg.tail[:2], leg.head[:2]) + radius * abs(leg.head.angle - leg.tail.angle)) / leg.duration
+            for leg in self.legs
+        ]
+        return PEAK_SPEED[self.path.easing] * max(speeds)
 
     @property
     def max_spin(self) -> float:
         """Largest angular velocity, rad/s."""
         peak = PEAK_SPEED[self.path.easing]
-        return max(peak * abs(leg.head.angle - leg.tail.angle) / leg.duration for leg in self._legs)
+        return max(peak * abs(leg.head.angle - leg.tail.angle) / leg.duration for leg in self.legs)
 
 
-def _legs(path: BodyPath) -> list[_Leg]:
-    """Return the legs of a cycle of a valid path, without those between equal stops."""
+def _schedule(path: BodyPath) -> tuple[list[Leg], float]:
+    """Return the legs of a cycle of a valid path, without those between equal stops, and the duration of the cycle."""
     pairs = [(tail, head) for tail, head in pairwise(cycle_of(path)) if tail != head]
     lengths = [math.dist(tail[:2], head[:2]) for tail, head in pairs]
     if path.speed is not None:
-        return [_Leg(length / path.speed, *pair) for length, pair in zip(lengths, pairs, strict=True)]
-    assert path.period is not None
-    if not any(lengths):
-        lengths = [abs(head.angle - tail.angle) for tail, head in pairs]
-    moving = path.period - path.pause * (len(pairs) - (path.repeat == "once"))
-    unit = moving / sum(lengths)
-    return [_Leg(length * unit, *pair) for length, pair in zip(lengths, pairs, strict=True)]
+        durations = [length / path.speed for length in lengths]
+    else:
+        assert path.period is not None
+        if not any(lengths):
+            lengths = [abs(head.angle - tail.angle) for tail, head in pairs]
+        unit = (path.period - _waiting(path, len(pairs))) / sum(lengths)
+        durations = [length * unit for length in lengths]
+    legs, time = list[Leg](), 0.0
+    for duration, (tail, head) in zip(durations, pairs, strict=True):
+        legs.append(Leg(time, duration, tail, head))
+        time += duration + path.pause
+    if path.period is not None:
+        time = path.period  # which the sum is up to rounding
+    return legs, time
+
+
+def _waiting(path: BodyPath, legs: int) -> float:
+    """Return the duration of the pauses of a cycle with a number of legs, s: a path made once does not end with one."""
+    return path.pause * (legs - (path.repeat == "once"))
 
 
 def path_faults(single: BodySpec) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -232,6 +241,6 @@ def _time_faults(path: BodyPath) -> Iterator[tuple[tuple[str, ...], str]]:
             "must not change between two points at one place, which takes no time; move the points apart",
         )
         return
-    waiting = path.pause * (len(pairs) - (path.repeat == "once"))
+    waiting = _waiting(path, len(pairs))
     if path.period is not None and not path.period > waiting:
         yield ("path", "period"), f"must be longer than the pauses of a cycle, which take {waiting:g} s"
