@@ -238,6 +238,7 @@ if TYPE_CHECKING:
         Setup as Setup,
     )
     from sandbox.scene.description.base import (
+        BodyPath as BodyPath,
         BodySource as BodySource,
         BodySpec as BodySpec,
     )
@@ -397,7 +398,7 @@ _NAMES = {
     "sandbox.scene.compile.joint_arrays": "JointArrays",
     "sandbox.scene.compile.scene": "Scene",
     "sandbox.scene.compile.setup": "Setup",
-    "sandbox.scene.description.base": "BodySource BodySpec",
+    "sandbox.scene.description.base": "BodyPath BodySource BodySpec",
     "sandbox.scene.description.bodies": "BallPart Box BoxPart Capsule CapsulePart Compound Polygon PolygonPart",
     "sandbox.scene.description.discs": "Ball Emitter Grid Scatter",
     "sandbox.scene.description.fixed": "Plane Post Wall Zone",

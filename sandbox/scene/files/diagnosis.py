@@ -274,7 +274,7 @@ _SYNONYMS: dict[str, set[str]] = {
     "restitution": {"bounce", "bounciness", "elasticity"},
     "friction": {"friction_coefficient", "mu"},
     "mass": {"density", "weight"},
-    "period": {"duration", "time"},
+    "period": {"cycle", "time"},
     "repeat": {"loop", "mode", "pingpong"},
     "easing": {"ease", "interpolation", "transition"},
     "pause": {"dwell", "wait"},
