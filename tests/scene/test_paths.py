@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.paths import PEAK_ACCELERATION, PathMotion
@@ -116,10 +118,42 @@ def test_polygon_turns_about_its_origin_and_not_its_centre_of_mass() -> None:
     assert pose == pytest.approx((1.0, 1.0, math.pi / 2.0), abs=ROUNDING)
 
 
+def test_speed_is_1_by_default() -> None:
+    assert poses({"points": [[0, 0], [4, 0]]}, [1.5, 7.0])[:, 0] == pytest.approx([1.5, 1.0], abs=ROUNDING)
+    assert poses({"angles": [0.0, 0.5]}, [0.25, 0.75])[:, 2] == pytest.approx([0.25, 0.25], abs=ROUNDING)
+
+
 def test_pose_has_no_error_that_grows_with_time() -> None:
     path = {"points": [[0, 0], [1, 0]], "period": 4.0, "easing": "smooth"}
     early, late = poses(path, [0.75, 0.75 + 4.0 * 2**28])  # both times are exact in binary
     assert early.tolist() == late.tolist()
+
+
+COORDINATES = st.tuples(*2 * [st.floats(-9.0, 9.0).map(lambda x: round(x, 2))])
+
+
+@pytest.mark.fail_slow(60)  # a hundred examples
+@given(data=st.data())
+def test_every_path_is_continuous_and_never_faster_than_its_bound(data: st.DataObject) -> None:
+    """Also at corners and pauses, at the end of a cycle, and at the start; a cycle later it is at the same place."""
+    points = data.draw(st.lists(COORDINATES, min_size=2, max_size=5, unique=True))
+    path = {
+        "points": [list(each) for each in points],
+        "angles": data.draw(st.just([]) | st.lists(st.floats(-3, 3), min_size=len(points), max_size=len(points))),
+        data.draw(st.sampled_from(["speed", "period"])): data.draw(st.floats(5.0, 50.0)),
+        "pause": data.draw(st.sampled_from([0.0, 0.25])),
+        "repeat": data.draw(st.sampled_from(["there_and_back", "loop", "once"])),
+        "easing": data.draw(st.sampled_from(["linear", "smooth"])),
+        "start": data.draw(st.floats(-3.0, 3.0)),
+    }
+    follows, h = motion(path), 0.01
+    times = np.arange(-1.0, min(follows.cycle, 8.0) + 1.0, h).tolist()
+    rates = np.diff([follows.pose(time) for time in times], axis=0) / h
+    assert np.hypot(*rates[:, :2].T).max() <= follows.max_speed * (1.0 + 1e-9) + 1e-9  # rounding over h
+    assert np.abs(rates[:, 2]).max() <= follows.max_spin * (1.0 + 1e-9) + 1e-9  # likewise
+    if path["repeat"] != "once":
+        time = max(path["start"], 0.0) + 0.3
+        assert follows.pose(time + follows.cycle) == pytest.approx(follows.pose(time), abs=1e-9)  # rounding of the time
 
 
 POINTS = [[0, 0], [4, 0]]
@@ -137,7 +171,6 @@ POINTS = [[0, 0], [4, 0]]
         ({"speed": 1}, {}, "path.points", "must be at least 2"),
         ({"points": POINTS, "angles": [0, 1, 2], "speed": 1}, {}, "path.angles", "must be 2 angles"),
         ({"points": POINTS, "speed": 1, "pivot": [1, 0]}, {}, "path.pivot", "has no effect without `angles`"),
-        ({"points": POINTS}, {}, "path", "needs `speed` or `period`"),
         ({"points": POINTS, "speed": 1, "period": 2}, {}, "path.speed", "cannot be combined with `period`"),
         ({"points": [[1, 1], [1, 1]], "speed": 1}, {}, "path.points", "are all at one place"),
         ({"angles": [0, 1], "speed": 1}, {}, "path.speed", "has no meaning for a path that only turns"),
@@ -149,6 +182,8 @@ POINTS = [[0, 0], [4, 0]]
         ),
         ({"points": POINTS, "period": 2, "pause": 1}, {}, "path.period", "longer than the pauses of a cycle"),
         ({"points": POINTS, "speed": 1, "easing": "bounce"}, {}, "path.easing", ""),
+        ({"points": POINTS, "speed": 1e12, "easing": "smooth"}, {}, "path", "moves the body at up to 1.875e+12 m/s"),
+        ({"points": [[0, 0], [1e16, 0]], "speed": 1}, {"position": [1e15, 0]}, "path", "leads more than 1e+16 m"),
         ({"points": POINTS, "speed": -1}, {}, "path.speed", ""),
     ],
 )

@@ -177,12 +177,11 @@ def _schedule(path: BodyPath) -> tuple[list[Leg], float]:
     """Return the legs of a cycle of a valid path, without those between equal stops, and the duration of the cycle."""
     pairs = [(tail, head) for tail, head in pairwise(cycle_of(path)) if tail != head]
     lengths = [math.dist(tail[:2], head[:2]) for tail, head in pairs]
-    if path.speed is not None:
-        durations = [length / path.speed for length in lengths]
+    if not any(lengths):
+        lengths = [abs(head.angle - tail.angle) for tail, head in pairs]
+    if path.period is None:
+        durations = [length / (1.0 if path.speed is None else path.speed) for length in lengths]
     else:
-        assert path.period is not None
-        if not any(lengths):
-            lengths = [abs(head.angle - tail.angle) for tail, head in pairs]
         unit = (path.period - _waiting(path, len(pairs))) / sum(lengths)
         durations = [length * unit for length in lengths]
     legs, time = list[Leg](), 0.0
@@ -223,9 +222,8 @@ def path_faults(single: BodySpec) -> Iterator[tuple[tuple[str, ...], str]]:
 
 def _time_faults(path: BodyPath) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the faults of the duration of a path with as many points as angles."""
-    if (path.speed is None) == (path.period is None):
-        given = "cannot be combined with `period`; remove one of the two" if path.speed else "needs `speed` or `period`"
-        yield ("path", "speed") if path.speed else ("path",), given
+    if path.speed is not None and path.period is not None:
+        yield ("path", "speed"), "cannot be combined with `period`; remove one of the two"
         return
     pairs = [(tail, head) for tail, head in pairwise(cycle_of(path)) if tail != head]
     if not pairs:

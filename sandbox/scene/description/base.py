@@ -285,16 +285,16 @@ class BodyPath(Part):
     pivot: PointField = default((0.0, 0.0))
     """point of the body, in its frame, about which it turns and which goes to the points, m; default: its origin"""
     speed: Annotated[float, Field(ge=1e-9, le=MAX_SPEED)] | None = None
-    """mean speed from each point to the next, m/s; a path has either this or `period`"""
+    """mean speed from each point to the next, m/s; default: by `period`, or 1 m/s (1 rad/s if the body only turns)"""
     period: Annotated[float, Field(ge=1e-9, le=1e12)] | None = None
-    """duration of a cycle with its pauses, s: there and back, once around, or once to the end"""
+    """duration of a cycle with its pauses, s, in place of `speed`: there and back, once around, or once to the end"""
     repeat: Literal["there_and_back", "loop", "once"] = "there_and_back"
     """after the last point: back through all points, on to the first point and around, or stay"""
     easing: Literal["linear", "smooth"] = "linear"
     """between two points: at constant speed, or from rest to rest along a fifth-order polynomial (minimum jerk)"""
     pause: Annotated[float, Field(ge=0, le=1e12)] = 0.0
     """time for which it waits at each point that it arrives at, s"""
-    start: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    start: Annotated[float, Field(ge=-1e9, le=1e9)] = 0.0
     """time at which it leaves the first point, s, where it waits until then; below 0, it is on its way at 0"""
 
 

@@ -337,6 +337,12 @@ def _check_initial_state(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessag
     ):
         for element in distinct(bodies.element[wrong]):
             yield prototypes[element][0], message
+    for index, motion in bodies.paths.items():
+        location = *prototypes[int(bodies.element[index])][0], "path"
+        if motion.max_speed > MAX_SPEED:
+            yield location, f"moves the body at up to {motion.max_speed:g} m/s; the limit is {MAX_SPEED:g} m/s"
+        if np.abs(motion.stops()).max() > MAX_POSITION:
+            yield location, f"leads more than {MAX_POSITION:g} m from the origin"
     if scene.world.bounds is not None:
         lower, upper = np.asarray(scene.world.bounds)
         outside = ((bodies.position < lower) | (bodies.position > upper)).any(axis=1)
