@@ -24,7 +24,6 @@ from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.draw_context import FARTHEST, Canvas
 from sandbox.window.render.lines import draw_arrow, draw_dashes, draw_line
 from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, PURPLE, SKY, WARNING, YELLOW, RgbColour, mix_colours
-from sandbox.window.render.paths import draw_paths
 from sandbox.window.render.text import TextPlate, draw_box, draw_text, text_size
 
 MAX_OUTLINES = 1_000
@@ -71,7 +70,6 @@ def draw_overlay(canvas: Canvas, editor: Editor, view: ViewScale) -> None:
     """Draw everything of the editor that lies on the scene."""
     scene, gesture = editor.scene, editor.gesture
     _draw_forces(canvas, scene)
-    draw_paths(canvas, scene.bodies)
     if editor.hovered is not None and gesture is None and editor.hovered not in editor.selection:
         _draw_outlines(canvas, scene, editor.hovered, mix_colours(SKY, INK, 0.5), 1.0)
     faulty, message = editor.fault or ([], "")
