@@ -231,6 +231,10 @@ if TYPE_CHECKING:
     from sandbox.scene.compile.joint_arrays import (
         JointArrays as JointArrays,
     )
+    from sandbox.scene.compile.paths import (
+        PathMotion as PathMotion,
+        PathPose as PathPose,
+    )
     from sandbox.scene.compile.scene import (
         Scene as Scene,
     )
@@ -396,6 +400,7 @@ _NAMES = {
     "sandbox.scene.compile.bodies": "Bodies",
     "sandbox.scene.compile.demands": "Demand demands",
     "sandbox.scene.compile.joint_arrays": "JointArrays",
+    "sandbox.scene.compile.paths": "PathMotion PathPose",
     "sandbox.scene.compile.scene": "Scene",
     "sandbox.scene.compile.setup": "Setup",
     "sandbox.scene.description.base": "BodyPath BodySource BodySpec",

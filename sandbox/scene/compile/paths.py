@@ -90,7 +90,13 @@ class Leg(NamedTuple):
 
 
 class PathMotion:
-    """Motion of a body along its path: pose by time, and bounds of speed."""
+    """Motion of a body along its path: pose by time, and bounds of speed.
+
+    Example:
+        >>> bodies = sandbox.load("games/moving_platforms").bodies
+        >>> bodies.paths[bodies.number_of["lift"]].pose(2.0)
+        PathPose(x=-5.2, y=2.1, angle=0.0)
+    """
 
     def __init__(self, single: BodySpec) -> None:
         assert single.path is not None
