@@ -17,6 +17,7 @@ from sandbox.pymunk_export import obstacles
 from sandbox.scene.compile.demands import Demand
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
+from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
 from tests.engines.stepping import advance
@@ -250,3 +251,16 @@ def test_body_of_several_shapes_is_refused() -> None:
     body = {"name": "a", "position": [0, 0], "fixed": True, "one_way": [0, 1], "ball": [{"radius": 1.0}]}
     with pytest.raises(SceneError, match=r"body\.a\.one_way: is not supported for a \[\[body\]\] of several shapes"):
         from_document({"body": [body]})
+
+
+@every_engine
+def test_body_that_passed_when_the_run_was_continued_is_not_passing_again_when_another_is_added(engine: str) -> None:
+    scene = scene_of({"position": [0.5, -0.3], "velocity": [0.0, 5.0]})
+    simulation = advance(sandbox.start(scene, engine), 10)
+    assert simulation.frame().passing is not None
+    simulation.apply(Switch(time=0.0, engine=engine, settings={"iterations": 20}))
+    assert advance(simulation, 300).frame().position[0, 1] == pytest.approx(0.2, abs=2e-3)  # slop
+    simulation.apply(Spawn(time=0, ball=Ball(name="new", position=(9.0, 9.0), radius=0.1)))
+    assert simulation.frame().passing is None
+    assert advance(simulation, 50).frame().position[0, 1] == pytest.approx(0.2, abs=2e-3)  # slop
+    simulation.close()

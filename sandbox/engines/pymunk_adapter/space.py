@@ -87,6 +87,7 @@ class SpaceBodies:
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._paths = SpacePaths(setup.time, settings.h)
         self._one_way: set[int] = set()  # indices of one-way bodies
+        self._continues = setup.time > 0.0  # until the first bodies have joined
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
@@ -121,10 +122,11 @@ class SpaceBodies:
             self._add(index, bodies, state)
         self._register()
         self.drives.add_callbacks(self._collision_types)
-        if self._setup.time and self._surface_setter.one_way_walls.any_left:
+        if self._continues and self._surface_setter.one_way_walls.any_left:
             walls = {index: each for each, index in self._one_way_ids.items()}
             pairs = [(n, walls[wall]) for n, wall in self._setup.passing if n in self._members]
             self._surface_setter.one_way_walls.resume([(self._members[n].body.id, wall) for n, wall in pairs])
+        self._continues = False
 
     def _body(self, index: int) -> pymunk.Body:
         return self._members[index].body
