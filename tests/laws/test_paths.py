@@ -329,3 +329,27 @@ def test_kinematic_bodies_on_paths_can_be_built_in_python_and_written_to_a_file(
     scene = sandbox.Scene(boxes=[lift])
     assert loads(dumps(scene)) == scene
     assert scene.bodies.paths[0].pose(1.0).x == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "box2d"])  # reference has no joints to kinematic bodies
+def test_trolley_carries_a_load_on_a_rod(engine: str) -> None:
+    """The load swings by the formula of a pendulum whose support moves along x(t): L θ'' = −g sin θ − x'' cos θ."""
+    path = {"points": [[0, 0], [2, 0]], "period": 3.0, "repeat": "once", "easing": "smooth"}
+    trolley = platform(path, name="trolley", size=[0.4, 0.2], collides="none")
+    ball = {"name": "load", "position": [0.0, -1.0], "radius": 0.1, "collides": "none"}
+    rod = {"kind": "rod", "between": ["trolley", "load"], "anchors": [[0, 0], [0, 0]]}
+    scene = scene_of(trolley, ball=[ball], joint=[rod], duration=3.0, dt=1 / 2000)
+    run = sandbox.run(scene, engine, record_every=20)
+    follows_path(run, scene, 1)
+    arm = run.position[:, 0] - run.position[:, 1]
+    assert np.hypot(*arm.T) == pytest.approx(1.0, abs=2e-3)  # of order 1: v h
+    h, theta, rate = 1e-4, 0.0, 0.0  # leapfrog, whose error is of order h²
+    motion = scene.bodies.paths[1]
+    for k in range(round(3.0 / h)):
+        x = [motion.pose(time).x for time in (k * h - 1e-3, k * h, k * h + 1e-3)]
+        rate += h * (-G * math.sin(theta) - (x[0] - 2.0 * x[1] + x[2]) / 1e-6 * math.cos(theta))
+        theta += h * rate
+    assert math.atan2(arm[-1, 0], -arm[-1, 1]) == pytest.approx(theta, abs=0.01)  # of order 1 in the substep
+    assert np.abs(np.arctan2(arm[:, 0], -arm[:, 1])).max() > 0.1
+    if engine == "pymunk":
+        closed_account(scene, 1000, engine=engine, closes=1e-11)  # hundreds of sums
