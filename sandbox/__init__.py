@@ -234,6 +234,10 @@ if TYPE_CHECKING:
     from sandbox.scene.compile.joint_arrays import (
         JointArrays as JointArrays,
     )
+    from sandbox.scene.compile.paths import (
+        PathMotion as PathMotion,
+        PathPose as PathPose,
+    )
     from sandbox.scene.compile.scene import (
         Scene as Scene,
     )
@@ -241,6 +245,7 @@ if TYPE_CHECKING:
         Setup as Setup,
     )
     from sandbox.scene.description.base import (
+        BodyPath as BodyPath,
         BodySource as BodySource,
         BodySpec as BodySpec,
     )
@@ -403,9 +408,10 @@ _NAMES = {
     "sandbox.scene.compile.bodies": "Bodies",
     "sandbox.scene.compile.demands": "Demand demands",
     "sandbox.scene.compile.joint_arrays": "JointArrays",
+    "sandbox.scene.compile.paths": "PathMotion PathPose",
     "sandbox.scene.compile.scene": "Scene",
     "sandbox.scene.compile.setup": "Setup",
-    "sandbox.scene.description.base": "BodySource BodySpec",
+    "sandbox.scene.description.base": "BodyPath BodySource BodySpec",
     "sandbox.scene.description.bodies": "BallPart Box BoxPart Capsule CapsulePart Compound Polygon PolygonPart",
     "sandbox.scene.description.discs": "Ball Emitter Grid Scatter",
     "sandbox.scene.description.fixed": "Plane Post Sensor Wall Zone",

@@ -447,7 +447,8 @@ def _check_completed(arrays: Mapping[str, Array], stated: _Stated) -> None:
     for name in ("position", "velocity", "angle", "angular_velocity"):
         if not np.isfinite(arrays[name][:, :known]).all():
             raise ValueError(f"{name}: has values that are not finite, although the run is complete")
-    hidden = len(scene.layers) > 1 or scene.zones or scene.drives or any(wall.one_way for wall in scene.walls)
+    has_one_way = scene.bodies.one_way or any(wall.one_way for wall in scene.walls)
+    hidden = len(scene.layers) > 1 or scene.zones or scene.drives or has_one_way
     if info.state_hash is None or hidden or not np.isnan(arrays["retired_time"]).all():
         return
     last = [arrays[name][-1] for name in ("position", "velocity", "angle", "angular_velocity")]

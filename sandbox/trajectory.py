@@ -46,8 +46,8 @@ class Frame:
     """(D, 3) state of each drive: level; torque in N·m, or pull of a plunger in m; rate of that pull in m/s. None
     without drives"""
     passing: IntArray | None = None
-    """(P, 2) pairs of a body and a one-way wall that it is passing; the wall is −1 − k. None if there are no such pairs
-    """
+    """(P, 2) pairs of a body and the one-way wall, −1 − k, or one-way body that it is passing; None without
+    any"""
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""

@@ -1,4 +1,4 @@
-"""Sample scenes: thirteen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: fourteen shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -17,6 +17,7 @@ SAMPLE_SCENES = (
     "games/conveyor",
     "games/curling",
     "games/landing",
+    "games/moving_platforms",
     "games/rube_goldberg",
     "games/table_tennis",
     "joints/atwood",

@@ -70,12 +70,13 @@ def present_bodies(bodies: Bodies, frame: Frame) -> Bodies:
 
 
 def passing_in(frame: Frame) -> Passing:
-    """Return the pairs of a body and the one-way wall that it is passing through, by indices of `present_bodies`."""
+    """Return the pairs of a body and the one-way wall or body that it is passing, by indices of `present_bodies`."""
     if frame.passing is None:
         return ()
-    present = np.flatnonzero(frame.present)
-    body_indices = np.searchsorted(present, frame.passing[:, 0])
-    return tuple(zip(body_indices.tolist(), frame.passing[:, 1].tolist(), strict=True))
+    own_index = np.cumsum(frame.present) - 1
+    passed = frame.passing[:, 1]
+    passed = np.where(passed >= 0, own_index[np.maximum(passed, 0)], passed)
+    return tuple(zip(own_index[frame.passing[:, 0]].tolist(), passed.tolist(), strict=True))
 
 
 @dataclass(eq=False)
@@ -164,7 +165,7 @@ class Segment:
         visits = self._expanded(frame.visits, np.zeros_like(self.bodies.visits))
         passing = frame.passing
         if passing is not None:
-            passing = np.column_stack((self.body_indices[passing[:, 0]], passing[:, 1]))
+            passing = self._session_pairs(passing)
         return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives, passing)
 
     def _expanded(self, values: IntArray | None, initial: IntArray, last: IntArray | None = None) -> IntArray | None:

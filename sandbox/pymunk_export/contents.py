@@ -23,6 +23,7 @@ from sandbox.engines.sensors import sensor_names
 from sandbox.pymunk_export.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, JointKind
+from sandbox.scene.compile.paths import PathMotion
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
@@ -165,6 +166,11 @@ class Contents:
         return bool(self._thrusts)
 
     @property
+    def has_paths(self) -> bool:
+        """Whether a body moves along a path."""
+        return bool(self.setup.bodies.paths)
+
+    @property
     def static_order(self) -> list[int] | None:
         """Order in which the engine adds static shapes; None if it is theirs."""
         fixed = self.setup.scene.fixed
@@ -232,6 +238,9 @@ class Contents:
                 "angular_velocity": literal(float(bodies.angular_velocity[index])),
             }
             state += ["body.velocity = {velocity}", "body.angular_velocity = {angular_velocity}"]
+        if index in bodies.paths:
+            values["path"] = literal(_path_values(bodies.paths[index]))
+            state += ["body.path = {path}", f"body.pose = pose_on_path(body.path, {literal(self.setup.time)})"]
         if name in self._thrusts:
             values["thrust"] = literal(self._thrusts[name])
             state.append("body.thrust = {thrust}")
@@ -342,6 +351,14 @@ def _shape_of(corners: list[tuple[float, ...]], radius: float, ending: str) -> t
         case _:
             values[f"corners{ending}"] = literal(corners)
             return f"pymunk.Poly(body, {{corners{ending}}}, radius={rounding})", values
+
+
+def _path_values(motion: PathMotion) -> tuple[object, ...]:
+    """Return the values of a path of which the program computes poses, as its `pose_on_path` takes them."""
+    legs = tuple((leg.begin, leg.duration, tuple(leg.tail), tuple(leg.head)) for leg in motion.legs)
+    cycle = None if motion.path.repeat == "once" else motion.cycle
+    frame = motion.centre, motion.pivot, motion.lever, motion.angle
+    return motion.path.start, cycle, motion.is_smooth, frame, legs
 
 
 def _thrusts_by_body(setup: Setup) -> dict[str, tuple[float, float, float]]:

@@ -105,6 +105,10 @@ def _objects(setup: Setup) -> Iterator[Obstacle]:
     one_way = [name for name, wall in zip(_wall_names(scene), scene.walls, strict=True) if wall.one_way]
     if one_way:
         yield Obstacle("wall", f"one-way walls need callbacks with a memory: {_listed(one_way)}")
+    bodies = setup.bodies
+    if bodies.one_way:
+        names = _listed([bodies.names[index] for index in bodies.one_way])
+        yield Obstacle("", f"one-way bodies need callbacks with a memory: {names}")
     if np.isfinite(setup.bodies.lifetime).any():
         yield Obstacle("emitter", "bodies with a lifetime are removed by a clock")
     breakable = [joints.names[k] or f"number {k + 1}" for k in np.flatnonzero(np.isfinite(joints.strength)).tolist()]

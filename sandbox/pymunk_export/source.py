@@ -78,10 +78,11 @@ def program_text(
         *_main(contents),
     ]
     text = "\n".join(parts)
-    return "\n".join([*_header(setup.scene, note, has_infinity="INFINITY" in text), text]) + "\n"
+    header = _header(setup.scene, note, has_infinity="INFINITY" in text, has_paths=contents.has_paths)
+    return "\n".join([*header, text]) + "\n"
 
 
-def _header(scene: Scene, note: str, has_infinity: bool) -> Iterator[str]:
+def _header(scene: Scene, note: str, *, has_infinity: bool, has_paths: bool) -> Iterator[str]:
     yield from (
         '"""A scene as a program for pymunk, written by `sandbox export`.',
         "",
@@ -89,6 +90,7 @@ def _header(scene: Scene, note: str, has_infinity: bool) -> Iterator[str]:
         f"of `sandbox run` on the engine pymunk, bit for bit, with pymunk {version('pymunk')}.",
         '"""',
         "",
+        *(("import math", "") if has_paths else ()),
         "import pymunk",
         "",
     )
@@ -285,6 +287,8 @@ def _make_space(contents: Contents, static: list[str], bodies: list[str], joints
         yield "        unused = pymunk.Circle(space.static_body, 1.0)"
         yield "        space.add(unused)"
         yield "        space.remove(unused)"
+    if contents.has_paths:
+        yield "    space.frames = 0  # made so far: the poses of bodies on paths follow from the time"
     yield "    bodies = {}"
     if contents.surfaces.rules:
         yield from _indented(["", *comment("Pairs of materials whose coefficients are no products of factors.")])
@@ -361,7 +365,48 @@ def _indented(lines: Sequence[str]) -> Iterator[str]:
     return (f"    {line}" if line else "" for line in lines)
 
 
+PATHS = '''
+def pose_on_path(path, time):
+    """Return x, y, m, and the angle, rad, of a body on its path at a time, s."""
+    start, cycle, is_smooth, (centre, pivot, lever, angle), legs = path
+    elapsed = time - start
+    if elapsed > 0.0 and cycle is not None:
+        elapsed = math.fmod(elapsed, cycle)
+    # Each leg has its begin and duration, s, and displacement, m, and turn, rad, at both ends.
+    begin, duration, tail, head = next((leg for leg in reversed(legs) if leg[0] <= elapsed), legs[0])
+    if elapsed <= 0.0:
+        x, y, turn = tail
+    elif elapsed - begin >= duration:  # it waits at the end of the leg
+        x, y, turn = head
+    else:
+        s = (elapsed - begin) / duration
+        if is_smooth:  # at rest at both ends
+            s = s * s * s * (s * (s * 6.0 - 15.0) + 10.0)
+        x, y, turn = ((1.0 - s) * a + s * b for a, b in zip(tail, head))
+    if not turn:
+        return centre[0] + x, centre[1] + y, angle
+    angle += turn
+    cos, sin = math.cos(angle), math.sin(angle)
+    dx, dy = cos * lever[0] - sin * lever[1], sin * lever[0] + cos * lever[1]
+    return pivot[0] + x + dx, pivot[1] + y + dy, angle
+
+
+def follow_paths(space, time, h):
+    """Give the bodies on paths the velocity that leads to their pose after a step of h, s, from a time, s."""
+    for body in space.bodies:
+        path = getattr(body, "path", None)
+        if path is not None:
+            (x, y, angle), (end_x, end_y, end_angle) = body.pose, pose_on_path(path, time + h)
+            body.position, body.angle = (x, y), angle  # without the rounding of the last step
+            body.velocity = (end_x - x) / h, (end_y - y) / h
+            body.angular_velocity = (end_angle - angle) / h
+            body.pose = end_x, end_y, end_angle
+'''
+
+
 def _step(contents: Contents) -> Iterator[str]:
+    if contents.has_paths:
+        yield PATHS
     if contents.has_thrusts:
         yield from (
             "",
@@ -380,11 +425,18 @@ def _step(contents: Contents) -> Iterator[str]:
         "def step(space):",
         '    """Advance by one frame, DT."""',
         "    h = DT / SUBSTEPS",
-        "    for _ in range(SUBSTEPS):",
     )
+    if contents.has_paths:
+        began = contents.setup.time
+        time = f"{literal(began)} + (space.frames * DT + k * h)" if began else "space.frames * DT + k * h"
+        yield from ("    for k in range(SUBSTEPS):", f"        follow_paths(space, {time}, h)")
+    else:
+        yield "    for _ in range(SUBSTEPS):"
     if contents.has_thrusts:
         yield from ("        for body in space.bodies:", "            apply_thrust(body, h)")
     yield "        space.step(h)"
+    if contents.has_paths:
+        yield "    space.frames += 1"
     if contents.setup.scene.world.bounds is not None:
         yield from (
             "    (left, bottom), (right, top) = BOUNDS",

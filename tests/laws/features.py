@@ -82,6 +82,23 @@ FEATURES: dict[str, Document] = {
     "categories": {"wall": [{**_WALL, "categories": ["curtain"]}], "ball": [_ball("c", -2.0, mask=["stage"])]},
     "groups": {"ball": [_ball("c", -2.0, group="crowd"), _ball("d", -2.5, group="crowd")], "wall": [_WALL]},
     "kinematic body": {"box": [{**_box("c", 0.0), "position": [0.0, 1.5], "kinematic": True, "velocity": [0.5, 0.5]}]},
+    "path": {
+        "box": [
+            {
+                **_box("c", 0.0),
+                "position": [0.0, 1.5],
+                "kinematic": True,
+                "path": {
+                    "points": [[0, 0], [0.5, 0.5]],
+                    "angles": [0, 0.3],
+                    "period": 0.7,
+                    "easing": "smooth",
+                    "start": -0.1,
+                },
+            }
+        ]
+    },
+    "one-way body": {"box": [{**_box("c", 0.0), "position": [0.0, 1.7], "fixed": True, "one_way": [0.0, -1.0]}]},
     "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},
     "zone": {"zone": [{"position": [0.0, 2.5], "radius": 2.0}]},
     "sensors": {

@@ -403,6 +403,26 @@ PROOFS: dict[Demand, Proof] = {
         ),
         both(position(0.325 - 3.0 * 0.675, 0.0), position(0.4, 0.0, body=1)),
     ),
+    # the same with a paddle on a path, at rest for 0.2 s: it hits the ball at 0.425 s and goes on to its end, for 0.6 s
+    Demand.PATHS: Proof(
+        scene(
+            ball=[ball(vx=1.0, restitution=1.0)],
+            box=[
+                box(
+                    1.4,
+                    restitution=1.0,
+                    kinematic=True,
+                    path={"points": [[0.0, 0.0], [-0.6, 0.0]], "speed": 1.0, "repeat": "once", "start": 0.2},
+                )
+            ],
+        ),
+        both(position(0.425 - 3.0 * 0.575, 0.0), position(0.8, 0.0, body=1)),
+    ),
+    # a box that is solid from the right: the ball passes through it
+    Demand.ONE_WAY_BODIES: Proof(
+        scene(ball=[ball(vx=2.0, restitution=1.0)], box=[box(1.0, restitution=1.0, fixed=True, one_way=[1.0, 0.0])]),
+        position(2.0, 0.0),
+    ),
     # gravity within 0.5 m around x = 1: 0.5 s at −4 m/s²
     Demand.ZONES: Proof(
         scene(

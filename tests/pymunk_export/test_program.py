@@ -26,6 +26,8 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
 from tests.engines.stepping import advance
+from tests.laws.test_paths import PATHS, passenger, platform
+from tests.laws.test_paths import scene_of as scene_with_paths
 from tests.pymunk_capture.test_space_capture import (
     balls,
     joints,
@@ -570,3 +572,11 @@ def test_all_reasons_are_given_at_once() -> None:
     assert {each.path for each in found} == paths
     messages = " ".join(each.message for each in found)
     assert all(name in messages for name in ("'corner'", "'gate'", "'late'"))
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_bodies_on_paths_and_their_passengers_have_the_states_of_the_engine(substeps: int) -> None:
+    boxes = [platform(path, name=name, position=[0.0, 10.0 * k]) for k, (name, path) in enumerate(PATHS.items())]
+    carried = [passenger(name=f"passenger-{k}", position=[0.3, 10.0 * k + 0.15]) for k in range(len(boxes))]
+    scene = scene_with_paths(*boxes, *carried, dt=1 / 60, solver={"substeps": substeps})
+    assert not differing(scene, 900)

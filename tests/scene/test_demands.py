@@ -50,6 +50,7 @@ JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.JOINT_BIAS: {"kind": "pivot", "at": [0, 0], "bias": 0},
 }
 
+PATH = {"points": [[0, 0], [1, 0]], "speed": 1}
 CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.TRANSLATION, True, {"ball": [BALL, BALL, ROCK]}, "2 bodies move"),
     (Demand.TRANSLATION, True, {"ball": [BALL]}, "1 body moves"),
@@ -145,6 +146,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.LAYERS, True, {"ball": [{**BALL, "layer": "ramp"}]}, "ground, ramp"),
     (Demand.CATEGORIES, True, {"ball": [{**BALL, "categories": ["player"], "mask": ["enemy"]}]}, "player, enemy"),
     (Demand.KINEMATIC, True, {"ball": [{**BALL, "kinematic": True}]}, "1 body is kinematic"),
+    (Demand.PATHS, True, {"ball": [{**BALL, "kinematic": True, "path": PATH}]}, "1 body moves along a path"),
+    (Demand.ONE_WAY_BODIES, True, {"ball": [{**BALL, "fixed": True, "one_way": [0, 1]}]}, "1 one-way body"),
     (Demand.GROUPS, True, {"ball": [{**BALL, "group": "limbs"}]}, "limbs"),
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.EVENTS, True, {"ball": [NAMED], "event": [{"kind": "remove", "time": 1, "body": "a"}]}, "1"),

@@ -1,4 +1,4 @@
-"""Bodies of stroke and plunger drives: kinematic bodies of Box2D that follow their prescribed motion.
+"""Bodies of stroke and plunger drives, and bodies on paths: kinematic bodies of Box2D with a prescribed motion.
 
 During a step of Box2D such a body has the constant velocity that leads to the end of its motion, which its contacts
 see; afterwards it is placed there exactly.
@@ -16,6 +16,7 @@ from sandbox.engines.common.motors import (
     turn_at_rate,
 )
 from sandbox.scene.compile.drives import Mount
+from sandbox.scene.compile.paths import PathPose
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import PlungerDrive, StrokeDrive
 
@@ -80,3 +81,55 @@ class KinematicDrives:
         spin = 0.0 if arrives else spin
         position, velocity = centre_about_pivot(mount.hinge, drive.pivot, angle, spin)
         return PlannedMotion(position, velocity, angle, spin, pull, rate)
+
+
+class PathStep(NamedTuple):
+    """Motion of a body on a path in a step."""
+
+    end: PathPose
+    velocity: Point
+    """m/s"""
+    spin: float
+    """rad/s"""
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the body does not move."""
+        return not (any(self.velocity) or self.spin)
+
+
+class KinematicPaths:
+    """Bodies of a simulation that follow paths."""
+
+    def __init__(self, store: BodyStore, world: Box2DWorld) -> None:
+        self._store, self._world, self._began = store, world, store.setup.time
+        self._steps: dict[int, PathStep] = {
+            index: PathStep(motion.pose(self._began), (0.0, 0.0), 0.0) for index, motion in store.bodies.paths.items()
+        }
+        self._moving: list[int] = []
+
+    def plan(self, time: float, h: float) -> None:
+        """Give each body the velocity that leads from its pose at a time of the simulation, s, to the one h, s, later.
+
+        A body that stays at rest is left out.
+        """
+        store, self._moving = self._store, []
+        for index, last in self._steps.items():
+            if not store.present[index]:
+                continue
+            (x, y, angle), end = last.end, store.bodies.paths[index].pose(self._began + time + h)
+            step = PathStep(end, ((end.x - x) / h, (end.y - y) / h), (end.angle - angle) / h)
+            self._steps[index] = step
+            if not (step.is_at_rest and last.is_at_rest):
+                self._moving.append(index)
+                self._world.set_velocity(index, step.velocity, step.spin)
+
+    def place(self) -> None:
+        """Place the bodies at the end of their motion, which Box2D has rounded to 32 bits."""
+        store = self._store
+        for index, step in self._steps.items():
+            if store.present[index]:
+                store.position[index], store.angle[index] = step.end[:2], step.end.angle
+                store.velocity[index], store.angular_velocity[index] = step.velocity, step.spin
+        for index in self._moving:
+            self._world.set_pose(index)

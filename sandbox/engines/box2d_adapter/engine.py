@@ -69,6 +69,7 @@ OWN = frozenset(
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
     }
 )
 

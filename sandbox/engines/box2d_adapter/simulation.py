@@ -9,7 +9,7 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.box2d_adapter.bodies import BodyState, ZonedBox2DBodies, far_away, make_store
-from sandbox.engines.box2d_adapter.drives import KinematicDrives
+from sandbox.engines.box2d_adapter.drives import KinematicDrives, KinematicPaths
 from sandbox.engines.box2d_adapter.joints import WorldJoints
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN
 from sandbox.engines.box2d_adapter.world import Box2DWorld, StateRows
@@ -66,6 +66,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         self._world = Box2DWorld(self._store, settings, setup.plane_reach)
         self._joints = WorldJoints(self._world, self._store)
         self._drives = KinematicDrives(self._store, self._world) if setup.scene.drives else None
+        self._paths = KinematicPaths(self._store, self._world) if setup.bodies.paths else None
         self._field = ForceField(self._store)
         self._largest_spin = MAX_TURN * (1.0 - SPIN_ROUNDING) / settings.h
         self._log: ContactLog | None = None
@@ -99,9 +100,10 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
 
     @property
     def _has_varying_forces(self) -> bool:
-        """Whether each substep has to be a step of Box2D: forces depend on the state, or there are drives or zones."""
+        """Whether each substep is a step of Box2D: forces depend on the state, or there are drives, paths or zones."""
         forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
-        return forces or self._joints.has_linear_motors or self._drives is not None or self._zoned is not None
+        moves = self._joints.has_linear_motors or self._drives is not None or self._paths is not None
+        return forces or moves or self._zoned is not None
 
     @property
     def _has_forces(self) -> bool:
@@ -155,11 +157,15 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             self._joints.limit_linear_motors(length)
         if self._drives is not None:
             self._drives.plan(length)
+        if self._paths is not None:
+            self._paths.plan(time, length)
         rows = world.raw_rows(1)
         changed = world.step(length, substeps, rows, 0)
         world.read(rows, 1, length, substeps)
         if self._drives is not None:
             self._drives.place()
+        if self._paths is not None:
+            self._paths.place()
         if self._log is not None and (changed or self._has_entries):
             self._log.record(time, world.contact_batch())
             self._has_entries = False

@@ -402,6 +402,8 @@ def _movable_body_index(name: str, target: ActionTarget) -> int:
     index = _body_index(name, target)
     if target.bodies.fixed[index]:
         raise ActionError(f"{name!r} is fixed and cannot move")
+    if index in target.bodies.paths:
+        raise ActionError(f"{name!r} follows its path: no impulse or force changes its motion")
     if target.bodies.kinematic[index]:
         raise ActionError(f"{name!r} is kinematic: no impulse or force changes its motion; set it by a `move` action")
     _refuse_driven(name, target.scene)
@@ -437,6 +439,8 @@ def _apply_force(action: Force, target: ActionTarget) -> None:
 def _move(action: Move, target: ActionTarget) -> None:
     index = _body_index(action.body, target)
     _refuse_driven(action.body, target.scene)
+    if index in target.bodies.paths:
+        raise ActionError(f"{action.body!r} follows its path, which depends on the time only; it cannot be moved")
     fixed = bool(target.bodies.fixed[index])
     if fixed and (action.velocity not in (None, (0.0, 0.0)) or action.angular_velocity):
         raise ActionError(f"{action.body!r} is fixed; its position can be changed, but it cannot have a velocity")
@@ -472,6 +476,10 @@ def _spawn(action: Spawn, target: ActionTarget) -> None:
         raise ActionError(f"a body or fixed object is already named {name!r}")
     if single.layer not in scene.layers:
         raise ActionError(f"no layer is named {single.layer!r}; layers: {', '.join(scene.layers)}")
+    if single.path is not None:
+        raise ActionError(f"{name!r} has a path, which begins with the scene; it cannot be added during a run")
+    if single.one_way is not None:
+        raise ActionError(f"{name!r} is a one-way body, which cannot be added during a run")
     unknown = [name for name in (*(single.categories or ()), *(single.mask or ())) if name not in scene.categories]
     if unknown:
         known = ", ".join(scene.categories) or "none"

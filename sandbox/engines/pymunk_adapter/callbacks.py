@@ -1,4 +1,4 @@
-"""Collision callbacks: coefficients by pair, kicks and one-way walls.
+"""Collision callbacks: coefficients by pair, kicks, one-way walls and one-way bodies.
 
 `PairCallbacks` sets the coefficients of individual contacts, for those pairs of surfaces that need it. A moving surface
 needs it as well: Munk2D's own surface velocity is the same vector on all sides of a shape. Munk2D separates two bodies
@@ -8,7 +8,8 @@ no kick and no other restitution.
 
 `SpaceOneWayWalls` lets bodies that come from the right of a one-way wall pass, for as long as the two overlap. The
 passing pairs are part of the state from which a run can continue: in the new space, a body that rests on a wall begins
-a new contact at a speed that is rounding error, and could not be distinguished from a body that leaves the wall.
+a new contact at a speed that is rounding error, and could not be distinguished from a body that leaves the wall. A
+one-way body stops others that were beyond its outermost point in its direction, but for the slop, a substep ago.
 
 Munk2D keeps the decision of `begin` on a contact until the contact ends; `pre_solve` is called nevertheless.
 `separate`, which would report the end, cannot be used: it is called for present contacts when a space is freed, and
@@ -34,6 +35,7 @@ from sandbox.engines.common.colliders import LEAN, WallSegment
 from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, rebound
 from sandbox.engines.pymunk_adapter.munk2d_memory import address_of
 from sandbox.scene.compile.contacts import PairTable
+from sandbox.scene.description.base import Point
 from sandbox.scene.description.world import Kick
 from sandbox.scene.geometry.vectors import is_left_of_bend
 
@@ -113,12 +115,14 @@ BodyWallPair: TypeAlias = tuple[int, int]
 
 
 class SpaceOneWayWalls:
-    """One-way walls of a space, and the bodies that are passing them."""
+    """One-way walls and one-way bodies of a space, and the bodies that are passing them."""
 
     def __init__(self, space: pymunk.Space, h: float) -> None:
         self._space, self._h = space, h
         self.walls: set[pymunk.Shape] = set()
         """segments of one-way walls"""
+        self.platforms: dict[pymunk.Shape, Point] = {}
+        """shapes of one-way bodies, and the direction in the body's frame from which each is solid"""
         self.joints: dict[pymunk.Shape, WallSegment] = {}
         """segments of all walls that continue at one of their ends"""
         self.tick = 0
@@ -129,8 +133,13 @@ class SpaceOneWayWalls:
         self._stopped: dict[BodyWallPair, int] = {}  # the substep in which a wall last stopped a body
         self._is_resumed = False
 
+    @property
+    def any_left(self) -> bool:
+        """Whether there are one-way walls or bodies."""
+        return bool(self.walls or self.platforms)
+
     def rebuild(self, surfaces: PairTable, touching: BoolArray) -> None:
-        """Add callbacks for the pairs (S, S) of surfaces of which one may be a one-way wall's."""
+        """Add callbacks for the pairs (S, S) of surfaces of which one may be a one-way wall's or body's."""
         for a, b in np.argwhere(np.triu(touching & (surfaces.one_way | surfaces.one_way[:, None]))).tolist():
             if (a, b) not in self._pairs_with_callback:
                 self._pairs_with_callback.add((a, b))
@@ -171,23 +180,50 @@ class SpaceOneWayWalls:
             self._passing.setdefault(_body_wall_pair(shape, wall), {})[shape, wall] = self._last = self.tick
 
     def _wall_and_other(self, arbiter: pymunk.Arbiter) -> tuple[pymunk.Shape | None, pymunk.Shape]:
-        """Return the shape of a one-way wall, if one of the two is such, and the other shape."""
+        """Return the shape of a one-way wall or body, if one of the two is such, and the other shape."""
         a, b = arbiter.shapes
-        if a in self.walls:
+        if a in self.walls or a in self.platforms:
             return a, b
-        return (b if b in self.walls else None), a
+        return (b if b in self.walls or b in self.platforms else None), a
 
     def _blocks(self, arbiter: pymunk.Arbiter, wall: pymunk.Shape, shape: pymunk.Shape) -> bool:
         """Return whether a wall blocks a body that has just touched it: it came from the left and is not leaving.
 
         Positions have moved by the velocity that the body still has, so its position a substep ago is known.
         """
+        if wall in self.platforms:
+            return (self._is_resumed and self.tick == 1) or self._came_from_solid_side(wall, shape)
         assert isinstance(wall, pymunk.Segment) and shape.body is not None
         side = shape.bb.center() - shape.body.velocity * self._h - wall.a
         if (wall.b - wall.a).cross(side) < 0.0:
             return False
         was_touching = self._is_resumed and self.tick == 1  # in contact before the space was created, and not passing
         return was_touching or closing_speed(arbiter) >= 0.0
+
+    def _came_from_solid_side(self, platform: pymunk.Shape, shape: pymunk.Shape) -> bool:
+        """Return whether a body was beyond a one-way body in its direction a substep ago, but for the slop."""
+        assert platform.body is not None and shape.body is not None
+        angle = platform.body.angle - platform.body.angular_velocity * self._h
+        out = pymunk.Vec2d(*self.platforms[platform]).rotated(angle)
+        top, bottom = self._farthest(platform.body, out), -self._farthest(shape.body, -out)
+        return bottom >= top - self._space.collision_slop
+
+    def _farthest(self, body: pymunk.Body, direction: pymunk.Vec2d) -> float:
+        """Return the largest coordinate of a body along a direction a substep ago, m."""
+        angle, centre = body.angle - body.angular_velocity * self._h, body.center_of_gravity
+        place = body.local_to_world(centre) - body.velocity * self._h
+        local = direction.rotated(-angle)
+        reaches = []
+        for shape in body.shapes:
+            match shape:
+                case pymunk.Circle():
+                    points = [shape.offset]
+                case pymunk.Segment():
+                    points = [shape.a, shape.b]
+                case pymunk.Poly():
+                    points = shape.get_vertices()
+            reaches += [local.dot(point - centre) + shape.radius for point in points]
+        return float(place.dot(direction) + max(reaches))
 
 
 def _body_wall_pair(shape: pymunk.Shape, wall: pymunk.Shape) -> BodyWallPair:
@@ -271,7 +307,7 @@ class PairCallbacks:
     def _set_coefficients(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[PairCoefficients]) -> None:
         if not known:
             return
-        if self.one_way_walls.walls:
+        if self.one_way_walls.any_left:
             self.one_way_walls.record_decision(arbiter)
             if not arbiter.process_collision:
                 return

@@ -11,6 +11,9 @@ torques and displacements. After it, contacts have changed the velocities of dyn
 holds a body that is pressed against a stop; pymunk solves it together with the contacts. If all contacts press the body
 against its stop too, it is immovable for that substep: alternating between contacts and limit would not converge in 10
 iterations.
+
+`SpacePaths` has the kinematic bodies with paths. Before each substep such a body gets its exact pose, and the constant
+velocity that leads to the next one.
 """
 
 import math
@@ -33,6 +36,7 @@ from sandbox.engines.common.motors import (
 )
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import Mount, about_hinge, mounts
+from sandbox.scene.compile.paths import PathMotion
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.forces import PlungerDrive, StrokeDrive, TorqueDrive
 
@@ -334,6 +338,52 @@ class SpacePlunger(SpaceDrivenBody):
 
     def update_centre(self) -> None:
         """Position and velocity are always up to date."""
+
+
+class _PathBody:
+    """Body in the space that follows a path."""
+
+    def __init__(self, motion: PathMotion, body: pymunk.Body, time: float) -> None:
+        self.motion, self.pose = motion, motion.pose(time)
+        self.record: Any = body._body
+        self.is_moving = True
+
+
+class SpacePaths:
+    """Kinematic bodies in the space that follow paths, by their index."""
+
+    def __init__(self, began: float, h: float) -> None:
+        """Start without bodies, at a time of the scene, s; h is the substep, s."""
+        self._began, self._h = began, h
+        self._bodies: dict[int, _PathBody] = {}
+
+    def __len__(self) -> int:
+        return len(self._bodies)
+
+    def join(self, index: int, motion: PathMotion, body: pymunk.Body) -> None:
+        """Move a body that is in the space along its path."""
+        self._bodies[index] = _PathBody(motion, body, self._began)
+
+    def leave(self, index: int) -> None:
+        """Forget a body, by its index, that leaves the space."""
+        self._bodies.pop(index, None)
+
+    def before(self, time: float) -> None:
+        """Prepare the bodies for a substep that starts at a time of the simulation, s.
+
+        Its drift adds one rounding to the pose. A body at rest is not touched.
+        """
+        h, end = self._h, self._began + time + self._h
+        for each in self._bodies.values():
+            pose, each.pose = each.pose, each.motion.pose(end)
+            moves = pose != each.pose
+            if moves or each.is_moving:
+                (x, y, angle), (end_x, end_y, end_angle) = pose, each.pose
+                lib.cpBodySetPosition(each.record, (x, y))
+                lib.cpBodySetAngle(each.record, angle)
+                lib.cpBodySetVelocity(each.record, ((end_x - x) / h, (end_y - y) / h))
+                lib.cpBodySetAngularVelocity(each.record, (end_angle - angle) / h)
+            each.is_moving = moves
 
 
 class SpaceDrives:

@@ -45,6 +45,8 @@ OWN = frozenset(
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
+        Demand.ONE_WAY_BODIES,
     }
 )
 

@@ -54,6 +54,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
         ("drives", scene.drives),
         ("zones", scene.zones),
         ("one-way walls", any(wall.one_way for wall in scene.walls)),
+        ("one-way bodies", Demand.ONE_WAY_BODIES in wanted),
         ("joints that can break", bool(np.isfinite(scene.joint_arrays.strength).any())),
         ("a [surface]", on_floor(scene)),
     ):

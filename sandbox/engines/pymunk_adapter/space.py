@@ -27,7 +27,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 )
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
-from sandbox.engines.pymunk_adapter.drives import SpaceDrives
+from sandbox.engines.pymunk_adapter.drives import SpaceDrives, SpacePaths
 from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
@@ -85,6 +85,9 @@ class SpaceBodies:
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
+        self._paths = SpacePaths(setup.time, settings.h)
+        self._one_way: set[int] = set()  # indices of one-way bodies
+        self._continues = setup.time > 0.0  # until the first bodies have joined
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
@@ -119,10 +122,11 @@ class SpaceBodies:
             self._add(index, bodies, state)
         self._register()
         self.drives.add_callbacks(self._collision_types)
-        if self._setup.time and self._surface_setter.one_way_walls.walls:
-            walls = {index: each for each, index in self._static_shapes.ids.items()}
+        if self._continues and self._surface_setter.one_way_walls.any_left:
+            walls = {index: each for each, index in self._one_way_ids.items()}
             pairs = [(n, walls[wall]) for n, wall in self._setup.passing if n in self._members]
             self._surface_setter.one_way_walls.resume([(self._members[n].body.id, wall) for n, wall in pairs])
+        self._continues = False
 
     def _body(self, index: int) -> pymunk.Body:
         return self._members[index].body
@@ -203,14 +207,20 @@ class SpaceBodies:
         self._state = None
 
     def passing(self) -> IntArray | None:
-        """Return the pairs (P, 2) of a body and the one-way wall, −1 − k, that it passes through; None without any."""
+        """Return the pairs (P, 2) of a body and the one-way wall, −1 − k, or body that it passes; None without any."""
         ids = self._surface_setter.one_way_walls.passing()
         if not ids:
             return None
         indices = {member.body.id: n for n, member in self._members.items()}
-        walls = self._static_shapes.ids
+        walls = self._one_way_ids
         pairs = sorted((indices[body], walls[wall]) for body, wall in ids if body in indices)
         return np.asarray(pairs, np.int64) if pairs else None
+
+    @property
+    def _one_way_ids(self) -> dict[int, int]:
+        """Index of each one-way body, or −1 − k of each static body, by its id."""
+        one_way = {self._members[index].body.id: index for index in self._one_way}
+        return self._static_shapes.ids | one_way
 
     def _collision_types(self, index: int) -> set[int]:
         """Return the collision types of a body's shapes."""
@@ -243,6 +253,8 @@ class SpaceBodies:
         self._by_name[name], self._name_of[index] = body, name
         if driven:
             self.drives.join(name, index, body, state)
+        elif index in bodies.paths:
+            self._paths.join(index, bodies.paths[index], body)
         elif not (fixed or kinematic):
             if self.field.attracts:
                 self.field.apply_to(name, body, self._by_name)
@@ -259,6 +271,9 @@ class SpaceBodies:
             self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
         self._space.add(*(shape for _, shape in shapes))
         self._members[index] = SpaceBody(body, shapes)
+        if index in bodies.one_way:
+            self._one_way.add(index)
+            self._surface_setter.one_way_walls.platforms |= {shape: bodies.one_way[index] for _, shape in shapes}
 
     def _filter(self, index: int, bodies: Bodies) -> pymunk.ShapeFilter:
         bits = bits_of_body(self._scene, bodies, index, int(self.layer[index]))
@@ -292,7 +307,11 @@ class SpaceBodies:
             self.joints.remove(index)
             self._resting.pop(index, None)
             self.drives.leave(index)
+            self._paths.leave(index)
             member = self._members.pop(index)
+            self._one_way.discard(index)
+            for _, shape in member.shapes:
+                self._surface_setter.one_way_walls.platforms.pop(shape, None)
             self._moving -= member.moves
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
@@ -363,7 +382,7 @@ class SpaceBodies:
         if not self._moving:
             return
         self._set_forces(time)
-        if self._surface_setter.one_way_walls.walls:
+        if self._surface_setter.one_way_walls.any_left:
             self._surface_setter.one_way_walls.tick += 1
         if self.drives.driven_bodies:
             self.drives.before()
@@ -374,7 +393,9 @@ class SpaceBodies:
         self._state = None
 
     def _set_forces(self, time: float) -> None:
-        """Set the forces of a substep that starts at a time, s: constant forces, thrusts and those of the air."""
+        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and the air."""
+        if self._paths:
+            self._paths.before(time)
         if self.air.flows:
             self.thrusts.update_loads(time, self._h)
             self._apply_air(*self._read())
@@ -393,7 +414,7 @@ class SpaceBodies:
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
-            or self._surface_setter.one_way_walls.walls
+            or self._surface_setter.one_way_walls.any_left
             or self.joints.has_breakable
         )
 
@@ -439,7 +460,7 @@ class SpaceBodies:
             polygons=self._polygons,
             until_contact=until_contact,
             warm_start=contacts.take_warm_start if lists_contacts else None,
-            before_substep=before_substep if self.thrusts or self.constant_forces else None,
+            before_substep=before_substep if self.thrusts or self.constant_forces or self._paths else None,
             needs_check=self._state_check(),
         )
         # The states are valid until the next batch, like those that the reader returns.

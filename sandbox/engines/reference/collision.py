@@ -118,10 +118,13 @@ class CollisionPipeline(ABC):
         return self._plane_tests
 
     @abstractmethod
-    def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
+    def candidates(
+        self, position: FloatArray, margin: float = 0.0, *, is_filtered: bool = True, segments_only: bool = False
+    ) -> CandidatePairs:
         """Return the candidate pairs at (N, ≥ 2) poses, m: at least all that are nearer than the margin, m.
 
-        With `segments_only`, return pairs with walls and posts only, unfiltered.
+        With `segments_only`, return pairs with walls and posts only; unless `is_filtered`, also those that do not
+        collide.
         """
 
     def check_limits(self, position: FloatArray) -> None:
@@ -235,18 +238,20 @@ class CollisionPipeline(ABC):
         found = self._out.of(slice(0, size))
         return found if self.filter is None else self.filter.drop_filtered_planes(found)
 
-    def at_one_way_walls(self, position: FloatArray) -> Manifolds:
-        """Return the overlaps of bodies with one-way walls, also of those that pass; valid until the next detection."""
-        assert self.filter is not None
-        pairs = self.filter.at_one_way_walls(self.candidates(position, segments_only=True), self._owner)
-        if not len(pairs.segments):
+    def at_one_way(self, position: FloatArray) -> Manifolds:
+        """Return the overlaps with one-way walls and bodies, passing ones too; valid until the next detection."""
+        assert self.filter is not None and self.filter.one_way is not None
+        only_walls = not self.filter.one_way.is_body.any()
+        near = self.candidates(position, is_filtered=False, segments_only=only_walls)
+        pairs = self.filter.at_one_way(near, self._owner)
+        if not (len(pairs.segments) or len(pairs.balls)):
             return self._no_contacts
         self._out, self._wall_out = self._wall_out, self._out  # the contacts of the step remain valid
         try:
             found = self.manifolds(position, pairs)
         finally:
             self._out, self._wall_out = self._wall_out, self._out
-        return found.of(self.filter.is_one_way(found.second))
+        return found.of(self.filter.one_way.are_one_way(found.first, found.second))
 
     @abstractmethod
     def _write_manifolds(self, position: FloatArray, pairs: CandidatePairs, max_separation: float) -> int:
@@ -315,7 +320,9 @@ class CirclePipeline(CollisionPipeline):
         colliders = self._store.static_colliders.segment_collider
         return len(np.unique(colliders)) < len(colliders)
 
-    def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
+    def candidates(
+        self, position: FloatArray, margin: float = 0.0, *, is_filtered: bool = True, segments_only: bool = False
+    ) -> CandidatePairs:
         """Return the candidate pairs at (N, ≥ 2) positions, m: at least all that are nearer than the margin, m."""
         store, boxes = self._store, self._boxes
         balls = segments = self._ball_keys[:0]
@@ -331,7 +338,7 @@ class CirclePipeline(CollisionPipeline):
                 ),
             )
         pairs = CandidatePairs(balls, segments)
-        return pairs if self.filter is None or segments_only else self.filter.apply(pairs, self._owner)
+        return self.filter.apply(pairs, self._owner) if self.filter is not None and is_filtered else pairs
 
     def _write_manifolds(self, position: FloatArray, pairs: CandidatePairs, max_separation: float) -> int:
         """Write contacts up to the capacity of the buffer; return their number."""
@@ -431,7 +438,9 @@ class ConvexPipeline(CollisionPipeline):
         angle = position[:, 2] if position.shape[1] == 3 else self._store.angle
         self._pieces.update(position, angle)
 
-    def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
+    def candidates(
+        self, position: FloatArray, margin: float = 0.0, *, is_filtered: bool = True, segments_only: bool = False
+    ) -> CandidatePairs:
         """Return the candidate pairs of pieces, and of pieces and segments, at (N, ≥ 2) positions, m."""
         self._update_pieces(position)
         store, boxes, pieces = self._store, self._boxes, self._pieces
@@ -461,7 +470,7 @@ class ConvexPipeline(CollisionPipeline):
             bodies = bodies[: drop_separated(bodies, 0, box, margin)]
             segments = segments[: drop_separated(segments, pieces.count, box, margin)]
         pairs = CandidatePairs(bodies, segments)
-        return pairs if self.filter is None or segments_only else self.filter.apply(pairs, self._owner)
+        return self.filter.apply(pairs, self._owner) if self.filter is not None and is_filtered else pairs
 
     def _write_manifolds(self, position: FloatArray, pairs: CandidatePairs, max_separation: float) -> int:
         """Write contacts up to the capacity of the buffer; return their number."""

@@ -6,7 +6,7 @@ contacts start there, and its moment of inertia is that about the hinge.
 The stops of a hinge are one-sided constraints. If all contacts of a body press it onto its stop as well, it is
 immovable in that substep, because contacts and stop, solved alternately, would not converge in 10 iterations. A body
 moved by a stroke or a plunger is kinematic, and has its planned velocity during the whole substep. Bodies that are
-kinematic by themselves keep their velocity.
+kinematic by themselves keep their velocity, or have the one that leads to the next pose on their path.
 """
 
 from abc import ABC, abstractmethod
@@ -37,6 +37,7 @@ from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import AngularStops, solve_together
 from sandbox.engines.reference.velocity_solver import ContactMemory, ImpulseSolver, Motion, SpringContacts
 from sandbox.scene.compile.drives import Mount, about_hinge
+from sandbox.scene.compile.paths import PathMotion
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.description.world import Settings
@@ -300,11 +301,37 @@ class KinematicBody(DrivenBody):
         self.place(after)
 
 
+class PathBody(KinematicBody):
+    """A kinematic body on a path: in each substep it has the constant velocity that leads to its pose at the end."""
+
+    time = 0.0
+    """start of the substep that is planned next, s"""
+
+    def __init__(self, store: BodyStore, index: int, motion: PathMotion) -> None:
+        super().__init__(store, index)
+        self._motion, self._began = motion, store.setup.time
+
+    def plan(self, x: State, h: float) -> None:
+        """Plan a motion to the pose at the end of the substep."""
+        self._end = np.asarray(self._motion.pose(self._began + self.time + h))
+        self._rate = (self._end - x[0, self.index]) / h
+
+    def begin(self, x: State) -> None:
+        """Write the velocities of the substep."""
+        x[1, self.index] = self._rate
+
+
 def make_driven_body(store: BodyStore, index: int, mount: Mount) -> DrivenBody:
     """Return the body with an index, which has a drive."""
     kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
     kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
     return kinds[mount.drive.kind](store, index, mount)
+
+
+def make_kinematic_body(store: BodyStore, index: int) -> KinematicBody:
+    """Return the body with an index, which is kinematic by itself."""
+    motion = store.bodies.paths.get(index)
+    return KinematicBody(store, index) if motion is None else PathBody(store, index, motion)
 
 
 class DriveWork(NamedTuple):
@@ -326,8 +353,9 @@ class Drives:
         kinematic = np.flatnonzero(store.bodies.kinematic & store.present).tolist()
         self.driven_bodies: list[DrivenBody] = [
             *(make_driven_body(store, index, mount) for index, mount in store.mounts.items()),
-            *(KinematicBody(store, index) for index in kinematic),
+            *(make_kinematic_body(store, index) for index in kinematic),
         ]
+        self._on_paths = [driven for driven in self.driven_bodies if isinstance(driven, PathBody)]
         self._hinges = [driven for driven in self.driven_bodies if isinstance(driven, HingeMotor)]
         self._indices: IntArray = np.asarray([driven.index for driven in self.driven_bodies], np.int64)
         self._turning = not store.kinematic[self._indices].all()
@@ -371,17 +399,22 @@ class Drives:
             position[driven.index] = driven.centre(*x)[0]
         return position
 
-    def begin(self, x: State, h: float) -> State:
-        """Plan a substep of h, s, from a state; return the state with the velocities of kinematic bodies during it."""
+    def begin(self, x: State, time: float, h: float) -> State:
+        """Plan a substep from a state at a time, s, over h, s.
+
+        Return the state with the velocities of kinematic bodies during it.
+        """
         self.start = x.copy()
         """(2, N, 3) state at the beginning of the planned substep"""
+        for on_path in self._on_paths:
+            on_path.time = time
         for driven in self.driven_bodies:
             driven.plan(x, h)
             driven.begin(self.start)
         return self.start
 
     def advance_with_springs(
-        self, x: State, h: float, advance: Callable[[State], tuple[State, SpringContacts]]
+        self, x: State, time: float, h: float, advance: Callable[[State], tuple[State, SpringContacts]]
     ) -> tuple[State, SpringContacts]:
         """Return the state after h, s, under contacts that act as forces during the whole substep, and these contacts.
 
@@ -391,10 +424,11 @@ class Drives:
 
         Args:
             x: (2, N, 3) the state.
+            time: s, of the state.
             h: s.
             advance: returns the end state for a start state, and the contacts.
         """
-        self.begin(x, h)
+        self.begin(x, time, h)
         for driven in self.driven_bodies:
             driven.use_mean_velocity(self.start, h)
         self.inverse_moment_forces = self._store.inverse_moment.copy()
@@ -526,7 +560,7 @@ class DrivenSolver(ImpulseSolver):
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
         """Return the motion from a state at a time, s, over h, s, without contacts."""
-        start = self._drives.begin(x, h)
+        start = self._drives.begin(x, time, h)
         free = self._integrator.step(transition, time, start, forces, h)
         self._drives.place(free)
         return self.complete_motion(start, free, h)

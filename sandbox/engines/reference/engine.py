@@ -125,6 +125,8 @@ class ReferenceEngine:
         Demand.ZONES,
         Demand.DRIVES,
         Demand.KINEMATIC,
+        Demand.PATHS,
+        Demand.ONE_WAY_BODIES,
     }
     knows_impulses: bool = True
     epsilon: float = 2.0**-52

@@ -303,7 +303,7 @@ class DrivenPenaltySolver(PenaltySolver):
         """Return the motion from a state at a time, s, over h, s, with contacts acting as forces."""
         penalty, scheme = self._penalty, self._impulses.scheme
         free, springs = self._drives.advance_with_springs(
-            x, h, lambda start: penalty.advance(scheme, time, start, forces, h)
+            x, time, h, lambda start: penalty.advance(scheme, time, start, forces, h)
         )
         self._drives.place(free)
         return self._impulses.complete_motion(self._drives.start, free, h, springs)

@@ -225,7 +225,7 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
             raise
 
     def _observe(self, record: StepRecord) -> None:
-        """Update the energy ledger, joint breaker, contact log and one-way walls from the record of a step."""
+        """Update the energy ledger, joint breaker, contact log and one-way colliders from the record of a step."""
         world = self._world
         if self._energy is not None:
             self._energy.enter_step(record)
@@ -233,8 +233,8 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
             self._breaker.add(record.h * record.joint_load)
         if self._log is not None:
             self._log_contacts(self._log, record)
-        if world.walls is not None:
-            world.walls.settle(world.pipeline.at_one_way_walls(record.after[0]), world.centres(record.after))
+        if world.one_way is not None:
+            world.one_way.settle(world.pipeline.at_one_way(record.after[0]), world.poses(record.after))
 
     def _end_substep(self, h: float, broken_at: float, noted_at: float) -> None:
         """Break joints that were overloaded in a substep of h, s, and apply zones; the times are those of both, s."""
@@ -342,7 +342,7 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         layer = r.layer.copy() if len(r.scene.layers) > 1 else None
         visits = r.visits.copy() if r.scene.zones else None
         drives = r.drives.copy() if len(r.drives) else None
-        present, passing = r.present.copy(), None if self._world.walls is None else self._world.walls.passing
+        present, passing = r.present.copy(), None if self._world.one_way is None else self._world.one_way.passing
         return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, drives, passing)
 
     def contacts(self) -> Contacts:

@@ -21,7 +21,7 @@ from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.forces.field import ForceField
 from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
 from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
-from sandbox.engines.reference.filtering import CollisionFilter, OneWayWalls
+from sandbox.engines.reference.filtering import CollisionFilter, OneWayColliders
 from sandbox.engines.reference.forces import forces_on
 from sandbox.engines.reference.integrators import INTEGRATORS, State
 from sandbox.engines.reference.joints import JointSolver
@@ -131,8 +131,8 @@ class WorldState:
         self.field = ForceField(store)
         self.joints = self._new_joints()
         self._posed = self.joints is not None or not self.field.empty
-        self.filter = CollisionFilter(store) if CollisionFilter.is_needed(store.scene) else None
-        self.walls: OneWayWalls | None = None if self.filter is None else self.filter.walls
+        self.filter = CollisionFilter(store, settings.slop) if CollisionFilter.is_needed(store) else None
+        self.one_way: OneWayColliders | None = None if self.filter is None else self.filter.one_way
         self.pipeline = self._new_pipeline(self.work)
         self._penalty = self._new_penalty(self.pipeline)
         self._fixtures = store.static_colliders
@@ -184,9 +184,9 @@ class WorldState:
         if not is_start:  # a new pipeline is up to date
             self.pipeline.rebuild()
         self._choose_solver()
-        if self.walls is not None:
-            overlaps = self.pipeline.at_one_way_walls(self.x[0])
-            self.walls.begin(overlaps, self.closing_speed(overlaps, self.x))
+        if self.one_way is not None:
+            overlaps = self.pipeline.at_one_way(self.x[0])
+            self.one_way.begin(overlaps, self.closing_speed(overlaps, self.x))
         if self.joints is not None:
             self.joints.joints = store.setup.joints  # motors may have other values
             self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.intact_joints())
@@ -223,7 +223,7 @@ class WorldState:
         One-way walls depend on velocities, zones release a body that gets a velocity, and angular velocities can change
         the shape of states. Nothing else that `rebuild` derives depends on velocities.
         """
-        if self.walls is not None or self._store.scene.zones or self._turns() != (self.x.shape[2] == 3):
+        if self.one_way is not None or self._store.scene.zones or self._turns() != (self.x.shape[2] == 3):
             return False
         self.x = self._stored_state()
         if self.drives is not None:
@@ -262,6 +262,10 @@ class WorldState:
     def centres(self, x: State) -> FloatArray:
         """Return the centres of mass of all bodies in a state, (N, 2) m."""
         return x[0, :, :2] if self.drives is None else self.drives.centres(x)
+
+    def poses(self, x: State) -> FloatArray:
+        """Return the centres of mass of all bodies in a state, with their angles if it has these, (N, 2 or 3)."""
+        return x[0] if self.drives is None else np.column_stack((self.drives.centres(x), x[0, :, 2]))
 
     def ledger_penalty(self) -> PenaltyContacts | None:
         """Return penalty contacts for the energy ledger, whose work is not counted; None for other responses."""

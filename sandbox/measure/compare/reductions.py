@@ -160,7 +160,7 @@ ValueKey = tuple[str, int, str]
 OPTIONAL_KEYS = (
     "angular_velocity", "velocity", "angle", "colour", "colours", "collides", "friction", "restitution", "material",
     "density", "mass", "jitter", "velocity_jitter", "lifetime", "lifetime_jitter", "thickness", "closed",
-    "restitution_falloff", "kick", "one_way", "solid",
+    "restitution_falloff", "kick", "one_way", "solid", "path",
 )  # fmt: skip
 """Keys of bodies and static objects that have a default."""
 

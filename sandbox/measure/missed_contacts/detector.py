@@ -63,7 +63,7 @@ class Audit:
     with a core of 0, whose centre of mass lies outside, is left out. Pairs
     whose collisions a joint or their categories disable, bodies of one group, bodies on different layers or that change
     their layer within the substep, and bodies that strokes and plungers move through static objects do not count.
-    Neither do kinematic bodies that pass through static objects or each other.
+    Neither do kinematic bodies that pass through static objects or each other, nor one-way bodies.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the number of close pairs.
@@ -169,6 +169,8 @@ class Audit:
         collides_with_all = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
         some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element]
         collides_with_all, some = collides_with_all & (bodies.core > 0.0), some & (bodies.core > 0.0)
+        for index in bodies.one_way:  # others may pass it
+            collides_with_all[index] = some[index] = False
         moves, moving_to_all, static = (
             some & ~bodies.fixed,
             collides_with_all & ~bodies.fixed,

@@ -130,6 +130,8 @@ def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts
         bodies = scene.bodies
         deep = close.clearance < -GRAZE_FRACTION * np.minimum(bodies.thin[close.first], bodies.thin[close.second])
         deep &= ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
+        if bodies.one_way:  # a body in one may pass it
+            deep &= ~np.isin(close.first, [*bodies.one_way]) & ~np.isin(close.second, [*bodies.one_way])
         if deep.any():
             k = int(np.argmin(np.where(deep, close.clearance, 0.0)))
             names = bodies.names[int(close.first[k])], bodies.names[int(close.second[k])]
@@ -214,7 +216,7 @@ def _overlaps_with_fixed_bodies(scene: Scene, close: InitialContacts) -> Iterato
     """Yield the moving bodies that start in a fixed body, deeper than the slop of the engines."""
     bodies = scene.bodies
     for a, b, gap in zip(close.first.tolist(), close.second.tolist(), close.clearance.tolist(), strict=True):
-        if bodies.fixed[a] != bodies.fixed[b]:
+        if bodies.fixed[a] != bodies.fixed[b] and not {a, b} & bodies.one_way.keys():
             mover, fixed = (b, a) if bodies.fixed[a] else (a, b)
             if -gap > SLOP_PER_RADIUS * float(bodies.thin[mover]):
                 yield -gap, bodies.names[mover], bodies.names[fixed]

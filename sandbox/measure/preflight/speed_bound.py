@@ -103,7 +103,7 @@ class SpeedBounds:
         if scene.drives:
             found.append("drives")
         bodies = scene.bodies
-        if (bodies.kinematic & (bodies.velocity.any(axis=1) | (bodies.angular_velocity != 0.0))).any():
+        if self.start[bodies.kinematic].any():
             found.append("kinematic bodies")
         if self.matrix.moving_surfaces:
             found.append("moving surfaces")
@@ -124,10 +124,13 @@ class SpeedBounds:
 
     @cached_property
     def start(self) -> FloatArray:
-        """(N,) m/s, speed at the start; of a kinematic body that of its fastest point."""
+        """(N,) m/s, speed at the start; of a kinematic body that of its fastest point, on a path the largest one."""
         bodies = self.scene.bodies
         turning = np.where(bodies.kinematic, np.abs(bodies.angular_velocity) * bodies.radius, 0.0)
-        return np.asarray(np.hypot(*bodies.velocity.T) + turning)
+        speed = np.asarray(np.hypot(*bodies.velocity.T) + turning)
+        for index, motion in bodies.paths.items():
+            speed[index] = motion.max_speed + motion.max_spin * bodies.radius[index]
+        return speed
 
     @cached_property
     def squared(self) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any, Self
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.compile.paths import PathMotion
 from sandbox.scene.description.base import GROUND, BodySource, BodySpec, Point
 from sandbox.scene.description.bodies import Capsule
 from sandbox.scene.description.discs import Ball, Disc
@@ -245,6 +246,29 @@ class Bodies:
         return np.asarray([isinstance(e, BodySpec) and e.kinematic for e in self.elements], np.bool_)[self.element]
 
     @cached_property
+    def paths(self) -> dict[int, PathMotion]:
+        """Motion of each body with a path, by its index."""
+        with_path = {k: e for k, e in enumerate(self.elements) if isinstance(e, BodySpec) and e.path is not None}
+        if not with_path:
+            return {}
+        motions = {k: PathMotion(single) for k, single in with_path.items()}
+        elements = self.element.tolist()
+        return {n: motions[element] for n, element in enumerate(elements) if element in motions}
+
+    @cached_property
+    def one_way(self) -> dict[int, Point]:
+        """Direction in its frame from which each one-way body is solid, of length 1, by its index."""
+        directions: dict[int, Point] = {}
+        for k, each in enumerate(self.elements):
+            if isinstance(each, BodySpec) and each.one_way is not None:
+                x, y = each.one_way
+                length = math.hypot(x, y)
+                directions[k] = x / length, y / length
+        if not directions:
+            return {}
+        return {n: directions[element] for n, element in enumerate(self.element.tolist()) if element in directions}
+
+    @cached_property
     def lift(self) -> FloatArray:
         """(N,) lift coefficient of each: s of the acceleration s ω ẑ × w."""
         each = [e.lift if isinstance(e, BodySpec) else 0.0 for e in self.elements]
@@ -304,13 +328,22 @@ def centre_of(single: BodySpec) -> Point:
     return to_world(centre, math.cos(single.angle), math.sin(single.angle), single.position)
 
 
+def start_pose(single: BodySpec) -> tuple[Point, float]:
+    """Return the position of a body's centre of mass, m, and its angle, rad, at time 0."""
+    if single.path is None:
+        return centre_of(single), single.angle
+    pose = PathMotion(single).pose(0.0)
+    return (pose.x, pose.y), pose.angle
+
+
 def layout_of_singles(singles: list[BodySpec]) -> Layout:
     """Return the start state of single bodies, each with its own prototype."""
+    poses = [start_pose(each) for each in singles]
     spins = [(0.0, 0.0, 0.0) if each.fixed else _spin(each) for each in singles]
     return Layout(
-        position=_rows([centre_of(each) for each in singles]),
+        position=_rows([position for position, _ in poses]),
         velocity=_rows([(0.0, 0.0) if each.fixed else each.velocity for each in singles]),
-        angle=np.asarray([each.angle for each in singles], dtype=np.float64),
+        angle=np.asarray([angle for _, angle in poses], dtype=np.float64),
         angular_velocity=np.asarray([spin[2] for spin in spins], dtype=np.float64),
         fixed=np.asarray([each.fixed for each in singles], dtype=np.bool_),
         element=np.arange(len(singles)),

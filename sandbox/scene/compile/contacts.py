@@ -23,7 +23,7 @@ from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.filters import FilterTable, filter_table
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, HasMaterial, SurfaceVelocity
+from sandbox.scene.description.base import BodySource, BodySpec, HasMaterial, SurfaceVelocity
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.description.world import Kick
@@ -88,7 +88,7 @@ class PairTable:
 
     @property
     def one_way(self) -> BoolArray:
-        """(S,) whether each belongs to a one-way wall."""
+        """(S,) whether each belongs to a one-way wall or body."""
         return np.asarray([surface.one_way for surface in self.surfaces], np.bool_)
 
     @property
@@ -179,7 +179,9 @@ def index_surfaces(
             falloff = material.restitution_falloff if falloff is None else falloff
         kept = element.material if element.material in paired else None
         kick = element.kick if isinstance(element, Wall | Post) else None
-        one_way = isinstance(element, Wall) and element.one_way
+        one_way = (isinstance(element, Wall) and element.one_way) or (
+            isinstance(element, BodySpec) and element.one_way is not None
+        )
         surface = ContactMaterial(
             kept, restitution, friction, falloff, kick, one_way, element.surface_speed, element.surface_velocity
         )

@@ -78,6 +78,8 @@ class Demand(StrEnum):
     KINEMATIC = "kinematic bodies"
     EVENTS = "events"
     SENSORS = "sensors"
+    PATHS = "paths"
+    ONE_WAY_BODIES = "one-way bodies"
 
 
 BALLS = frozenset(
@@ -229,6 +231,11 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         _count(kinematic, "body is kinematic", "bodies are kinematic", "no body is kinematic"),
     )
     yield Demand.EVENTS, bool(scene.events), f"{len(scene.events):,}" if scene.events else "none"
+    on_path = len(bodies.paths)
+    why = _count(on_path, "body moves along a path", "bodies move along paths", "no body has a path")
+    yield Demand.PATHS, on_path > 0, why
+    one_way = len(bodies.one_way)
+    yield Demand.ONE_WAY_BODIES, one_way > 0, _count(one_way, "one-way body", "one-way bodies", "none")
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.SENSORS, bool(scene.sensors), f"{len(scene.sensors):,}" if scene.sensors else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
@@ -359,6 +366,8 @@ def demands_of_body(single: BodySpec) -> frozenset[Demand]:
     stated = (
         (Demand.GROUPS, single.group is not None),
         (Demand.KINEMATIC, single.kinematic),
+        (Demand.PATHS, single.path is not None),
+        (Demand.ONE_WAY_BODIES, single.one_way is not None),
         (Demand.LIFT, single.lift != 0.0),
     )
     return frozenset(demand for demand, is_stated in stated if is_stated)

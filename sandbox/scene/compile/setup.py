@@ -35,7 +35,7 @@ class Setup:
     time: float = 0.0
     """s, time in the session at which the state begins; 0 at the start of the scene"""
     passing: Passing = ()
-    """pairs of a body and a one-way wall that it is passing"""
+    """pairs of a body and the one-way wall or body that it is passing"""
     plane_reach: PlaneReach | None = None
     """extent of half-planes; None leaves it to the engine"""
     is_start: bool = field(default=False, init=False)
@@ -70,7 +70,7 @@ class Setup:
             time: s.
             broken: indices of the broken joints.
             drives: (D, 3) state of the drives; default: their initial state.
-            passing: pairs of a body and a one-way wall that it is passing.
+            passing: pairs of a body and the one-way wall or body that it is passing.
             plane_reach: extent of half-planes.
         """
         joints = self.joints.without(broken).among(bodies.names, self.bodies.names).clicked(bodies.angle)

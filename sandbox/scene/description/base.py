@@ -271,6 +271,33 @@ class BodySource(Collider):
     """initial collision layer: bodies collide only with objects in the same layer"""
 
 
+PathPoints = Annotated[tuple[Point, ...], Field(max_length=1000)]
+PathAngles = Annotated[tuple[Angle, ...], Field(max_length=1000)]
+
+
+class BodyPath(Part):
+    """Motion of a kinematic body over time: from point to point, and at the angle of each."""
+
+    points: Accepts[PathPoints, Coordinates] = default(())
+    """positions that it goes to, from the body's `position`, m; default: it stays at its place, and only turns"""
+    angles: Accepts[PathAngles, Sequence[float]] = default(())
+    """angle at each point, from the body's `angle`, rad; default: it does not turn"""
+    pivot: PointField = default((0.0, 0.0))
+    """point of the body, in its frame, about which it turns and which goes to the points, m; default: its origin"""
+    speed: Annotated[float, Field(ge=1e-9, le=MAX_SPEED)] | None = None
+    """mean speed from each point to the next, m/s; default: by `period`, or 1 m/s (1 rad/s if the body only turns)"""
+    period: Annotated[float, Field(ge=1e-9, le=1e12)] | None = None
+    """duration of a cycle with its pauses, s, in place of `speed`: there and back, once around, or once to the end"""
+    repeat: Literal["there_and_back", "loop", "once"] = "there_and_back"
+    """after the last point: back through all points, on to the first point and around, or stay"""
+    easing: Literal["linear", "smooth"] = "linear"
+    """between two points: at constant speed, or from rest to rest along a fifth-order polynomial (minimum jerk)"""
+    pause: Annotated[float, Field(ge=0, le=1e12)] = 0.0
+    """time for which it waits at each point that it arrives at, s"""
+    start: Annotated[float, Field(ge=-1e9, le=1e9)] = 0.0
+    """time at which it leaves the first point, s, where it waits until then; below 0, it is on its way at 0"""
+
+
 class BodySpec(BodySource):
     """One body."""
 
@@ -282,6 +309,11 @@ class BodySpec(BodySource):
     """Never moves, as if infinitely heavy."""
     kinematic: bool = False
     """Moves at its velocity and angular velocity, which no collision or force changes, as if infinitely heavy."""
+    path: BodyPath | None = None
+    """motion of a kinematic body over time, instead of constant velocities"""
+    one_way: Accepts[Vector | None, Sequence[float] | None] = default(None)
+    """direction in the frame of a fixed or kinematic body from which it is solid, such as [0, 1] for a platform; bodies
+    that come from elsewhere pass"""
     moment: Moment | None = None
     """moment of inertia about the centre of mass, kg·m²; default: from the shape and the mass"""
     fixed_rotation: bool = False

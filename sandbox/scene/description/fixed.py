@@ -117,7 +117,7 @@ Height = Annotated[float, Field(gt=0, le=1e9)]
 Course = Annotated[tuple[Point, ...], Field(min_length=2, max_length=100_000)]
 
 Passing: TypeAlias = tuple[tuple[int, int], ...]
-"""Pairs of a body index and a one-way wall, −1 − k, that the body is passing."""
+"""Pairs of a body index and what the body is passing: a one-way wall, −1 − k, or the index of a one-way body."""
 
 PlaneReach: TypeAlias = tuple[float, float, float]
 """Centre (x, y) of the start positions, and the distance from it within which half-planes are exact, m."""

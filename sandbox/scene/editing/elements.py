@@ -5,7 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from sandbox.scene.compile.bodies import Bodies, centre_of
+from sandbox.scene.compile.bodies import Bodies, start_pose
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part
@@ -84,7 +84,7 @@ def with_moved_bodies(scene: Scene, replaced: Mapping[ElementKey, BodySpec]) -> 
     position, angle, elements = before.position.copy(), before.angle.copy(), list(before.elements)
     for key, body in replaced.items():
         (index,) = bodies_of(scene, key)
-        position[index], angle[index] = centre_of(body), body.angle
+        position[index], angle[index] = start_pose(body)
         elements[before.element[index]] = body
     moved = replace(before, position=position, angle=angle, elements=tuple(elements))
     for name in ("round", "all_round", "shapes", "number_of"):  # they depend on shapes and names only

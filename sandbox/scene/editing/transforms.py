@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import BodySpec, Part, Point
+from sandbox.scene.description.base import BodyPath, BodySpec, Part, Point
 from sandbox.scene.description.bodies import Attached, Compound, Polygon
 from sandbox.scene.description.fixed import Plane, Sensor
 from sandbox.scene.description.generators import Stack
@@ -112,6 +112,8 @@ def _shape(element: Part, by: Similarity) -> dict[str, Any]:
         values |= _parts(element, Similarity(mirrored=by.mirrored, scale=by.scale))
         if element.centre_of_mass is not None:
             values["centre_of_mass"] = Similarity(mirrored=by.mirrored, scale=by.scale).vector(element.centre_of_mass)
+    if isinstance(element, BodySpec) and element.path is not None:
+        values["path"] = _path(element.path, by)
     if isinstance(element, BodySpec) and element.moment is not None:  # the mass scales only with a density
         values["moment"] = element.moment * by.scale ** (2 if element.density is None else 4)
     if by.scale != 1.0:
@@ -122,6 +124,19 @@ def _shape(element: Part, by: Similarity) -> dict[str, Any]:
             elif isinstance(value, int | float) and not isinstance(value, bool):
                 values[key] = by.scale * value
     return values
+
+
+def _path(path: BodyPath, by: Similarity) -> BodyPath:
+    """Return the path of a body that is transformed."""
+    in_frame, sign = Similarity(mirrored=by.mirrored, scale=by.scale), -1.0 if by.mirrored else 1.0
+    return path.model_copy(
+        update={
+            "points": tuple(by.vector(each) for each in path.points),
+            "angles": tuple(sign * each + 0.0 for each in path.angles),
+            "pivot": in_frame.vector(path.pivot),
+            "speed": None if path.speed is None else by.scale * path.speed,
+        }
+    )
 
 
 def _parts(body: Compound, by: Similarity) -> dict[str, Any]:
@@ -238,7 +253,9 @@ def round_value(value: float) -> float:
 
 
 def plain_value(value: Any) -> Any:
-    """Return a value of a key as TOML holds it: lists of rounded numbers in place of tuples."""
+    """Return a value of a key as TOML holds it: lists of rounded numbers in place of tuples, tables of parts."""
+    if isinstance(value, Part):
+        return {key: plain_value(each) for key, each in table_values(value).items()}
     if isinstance(value, tuple | list):
         return [plain_value(each) for each in value]
     return round_value(value) if isinstance(value, float) else value

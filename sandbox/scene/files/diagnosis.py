@@ -274,6 +274,11 @@ _SYNONYMS: dict[str, set[str]] = {
     "restitution": {"bounce", "bounciness", "elasticity"},
     "friction": {"friction_coefficient", "mu"},
     "mass": {"density", "weight"},
+    "period": {"cycle", "time"},
+    "repeat": {"loop", "mode", "pingpong"},
+    "easing": {"ease", "interpolation", "transition"},
+    "pause": {"dwell", "wait"},
+    "start": {"delay", "offset", "phase"},
 }
 """Keys of the scene file, and words that other engines and file formats use for them."""
 
@@ -286,6 +291,7 @@ _GRAVITY = "no body has a gravity of its own; world.gravity acts on all bodies, 
 _DAMPING = "no body has a damping of its own; world.damping and world.linear_drag act on all bodies"
 _ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
 _SPEED = "speeds have no limit; world.quadratic_drag limits that of a fall"
+_PATH = "a body with kinematic = true moves along a `path`, such as { points = [[0, 0], [4, 0]], period = 4.0 }"
 _ELSEWHERE = {
     "bullet": _FAST,
     "ccd": _FAST,
@@ -300,6 +306,8 @@ _ELSEWHERE = {
     "rollingresistance": _ROLLING,
     "maxspeed": _SPEED,
     "maxvelocity": _SPEED,
+    **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
+    **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),
 }
 """Features that bodies have in other engines, in letters only and without `is`, and what a scene has in their place"""
 

@@ -118,6 +118,13 @@ def with_placeholder_shapes(scene: Scene) -> Scene:
     return scene.model_copy(update={"polygons": polygons, "compounds": compounds})
 
 
+def without_paths(scene: Scene) -> Scene:
+    """Return the scene with all kinematic bodies at rest."""
+    kinds = ("balls", "boxes", "capsules", "polygons", "compounds")
+    at_rest = {kind: tuple(each.model_copy(update={"path": None}) for each in getattr(scene, kind)) for kind in kinds}
+    return scene.model_copy(update=at_rest)
+
+
 def polygon_outlines(scene: Scene) -> Iterator[tuple[Location, tuple[Point, ...]]]:
     """Yield every outline with its location."""
     for k, polygon in enumerate(scene.polygons):

@@ -8,8 +8,10 @@ import numpy as np
 from sandbox.scene.compile.bodies import Bodies, elements_of
 from sandbox.scene.compile.contacts import index_surfaces, surface_parts
 from sandbox.scene.compile.generators import GeneratorError
+from sandbox.scene.compile.paths import path_faults
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
+from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial, Vector
+from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.description.world import Material, Pair
@@ -31,6 +33,7 @@ from sandbox.scene.validate.geometry import (
     check_sensors,
     check_zones,
     with_placeholder_shapes,
+    without_paths,
 )
 from sandbox.scene.validate.references import check_attachments, check_events, check_play, check_surface
 
@@ -50,6 +53,10 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
     if scene.polygons or scene.compounds:
         shapeless += check_outlines(scene)
     found = [*materials, *_check_planes_and_walls(scene)]
+    if with_path := [each for each in _elements(scene) if isinstance(each[1], BodySpec) and each[1].path is not None]:
+        faults = list(_check_paths(with_path))
+        scene = without_paths(scene) if faults else scene  # the other checks need the bodies
+        found += faults
     if scene.zones:
         found += check_zones(scene)
     if scene.sensors:
@@ -186,6 +193,13 @@ def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
             yield from (((*location, key), message) for key, message in _check_at_rest(element))
 
 
+def _check_paths(elements: list[tuple[Location, BodySource]]) -> Iterator[LocatedMessage]:
+    """Yield the faults of paths."""
+    for location, single in elements:
+        assert isinstance(single, BodySpec)
+        yield from (((*location, *key), message) for key, message in path_faults(single))
+
+
 def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
     """Yield the keys that a fixed or kinematic body cannot have, with the reasons."""
     yield from _check_at_rest(single)
@@ -193,8 +207,20 @@ def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
         yield "kinematic", "cannot be combined with `fixed`; remove one of the two"
     if single.kinematic and single.fixed_rotation:
         yield "fixed_rotation", "has no effect on a kinematic body, which nothing turns; remove it"
+    if single.one_way is not None:
+        yield from _check_one_way(single, single.one_way)
     if single.lift and (single.fixed or single.kinematic):
         yield "lift", f"has no effect on a {'fixed' if single.fixed else 'kinematic'} body; remove it"
+
+
+def _check_one_way(single: BodySpec, direction: Vector) -> Iterator[tuple[str, str]]:
+    """Yield the faults of a one-way body."""
+    if not (single.fixed or single.kinematic):
+        yield "one_way", "needs `fixed = true` or `kinematic = true`: a body that others push is solid on all sides"
+    if isinstance(single, Compound):
+        yield "one_way", "is not supported for a [[body]] of several shapes; use a box, capsule, polygon or ball"
+    if not any(direction):
+        yield "one_way", f"{list(direction)} has no direction; use a vector such as [0, 1], solid from above"
 
 
 def _check_at_rest(source: BodySpec | Stack) -> Iterator[tuple[str, str]]:
@@ -231,6 +257,9 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
         for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
             if getattr(collider, key, usual) != usual:
                 yield (*location, key), "is not supported in a scene with a [surface] or pockets; remove it"
+    for location, element in _elements(scene):
+        if isinstance(element, BodySpec) and element.one_way is not None:
+            yield (*location, "one_way"), "is not supported in a scene with a [surface] or pockets; remove it"
     tables: dict[str, Sequence[Material | Pair | BodySource]] = {
         "material": scene.materials,
         "pair": scene.pairs,
@@ -313,6 +342,12 @@ def _check_initial_state(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessag
     ):
         for element in distinct(bodies.element[wrong]):
             yield prototypes[element][0], message
+    for index, motion in bodies.paths.items():
+        location = *prototypes[int(bodies.element[index])][0], "path"
+        if motion.max_speed > MAX_SPEED:
+            yield location, f"moves the body at up to {motion.max_speed:g} m/s; the limit is {MAX_SPEED:g} m/s"
+        if np.abs(motion.stops()).max() > MAX_POSITION:
+            yield location, f"leads more than {MAX_POSITION:g} m from the origin"
     if scene.world.bounds is not None:
         lower, upper = np.asarray(scene.world.bounds)
         outside = ((bodies.position < lower) | (bodies.position > upper)).any(axis=1)

@@ -402,8 +402,9 @@ class EditView:
         self._update_cursor()
         scene = editor.scene
         overlays = frozenset(gui.overlays | {"shapes", "joints"}) - {"trails", "energy", "contacts", "impulses"}
-        # While bodies are dragged, only the frame differs, so that the renderer need not prepare the scene again.
-        drawn = self.draft.scene if differ_in_poses_only(scene, self.draft.scene) else scene
+        # While bodies without paths are dragged, only the frame differs: the renderer need not prepare the scene again.
+        is_prepared = differ_in_poses_only(scene, self.draft.scene) and not scene.bodies.paths
+        drawn = self.draft.scene if is_prepared else scene
         snapshot = Snapshot(drawn, drawn.bodies, start_frame(scene), overlays=frozenset(overlays))
         self._renderer.draw(surface, context.camera, snapshot, antialias=gui.antialias, ui_scale=gui.ui_scale)
         self._draw_ghost(surface, scene)

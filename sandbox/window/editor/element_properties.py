@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.base import Part
+from sandbox.scene.description.base import BodySpec, Part
 from sandbox.scene.description.play import Play
 from sandbox.scene.description.surface import Floor, Shot
 from sandbox.scene.editing.draft import SceneDraft
@@ -128,13 +128,22 @@ def _rows(model: type[Part], parts: Sequence[Part], only: tuple[str, ...] = ()) 
     rows = []
     for spec in fields_of(model):
         is_list = spec.kind == "other" and not spec.default and not isinstance(spec.default, dict)
-        if is_list or (only and spec.key not in only):
+        if is_list or (only and spec.key not in only) or not all(_applies(spec.key, part) for part in parts):
             continue
         if all(any(spec.key == other.key for other in fields_of(type(part))) for part in parts):
             found = [_value_of(each, spec.key) for each in values]
             is_mixed = any(value != found[0] for value in found)
             rows.append(PropertyRow(spec, None if is_mixed or not found else found[0], is_mixed))
     return tuple(rows)
+
+
+def _applies(key: str, part: Part) -> bool:
+    """Return whether a field can have a value: bodies that others push have no path and are not one-way."""
+    if not isinstance(part, BodySpec):
+        return True
+    if key.startswith("path."):
+        return part.kinematic
+    return key != "one_way" or part.kinematic or part.fixed
 
 
 def _value_of(values: dict[str, Any], key: str) -> Any:

@@ -108,7 +108,7 @@ def _vertex_handles(scene: Scene, selection: Sequence[ElementKey]) -> list[EditH
 def _velocity_handle(scene: Scene, selection: Sequence[ElementKey], right: float, view: ViewScale) -> list[EditHandle]:
     """Return the handle at the tip of the velocity of a single body; at its right side if it is at rest."""
     element = element_at(scene, selection[0]) if len(selection) == 1 and exists(scene, selection[0]) else None
-    if not isinstance(element, BodySpec) or element.fixed:
+    if not isinstance(element, BodySpec) or element.fixed or element.path is not None:
         return []
     (body,) = bodies_of(scene, selection[0])
     (x, y), (vx, vy) = scene.bodies.position[body].tolist(), element.velocity

@@ -22,8 +22,10 @@ from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.joints import draw_hinges, draw_joint_symbols, draw_joints, draw_stops, joint_segments
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.moving_surfaces import draw_moving_surfaces
+from sandbox.window.render.one_way_bodies import draw_one_way_bodies
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, ColourArray, RgbColour, mix_colours
 from sandbox.window.render.particles import ParticleRenderer, packed_pixels
+from sandbox.window.render.paths import draw_paths
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
 
@@ -167,6 +169,7 @@ class OverlayRenderer:
             draw_hinges(view, self._discs)
         if "shapes" in overlays:
             draw_moving_surfaces(view)
+            draw_one_way_bodies(view)
         if view.snapshot.ghost is not None:
             self._draw_ghost(view)
         if "bounds" in overlays:
@@ -175,6 +178,8 @@ class OverlayRenderer:
             draw_joint_symbols(view, joint_segments(view), self._discs)
         if drives and "joints" in overlays:
             draw_stops(view)
+        if "joints" in overlays:
+            draw_paths(view, view.snapshot.bodies)
         if "centres" in overlays:
             draw_centres(view)
         if view.snapshot.overlapping is not None:

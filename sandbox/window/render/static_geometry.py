@@ -172,7 +172,7 @@ def _draw_wall(canvas: Canvas, wall: Wall) -> None:
         return
     if wall.one_way:
         for a, b in pairwise(pixels):
-            _draw_passing_arrows(canvas, (a[0], a[1]), (b[0], b[1]), half, edge)
+            draw_passing_arrows(canvas, (a[0], a[1]), (b[0], b[1]), half, edge)
     has_plain_lines = len(segments) > MAX_ROUND_WALLS
     rim = 0.0 if is_thin else min(1.5 * ui_scale, half)
     # All outlines first, then all fills, so that no outline shows inside a corner.
@@ -185,7 +185,7 @@ def _draw_wall(canvas: Canvas, wall: Wall) -> None:
                 draw_sdf(surface, capsule_distance(a, b, half - inset), style, _surrounding_rect(a, b, half, area))
 
 
-def _draw_passing_arrows(canvas: Canvas, a: Pixel, b: Pixel, half: float, colour: RgbColour) -> None:
+def draw_passing_arrows(canvas: Canvas, a: Pixel, b: Pixel, half: float, colour: RgbColour) -> None:
     """Draw small arrows on the left side of a wall, in its passing direction, at fixed points of the wall."""
     ui_scale = canvas.ui_scale
     clipped, length = clip_segment(a, b, canvas.surface.get_clip(), half + 12.0 * ui_scale), math.dist(a, b)

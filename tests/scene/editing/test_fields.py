@@ -116,7 +116,7 @@ def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
 
 DIMENSIONLESS = {
     "axis", "ball_restitution", "bias", "bot", "bounce", "curl", "cushion_friction", "cushion_restitution", "damping",
-    "direction", "error", "facing", "friction", "height", "hold_ratio", "level", "lift", "normal", "ratio",
+    "direction", "error", "facing", "friction", "height", "hold_ratio", "level", "lift", "normal", "one_way", "ratio",
     "restitution", "return_ratio", "rolling_friction", "roughness", "side", "sliding_friction", "spinning_friction",
     "stretch",
 }  # fmt: skip
@@ -373,8 +373,10 @@ def test_valid_text(model: type[BaseModel], key: str, text: str, value: Any) -> 
 def test_model_accepts_a_parsed_value_of_a_box(data: st.DataObject) -> None:
     spec = data.draw(st.sampled_from([spec for spec in fields_of(Box) if spec.kind in ("number", "numbers")]))
     value = parse(spec, format_value(spec, data.draw(in_range(spec))))
-    document = {"position": (0.0, 0.0), "size": (1.0, 1.0)}
+    document, added = {"position": (0.0, 0.0), "size": (1.0, 1.0)}, tuple(value) if isinstance(value, list) else value
+    for key in reversed(spec.key.split(".")):  # of a table within the table
+        added = {key: added}
     try:
-        Box.model_validate({**document, spec.key: tuple(value) if isinstance(value, list) else value})
+        Box.model_validate({**document, **added})
     except ValidationError as error:
         assert spec.key == "velocity", error  # its length is limited, not its components

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.editing.elements import ElementKey, all_elements, bodies_of, unique_name
-from sandbox.scene.editing.transforms import CANNOT_ROTATE, Similarity, transform_elements
+from sandbox.scene.editing.transforms import CANNOT_ROTATE, Similarity, plain_value, transform_elements
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.toml_changes import SetValue, with_changes
 from sandbox.scene.geometry.shapes import placed_sensor
@@ -80,7 +80,11 @@ ROUNDING = 1e-7
 
 def after(by: Similarity, keys: list[ElementKey], text: str = TEXT) -> Scene:
     values = transform_elements(loads(text), keys, by)
-    changes = [SetValue((*key.location, name), value) for key, each in values.items() for name, value in each.items()]
+    changes = [
+        SetValue((*key.location, name), plain_value(value))
+        for key, each in values.items()
+        for name, value in each.items()
+    ]
     return loads(with_changes(text, changes))
 
 
@@ -170,6 +174,20 @@ def test_stack_turns_about_its_base() -> None:
     moved = after(by, [ElementKey("stack", 0)])
     bodies = list(bodies_of(SCENE, ElementKey("stack", 0)))
     assert np.abs(moved.bodies.position[bodies] - image(by, SCENE.bodies.position[bodies])).max() < ROUNDING
+
+
+@pytest.mark.fail_slow(60)  # a hundred examples
+@pytest.mark.parametrize("file_form", ["inline", "table"])
+@given(by=SIMILARITIES)
+def test_path_of_a_body_is_mapped(file_form: str, by: Similarity) -> None:
+    """The centre of a door that also moves is where the similarity maps the one before, at every time."""
+    keys = "points = [[0, 0], [3, 0], [3, 1]]", "angles = [0.0, 1.0, -0.5]", "pivot = [0.5, -1.0]", "period = 4.0"
+    path = f"path = {{ {', '.join(keys)} }}\n" if file_form == "inline" else "\n".join(("[box.path]", *keys)) + "\n"
+    text = f"[[box]]\nposition = [1.0, 2.0]\nsize = [1.0, 2.0]\nangle = 0.3\nkinematic = true\n{path}"
+    before, moved = (scene.bodies.paths[0] for scene in (loads(text), after(by, [ElementKey("box", 0)], text)))
+    for time in (0.0, 0.7, 1.6, 2.5):
+        expected = image(by, np.asarray([before.pose(time)[:2]]))[0]
+        assert moved.pose(time)[:2] == pytest.approx(expected, abs=ROUNDING)
 
 
 def test_identity_changes_nothing() -> None:

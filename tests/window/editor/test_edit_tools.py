@@ -16,6 +16,7 @@ from sandbox.scene.editing.elements import ElementKey
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.editor.edit_keys import HELP_GROUPS
+from sandbox.window.editor.element_properties import property_sections
 from tests.window.editor.hand import BALL, CTRL, SHIFT, Hand, OpenOn
 from tests.window.pressing import press, release
 
@@ -227,6 +228,31 @@ def test_flipper_and_plunger_drive_bodies(hand: Hand, tmp_path: Path) -> None:
     assert math.isclose(found.position[:, names.index("box"), 1].min(), 2.0, abs_tol=0.01)  # drawn back by 0.5 m
     hand.press_button("drive:1")
     assert len(hand.scene.drives) == 1
+
+
+def test_path_of_a_kinematic_body_is_made_in_the_panel_and_moved_with_it(open_on: OpenOn) -> None:
+    """The rows of a path, and `one_way`, are those of kinematic bodies; the course is drawn and has no velocity."""
+    hand = open_on('[[box]]\nname = "lift"\nposition = [0.0, 0.0]\nsize = [2.0, 0.4]\n')
+    hand.click((0.0, 0.0))
+    shown = {
+        row.spec.key for section in property_sections(hand.view.draft, hand.editor.selection) for row in section.rows
+    }
+    assert "kinematic" in shown and not {"path.points", "one_way"} & shown
+    hand.set_field("selection:box", "kinematic", "true")
+    shown = {
+        row.spec.key for section in property_sections(hand.view.draft, hand.editor.selection) for row in section.rows
+    }
+    assert {"path.points", "path.easing", "one_way"} <= shown
+    hand.set_field("selection:box", "path.points", "0, 0; 0, 3")
+    hand.set_field("selection:box", "path.period", "4")
+    hand.set_field("selection:box", "path.easing", "smooth")
+    motion = hand.scene.bodies.paths[0]
+    assert motion.pose(1.0)[:2] == pytest.approx((0.0, 1.5)) and motion.is_smooth
+    hand.drag((0.0, 0.0), (2.0, 0.0))
+    assert hand.scene.bodies.paths[0].pose(2.0)[:2] == pytest.approx((2.0, 3.0))
+    hand.set_field("selection:box", "path.pause", "9")  # longer than the cycle
+    path = hand.scene.boxes[0].path
+    assert path is not None and path.pause == 0.0
 
 
 def test_nested_tables_lists_and_points_or_names_are_edited(open_on: OpenOn) -> None:

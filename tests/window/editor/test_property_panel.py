@@ -36,7 +36,8 @@ def section(
     mixed: tuple[str, ...] = (),
     is_open: bool = True,
 ) -> PropertySection:
-    rows = tuple(PropertyRow(spec, values.get(spec.key), spec.key in mixed) for spec in fields_of(model))
+    shown = [spec for spec in fields_of(model) if spec.key != "one_way" and not spec.key.startswith("path.")]
+    rows = tuple(PropertyRow(spec, values.get(spec.key), spec.key in mixed) for spec in shown)
     return PropertySection(title, model.__name__.lower(), rows, is_open)
 
 

@@ -225,3 +225,18 @@ def test_picked_body_has_a_ring():
     assert pixel_box(differ) == pytest.approx((76, 36, 124, 84), abs=1)  # smooth edges
     assert not differ[85:115, 45:75].any()
     assert not overlay_pixels(ONE, picked=5).any()
+
+
+def test_course_of_a_path_is_drawn_in_the_joints_overlay():
+    """A line from the first point to the last, dotted, with a disc at each; nothing else changes."""
+    box = {"position": [-3.0, 0.0], "size": [0.4, 0.4], "kinematic": True}
+    path = {"points": [[0.0, 0.0], [6.0, 0.0]], "speed": 1.0}
+    model = scene(box=[{**box, "path": path}])
+    left, top, right, bottom = pixel_box(overlay_pixels(model, "joints"))
+    assert left >= 36 and right == pytest.approx(163, abs=2)  # from 2 m inside the box to a disc of 3 px around 160 px
+    assert top >= 55 and bottom <= 65
+    dots = overlay_pixels(model, "joints")[70:150, 60]
+    assert 0.3 < dots.mean() < 0.9  # a dotted line, with antialiased ends
+    door = scene(box=[{**box, "path": {"angles": [0.0, 3.0], "pivot": [2.0, 0.0], "period": 1.0}}])
+    _, top, _, bottom = pixel_box(overlay_pixels(door, "joints"))
+    assert 15 <= top <= 25 or 95 <= bottom <= 105  # an arc of 2 m radius about the pivot
