@@ -33,6 +33,8 @@ class Cause(StrEnum):
     """kicks of walls and posts, as of bumpers and slingshots"""
     DRIVES = "drives"
     """thrusts, drives, motors, moving surfaces; forces and pulls by actions; zones that hold a body or have gravity"""
+    SPEED_LIMITS = "speed limits"
+    """speeds and angular speeds reduced to their limits"""
     CORRECTION = "position correction"
     """position changes that correct overlaps and joints"""
     INTEGRATOR = "integrator"

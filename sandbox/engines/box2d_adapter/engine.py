@@ -46,6 +46,9 @@ OWN = frozenset(
     {
         Demand.DAMPING,
         Demand.LIFT,
+        Demand.BODY_DAMPING,
+        Demand.GRAVITY_SCALE,
+        Demand.SPEED_LIMITS,
         Demand.POLYGONS,
         Demand.PASSABLE,
         Demand.SURFACE_SPEED,

@@ -235,6 +235,7 @@ class Box2DWorld:
             self.set_motion(index)
         if not (fixed or kinematic):
             self.set_mass(index)
+            body.gravity_scale = float(bodies.gravity_scale[index])
 
     def _has_contacts(self, index: int) -> bool:
         """Return whether a body can touch something, or is fixed, so that others may touch it."""
@@ -412,9 +413,11 @@ class Box2DWorld:
         self._world.gravity = self._vector(gravity)
 
     def set_damping(self, linear: float, angular: float) -> None:
-        """Set the damping rates of the velocities and spins of all bodies that forces move, 1/s."""
+        """Set the damping rates of the velocities and spins of all bodies that forces move, 1/s, besides their own."""
+        bodies = self._store.bodies
         for index in self.indices[~self._store.kinematic[self.indices]].tolist():
-            self._bodies[index].linear_damping, self._bodies[index].angular_damping = linear, angular
+            self._bodies[index].linear_damping = linear + float(bodies.linear_damping[index])
+            self._bodies[index].angular_damping = angular + float(bodies.angular_damping[index])
 
     def remove(self, indices: list[int]) -> None:
         """Remove bodies; their contacts end."""

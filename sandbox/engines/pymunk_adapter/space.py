@@ -87,6 +87,10 @@ class SpaceBodies:
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
+        self.limits: dict[int, tuple[float, float]] = {}
+        """largest speed, m/s, and angular speed, rad/s, of each body in the space that has a limit, by its index"""
+        self.limit_changes: list[tuple[int, float, float, float]] = []
+        """bodies whose speed was reduced in the last substep, and the changes of velocity, m/s, and spin, rad/s"""
         self._moving = 0
         self._needs_check: StateCheck | None = None
 
@@ -248,6 +252,8 @@ class SpaceBodies:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
                 self.thrusts.join(index, body)
+            if bodies.limited[index]:
+                self.limits[index] = float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])
 
     def _add_shapes(self, index: int, bodies: Bodies) -> None:
         """Add the shapes of a body in the space."""
@@ -298,6 +304,7 @@ class SpaceBodies:
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
             self.thrusts.leave(index)
+            self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
 
@@ -371,11 +378,28 @@ class SpaceBodies:
             self.drives.after()
         else:
             self._space.step(self._h)
+        if self.limits:
+            self._limit_speeds()
         self._state = None
+
+    def _limit_speeds(self) -> None:
+        """Reduce speeds to their limits."""
+        self.limit_changes.clear()
+        for index, (speed, spin) in self.limits.items():
+            record = self._members[index].body._body
+            velocity, turning = lib.cpBodyGetVelocity(record), lib.cpBodyGetAngularVelocity(record)
+            x, y = velocity.x, velocity.y
+            factor, turned = min(speed / max(math.hypot(x, y), speed), 1.0), max(min(turning, spin), -spin)
+            if factor < 1.0:
+                lib.cpBodySetVelocity(record, (factor * x, factor * y))
+            if turned != turning:
+                lib.cpBodySetAngularVelocity(record, turned)
+            if factor < 1.0 or turned != turning:
+                self.limit_changes.append((index, (factor - 1.0) * x, (factor - 1.0) * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
         """Set the forces of a substep that starts at a time, s: constant forces, thrusts and those of the air."""
-        if self.air.flows:
+        if self.air.acts_by_force:
             self.thrusts.update_loads(time, self._h)
             self._apply_air(*self._read())
             return
@@ -389,12 +413,13 @@ class SpaceBodies:
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
-            or self.air.flows
+            or self.air.acts_by_force
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
             or self._surface_setter.one_way_walls.walls
             or self.joints.has_breakable
+            or self.limits
         )
 
     def batch_steps(self, substeps: int, lists_substeps: bool) -> int:

@@ -62,8 +62,8 @@ class StepEnergyLedger:
         if self._drives is not None:  # the motion of driven bodies is entered separately
             self._inertia = self._all_inertia.copy()
             self._inertia[store.driven] = 0.0
-        self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
-        self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
+        self._weight: FloatArray = self._inertia[:, :1] * store.world_gravity
+        self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - store.world_gravity)
         breaks = np.full(len(store.setup.joints), np.inf)
         breaks[list(store.broken)] = -np.inf
         self._potential = Potential(store.setup, store.bodies, breaks=breaks)
@@ -83,6 +83,9 @@ class StepEnergyLedger:
 
     def enter_step(self, record: StepRecord) -> None:
         """Enter a step: its contacts and joints, the impact at its end, drives, forces and the integrator."""
+        if record.unlimited is not None:
+            self.account.add(Cause.SPEED_LIMITS, self._limits(record.unlimited, record.after))
+            record = record._replace(after=record.unlimited)
         start, impact = record.motion.start[1], record.impact
         mean = 0.5 * (start + record.end)
         if self._penalty is None:
@@ -97,6 +100,11 @@ class StepEnergyLedger:
         if self._drives is not None and record.work.drives is not None:
             self._enter_drives(self._drives, record.work.drives, record, mean)
         self._enter_motion(record, record.work.motors)
+
+    def _limits(self, before: State, after: State) -> float:
+        """Return the energy change, J, by the reduction of speeds to their limits, and by positions that follow it."""
+        change = self._kinetic(before[1], after[1]) + self._potential_change(before[0], after[0])
+        return change + self._spring_energy_change(before[0], after[0])
 
     def _enter_drives(self, drives: Drives, work: DriveWork, record: StepRecord, mean: FloatArray) -> None:
         """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
@@ -244,7 +252,7 @@ class StepEnergyLedger:
         store = self._store
         pose = np.column_stack((store.position, store.angle))
         rate = np.column_stack((store.velocity, store.angular_velocity))
-        weight = self._all_inertia[:, :1] * store.scene.world.gravity
+        weight = self._all_inertia[:, :1] * store.world_gravity
         total = 0.5 * float((self._all_inertia * rate * rate).sum()) - float((weight * store.position).sum())
         if self._potential.attracts:
             total += self._attraction_energy(pose)

@@ -210,7 +210,8 @@ class ContactMatrix:
     can_enter_zone: BoolArray
     """(N,) can enter a zone; driven bodies are not detected"""
     turnable: BoolArray
-    """(N,) can rotate: by friction; for other shapes than balls by any contact; by joints, thrusts or drives"""
+    """(N,) can change its spin: by friction; for other shapes than balls by any contact; by joints, thrusts, drives or
+    damping of its own"""
     mutual: bool
     """whether two bodies can touch"""
     ball_ball: bool
@@ -356,7 +357,12 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=joints.held(len(bodies)),
         can_enter_zone=_can_enter_zone(scene, bodies, filters.layers) & ~is_driven(scene, bodies),
-        turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True))
+        turnable=(
+            turnable
+            | _thrust_turned(scene, bodies)
+            | is_driven(scene, bodies, turning=True)
+            | (bodies.angular_damping > 0.0)
+        )
         & ~bodies.fixed
         & (bodies.moment < UNTURNABLE),
         mutual=bool(pair.any()),

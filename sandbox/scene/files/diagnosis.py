@@ -274,6 +274,11 @@ _SYNONYMS: dict[str, set[str]] = {
     "restitution": {"bounce", "bounciness", "elasticity"},
     "friction": {"friction_coefficient", "mu"},
     "mass": {"density", "weight"},
+    "gravity_scale": {"gravityscale", "gravity"},
+    "linear_damping": {"lineardamping", "damping", "linear_drag", "lineardrag", "drag"},
+    "angular_damping": {"angulardamping", "angular_drag", "angulardrag"},
+    "max_speed": {"maxspeed", "max_velocity", "maxvelocity", "speed_limit", "velocity_limit"},
+    "max_angular_velocity": {"maxangularvelocity", "max_angular_speed", "max_spin"},
 }
 """Keys of the scene file, and words that other engines and file formats use for them."""
 
@@ -282,23 +287,15 @@ _FAST = (
     'detection = "swept", box2d none with static objects; for pymunk, `sandbox check` states the dt'
 )
 _SENSOR = "bodies have no sensors; a [[zone]] detects bodies whose centre is inside it"
-_GRAVITY = "no body has a gravity of its own; world.gravity acts on all bodies, that of a [[zone]] on those inside it"
-_DAMPING = "no body has a damping of its own; world.damping and world.linear_drag act on all bodies"
 _ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
-_SPEED = "speeds have no limit; world.quadratic_drag limits that of a fall"
 _ELSEWHERE = {
     "bullet": _FAST,
     "ccd": _FAST,
     "continuouscollision": _FAST,
     "sensor": _SENSOR,
     "trigger": _SENSOR,
-    "gravityscale": _GRAVITY,
-    "lineardamping": _DAMPING,
-    "angulardamping": _DAMPING,
     "rollingfriction": _ROLLING,
     "rollingresistance": _ROLLING,
-    "maxspeed": _SPEED,
-    "maxvelocity": _SPEED,
 }
 """Features that bodies have in other engines, in letters only and without `is`, and what a scene has in their place"""
 
