@@ -23,6 +23,8 @@ class Cause(StrEnum):
     """normal impulses of contacts, as far as they remove energy"""
     FRICTION = "friction"
     """tangential impulses of contacts, as far as they remove energy"""
+    ROLLING = "rolling resistance"
+    """torques that resist rolling"""
     DRAG = "drag"
     """air drag, where wind may add energy, and `world.damping`"""
     DAMPING = "damping"

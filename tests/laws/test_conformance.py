@@ -156,6 +156,14 @@ PROOFS: dict[Demand, Proof] = {
         scene(world=GRAVITY, ball=[ball(max_speed=2.0, max_angular_velocity=1.0, angular_velocity=3.0)]),
         both(velocity(0.0, -2.0), spin(1.0), position(0.0, -1.8)),
     ),
+    Demand.ROLLING: Proof(
+        scene(
+            world=GRAVITY,
+            ball=[ball(y=0.25, vx=1.0, angular_velocity=-4.0, rolling_resistance=0.05, friction=1.0)],
+            plane=[FLOOR],
+        ),
+        both(velocity(1.0 - 0.5 / 1.5, 0.0), spin(-4.0 * (1.0 - 0.5 / 1.5), error=4.0 * ERROR)),
+    ),
     Demand.LIFT: Proof(scene(ball=[ball(vx=1.0, angular_velocity=5.0, lift=0.1 * math.pi)]), velocity(0.0, 1.0)),
     # velocity and spin keep a quarter of their values
     Demand.DAMPING: Proof(

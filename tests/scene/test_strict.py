@@ -91,7 +91,7 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
         (f"{BALL}isSensor = true", r"\[\[zone\]\]"),
         (f"{BALL}gravityScale = 0.5", "did you mean 'gravity_scale'"),
         (f"{BALL}drag = 0.1", "did you mean 'linear_damping'"),
-        (f"{BALL}rollingResistance = 0.1", r"surface\.rolling_friction"),
+        (f"{BALL}rollingFriction = 0.1", "did you mean 'rolling_resistance'"),
         (f"{BALL}maxVelocity = 3", "did you mean 'max_speed'"),
         (f"{BALL}[[joint]]\nkind = 'prismatic'\nbetween = ['ball-1']", "did you mean 'groove'"),
         (f"{BALL}[[joint]]\nkind = 'RevoluteJoint'\nbetween = ['ball-1']", "did you mean 'pivot'"),

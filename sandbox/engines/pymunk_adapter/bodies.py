@@ -204,7 +204,7 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.add`, or pymunk does not support the body in the scene.
         """
-        wanted = self._demands(self.scene.world) | demands_of_body(single)
+        wanted = self._demands(self.scene.world) | demands_of_body(single, self.scene)
         if faults := combination_faults(self.scene, self._settings, wanted):
             raise ActionError(f"pymunk: {faults[0]}")
         self.refresh()

@@ -39,6 +39,7 @@ OWN = frozenset(
         Demand.BODY_DAMPING,
         Demand.GRAVITY_SCALE,
         Demand.SPEED_LIMITS,
+        Demand.ROLLING,
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,

@@ -31,6 +31,7 @@ from sandbox.engines.pymunk_adapter.drives import SpaceDrives
 from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
+from sandbox.engines.pymunk_adapter.rolling import SpaceRolling
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
@@ -87,6 +88,8 @@ class SpaceBodies:
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
+        self.rolling = SpaceRolling(self._space, settings.h)
+        """rolling resistance of balls"""
         self.limits: dict[int, tuple[float, float]] = {}
         """largest speed, m/s, and angular speed, rad/s, of each body in the space that has a limit, by its index"""
         self.limit_changes: list[tuple[int, float, float, float]] = []
@@ -192,6 +195,7 @@ class SpaceBodies:
         if index in self._resting:  # it is kinematic already and has no mass in pymunk
             return
         body = self._members[index].body
+        self.rolling.leave(body)
         self._resting[index] = body.mass, body.moment
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         body.body_type = pymunk.Body.KINEMATIC
@@ -245,6 +249,8 @@ class SpaceBodies:
         if self._can_touch[index] or (fixed and bodies.elements[bodies.element[index]].collides != "none"):
             self._add_shapes(index, bodies)
         self._by_name[name], self._name_of[index] = body, name
+        if bodies.round[index]:
+            self.rolling.join(body, float(bodies.radius[index]))
         if driven:
             self.drives.join(name, index, body, state)
         elif not (fixed or kinematic):
@@ -300,6 +306,7 @@ class SpaceBodies:
             self.drives.leave(index)
             member = self._members.pop(index)
             self._moving -= member.moves
+            self.rolling.leave(member.body)
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
@@ -342,6 +349,7 @@ class SpaceBodies:
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch = matrix.touches
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
+        self.rolling.rebuild(matrix)
         for index, (_, shapes) in self._members.items():
             for piece, shape in shapes:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
@@ -378,9 +386,17 @@ class SpaceBodies:
             self.drives.after()
         else:
             self._space.step(self._h)
+        if self.rolling.is_active:
+            self.rolling.update()
         if self.limits:
             self._limit_speeds()
         self._state = None
+
+    @property
+    def rolled(self) -> IntArray:
+        """Indices of the bodies on which rolling resistance acted in the last substep."""
+        ids = self.rolling.resisted
+        return np.asarray([n for n, member in self._members.items() if member.body.id in ids], np.int64)
 
     def _limit_speeds(self) -> None:
         """Reduce speeds to their limits."""
@@ -420,6 +436,7 @@ class SpaceBodies:
             or self._surface_setter.one_way_walls.walls
             or self.joints.has_breakable
             or self.limits
+            or self.rolling.is_active
         )
 
     def batch_steps(self, substeps: int, lists_substeps: bool) -> int:

@@ -90,6 +90,8 @@ class StepEnergyLedger:
         mean = 0.5 * (start + record.end)
         if self._penalty is None:
             self._enter_contacts(record.contacts, record.impulse, mean, record.kick_energy)
+        if record.rolling is not None:
+            self.account.add(Cause.ROLLING, self._rolling_work(record.contacts, record.rolling, mean))
         assert record.work is not None  # this ledger has switched it on
         if self._joints is not None and self._joints.method == "impulses":
             self.account.add(Cause.JOINTS, record.work.joints)
@@ -100,6 +102,12 @@ class StepEnergyLedger:
         if self._drives is not None and record.work.drives is not None:
             self._enter_drives(self._drives, record.work.drives, record, mean)
         self._enter_motion(record, record.work.motors)
+
+    def _rolling_work(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
+        """Return the work, J, of angular impulses (K,) at mean rates, without that on driven bodies."""
+        spin = np.where(self._store.driven, 0.0, mean[:, 2])
+        other = np.where(contacts.second >= 0, spin[np.maximum(contacts.second, 0)], 0.0)
+        return float(impulse @ (other - spin[contacts.first]))
 
     def _limits(self, before: State, after: State) -> float:
         """Return the energy change, J, by the reduction of speeds to their limits, and by positions that follow it."""

@@ -69,6 +69,8 @@ class StepRecord(NamedTuple):
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
     impact: Impact | None
     """contacts that act only at the end of the step; None with discrete detection"""
+    rolling: FloatArray | None
+    """(K,) N·m·s on the second bodies of the contacts, by rolling resistance; None without any"""
     joint_load: FloatArray | None
     """(L, 2) N or N·m, force of each joint on its second body; None if no joint can break"""
     work: "SolverWork | None"

@@ -31,7 +31,7 @@ from sandbox.measure.analytic.static_stack import static_stack
 from sandbox.measure.metrics.clearance import plane_clearance
 from sandbox.scene.compile.ballistics import free_rotation
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import OWN_MOTION, demands, on_floor
+from sandbox.scene.compile.demands import OWN_MOTION, Demand, demands, on_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import ContactEvent, Contacts, Trajectory
 
@@ -110,7 +110,7 @@ def solution(scene: Scene) -> Solution | None:
     has_filters = len(scene.layers) > 1 or scene.categories or scene.bodies.groups
     if on_floor(scene) or scene.zones or has_filters or scene.bodies.kinematic.any():  # no formula includes them
         return None
-    if demands(scene) & OWN_MOTION:  # nor these
+    if demands(scene) & (OWN_MOTION | {Demand.ROLLING}):  # nor these
         return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:
@@ -172,7 +172,9 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones) or _moves_its_own_way(bodies, number):
         return None
-    form = _solved(trajectory, scene, number) or _bouncing(trajectory, scene, number)
+    form = _solved(trajectory, scene, number)
+    if Demand.ROLLING not in demands(scene):
+        form = form or _bouncing(trajectory, scene, number)
     form = form or _flying(trajectory, scene, bodies, number)
     return form if form is not None and np.count_nonzero(form.valid) > 1 else None
 

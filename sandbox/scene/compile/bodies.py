@@ -101,7 +101,7 @@ def rotated(offset: FloatArray, angle: float) -> FloatArray:
 
 
 SURFACE = (
-    *("material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour"),
+    *("material", "restitution", "restitution_falloff", "friction", "rolling_resistance", "surface_speed", "colour"),
     *("collides", "categories", "mask", "layer"),
 )
 MOTION = ("gravity_scale", "linear_damping", "angular_damping", "max_speed", "max_angular_velocity")

@@ -40,6 +40,7 @@ class Demand(StrEnum):
     POLYGONS = "polygons"
     RESTITUTION = "restitution"
     FRICTION = "friction"
+    ROLLING = "rolling resistance"
     FALLOFF = "falloff"
     KICKS = "kicks"
     SURFACE_SPEED = "surface speed"
@@ -208,6 +209,10 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
         why = f"up to {largest:g}" if largest else "0 for every pair that can collide"
         yield demand, largest > 0, why if can_collide else "no collisions possible"
 
+    rolls = bool((bodies.round & matrix.touches).any())
+    why = f"up to {matrix.rolling:g}" if rolls and matrix.rolling else "0 for every contact of a ball"
+    yield Demand.ROLLING, rolls and matrix.rolling > 0.0, why if can_collide else "no collisions possible"
+
     yield from _surfaces(scene, matrix)
     yield from _joints(setup)
     yield from _floor(setup)
@@ -345,8 +350,16 @@ def curls(setup: Setup) -> bool:
     return any(on and demand is Demand.CURL for demand, on, _ in _floor(setup))
 
 
-def demands_of_body(single: BodySpec) -> frozenset[Demand]:
-    """Return the demands that a body alone adds to those of any scene."""
+def may_resist_rolling(single: BodySpec, scene: Scene) -> bool:
+    """Return whether a body can have contacts with rolling resistance by its own value, its material or a pair."""
+    stated = [single.rolling_resistance]
+    stated += [each.rolling_resistance for each in scene.materials if each.name == single.material]
+    stated += [each.rolling_resistance for each in scene.pairs if single.material in each.between]
+    return any(stated)
+
+
+def demands_of_body(single: BodySpec, scene: Scene) -> frozenset[Demand]:
+    """Return the demands that a body adds to those of a scene, by itself."""
     stated = (
         (Demand.GROUPS, single.group is not None),
         (Demand.KINEMATIC, single.kinematic),
@@ -354,6 +367,7 @@ def demands_of_body(single: BodySpec) -> frozenset[Demand]:
         (Demand.GRAVITY_SCALE, single.gravity_scale != 1.0),
         (Demand.BODY_DAMPING, single.linear_damping > 0.0 or single.angular_damping > 0.0),
         (Demand.SPEED_LIMITS, single.max_speed is not None or single.max_angular_velocity is not None),
+        (Demand.ROLLING, may_resist_rolling(single, scene)),
     )
     return frozenset(demand for demand, is_stated in stated if is_stated)
 

@@ -202,6 +202,8 @@ SpeedLimit = Annotated[float, Field(gt=0, le=MAX_SPEED)]
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
+RollingResistance = Annotated[float, Field(ge=0, le=1000)]
+"""Coefficient of rolling resistance: torque / (radius · normal force)."""
 SurfaceSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
 SurfaceVelocity = tuple[SurfaceSpeed, SurfaceSpeed]
 Falloff = Annotated[float, Field(ge=0, le=1e6)]
@@ -236,6 +238,9 @@ class HasMaterial(Part):
     added"""
     friction: Friction | None = None
     """Coulomb friction μ; if both sides of a contact have a value, they are multiplied"""
+    rolling_resistance: RollingResistance | None = None
+    """c of contacts of balls: a torque up to c·r·N resists rolling, N being the normal force and r the larger radius of
+    the balls; the larger value of the two sides applies"""
     surface_speed: SurfaceSpeed = 0.0
     """speed of the surface, m/s, as of a conveyor belt or a drum: to the right of the outward normal, clockwise around
     the object"""

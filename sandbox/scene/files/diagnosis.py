@@ -273,6 +273,7 @@ _SYNONYMS: dict[str, set[str]] = {
     "angular_velocity": {"angvel", "omega"},
     "restitution": {"bounce", "bounciness", "elasticity"},
     "friction": {"friction_coefficient", "mu"},
+    "rolling_resistance": {"rollingresistance", "rolling_friction", "rollingfriction"},
     "mass": {"density", "weight"},
     "gravity_scale": {"gravityscale", "gravity"},
     "linear_damping": {"lineardamping", "damping", "linear_drag", "lineardrag", "drag"},
@@ -287,15 +288,12 @@ _FAST = (
     'detection = "swept", box2d none with static objects; for pymunk, `sandbox check` states the dt'
 )
 _SENSOR = "bodies have no sensors; a [[zone]] detects bodies whose centre is inside it"
-_ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
 _ELSEWHERE = {
     "bullet": _FAST,
     "ccd": _FAST,
     "continuouscollision": _FAST,
     "sensor": _SENSOR,
     "trigger": _SENSOR,
-    "rollingfriction": _ROLLING,
-    "rollingresistance": _ROLLING,
 }
 """Features that bodies have in other engines, in letters only and without `is`, and what a scene has in their place"""
 

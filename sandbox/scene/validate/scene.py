@@ -234,7 +234,8 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
     if scene.surface is None and not scene.pockets:
         return
     for location, collider in _static_colliders(scene):
-        for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
+        keys = ("restitution_falloff", None), ("rolling_resistance", None)
+        for key, usual in (("kick", None), ("one_way", False), ("solid", True), *keys):
             if getattr(collider, key, usual) != usual:
                 yield (*location, key), "is not supported in a scene with a [surface] or pockets; remove it"
     tables: dict[str, Sequence[Material | Pair | BodySource]] = {
@@ -249,6 +250,12 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
                     (kind, k, "restitution_falloff"),
                     "is not supported in a scene with a [surface] or pockets, where restitution does not "
                     "depend on speed; remove it",
+                )
+            if each.rolling_resistance:
+                yield (
+                    (kind, k, "rolling_resistance"),
+                    "is not supported in a scene with a [surface] or pockets, where balls roll by "
+                    "surface.rolling_friction; remove it",
                 )
 
 
