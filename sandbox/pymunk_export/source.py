@@ -76,10 +76,11 @@ def program_text(
         *_main(contents),
     ]
     text = "\n".join(parts)
-    return "\n".join([*_header(setup.scene, note, has_infinity="INFINITY" in text), text]) + "\n"
+    header = _header(setup.scene, note, has_infinity="INFINITY" in text, has_math="math." in text)
+    return "\n".join([*header, text]) + "\n"
 
 
-def _header(scene: Scene, note: str, has_infinity: bool) -> Iterator[str]:
+def _header(scene: Scene, note: str, has_infinity: bool, has_math: bool) -> Iterator[str]:
     yield from (
         '"""A scene as a program for pymunk, written by `sandbox export`.',
         "",
@@ -87,6 +88,7 @@ def _header(scene: Scene, note: str, has_infinity: bool) -> Iterator[str]:
         f"of `sandbox run` on the engine pymunk, bit for bit, with pymunk {version('pymunk')}.",
         '"""',
         "",
+        *(("import math", "") if has_math else ()),
         "import pymunk",
         "",
     )
@@ -318,6 +320,32 @@ def _step(contents: Contents) -> Iterator[str]:
             "        body.torque = torque",
             "",
         )
+    if contents.scales_gravity:
+        yield from (
+            "",
+            "def scale_gravity(body):",
+            '    """Add the force by which the gravity on a body differs: pymunk resets forces after each step."""',
+            '    scale = getattr(body, "gravity_scale", 1.0)',
+            "    if scale != 1.0:",
+            "        x, y = GRAVITY",
+            "        body.force += ((scale * x - x) * body.mass, (scale * y - y) * body.mass)",
+            "",
+        )
+    if contents.has_limits:
+        yield from (
+            "",
+            "def limit_speed(body):",
+            '    """Reduce velocity and angular velocity of a body to its limits."""',
+            "    speed, spin = body.limits",
+            "    x, y = body.velocity",
+            "    fast = math.hypot(x, y)",
+            "    if fast > speed:",
+            "        change = speed / fast - 1.0",
+            "        body.velocity = x + change * x, y + change * y",
+            "    if abs(body.angular_velocity) > spin:",
+            "        body.angular_velocity = math.copysign(spin, body.angular_velocity)",
+            "",
+        )
     yield from (
         "",
         "def step(space):",
@@ -327,7 +355,15 @@ def _step(contents: Contents) -> Iterator[str]:
     )
     if contents.has_thrusts:
         yield from ("        for body in space.bodies:", "            apply_thrust(body, h)")
+    if contents.scales_gravity:
+        yield from ("        for body in space.bodies:", "            scale_gravity(body)")
     yield "        space.step(h)"
+    if contents.has_limits:
+        yield from (
+            "        for body in space.bodies:",
+            '            if hasattr(body, "limits"):',
+            "                limit_speed(body)",
+        )
     if contents.setup.scene.world.bounds is not None:
         yield from (
             "    (left, bottom), (right, top) = BOUNDS",

@@ -25,6 +25,8 @@ from tests.accounts import closed_account
 G = 9.81
 ABLE = ["pymunk", "box2d", "reference"]
 LEDGERS = ["pymunk", "reference"]
+pytestmark = pytest.mark.fail_slow(60)  # kernels compile on first use
+
 ORDERS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "leapfrog": 2, "rk4": 4}
 
 

@@ -91,7 +91,7 @@ def test_a_spinning_ball_without_friction_loses_its_spin_at_a_constant_rate(engi
     result = run(scene_of(ball), engine)
     rate = 0.05 * R * M * G / (DISC * M * R * R)
     assert result.angular_velocity[-1, 0] == pytest.approx(20.0 - rate, abs=3.0 * rate / 240.0)  # three steps
-    assert np.abs(result.velocity[-1, 0]).max() < 0.01  # m/s, it stays
+    assert abs(result.velocity[-1, 0, 0]) < 0.01  # m/s, it stays
 
 
 @pytest.mark.parametrize("engine", ABLE)
@@ -157,6 +157,7 @@ def test_the_account_of_energy_names_the_loss(engine: str) -> None:
     assert account[Cause.ROLLING] < -1.0
 
 
+@pytest.mark.fail_slow(60)  # 1920 steps with an account, twice
 @pytest.mark.parametrize("engine", LEDGERS)
 def test_all_the_energy_of_a_ball_that_stops_is_lost_to_rolling_resistance(engine: str) -> None:
     scene = scene_of(rolling(2.0, rolling_resistance=0.05), duration=8.0)

@@ -135,6 +135,16 @@ CONTENTS: dict[str, dict[str, Any]] = {
         "ball": [{"name": "ghost", "position": [0.0, 3.0], "radius": 0.5, "collides": "none"}],
         "thrust": [{"body": "ghost", "force": [2.0, 9.0]}],
     },
+    "gravity scales and speed limits": {
+        "ball": [
+            {"name": "balloon", "position": [0.0, 1.0], "radius": 0.3, "mass": 0.7, "gravity_scale": -0.3},
+            {"name": "rock", "position": [1.0, 3.0], "radius": 0.3, "gravity_scale": 1.7, "max_speed": 3.1},
+            {"name": "ghost", "position": [2.0, 3.0], "radius": 0.3, "gravity_scale": 0.3, "collides": "none"},
+            {"name": "top", "position": [3.0, 0.5], "radius": 0.3, "angular_velocity": 9, "max_angular_velocity": 4.3},
+        ],
+        "box": [{"name": "ship", "position": [-2.0, 3.0], "size": [1.0, 0.5], "gravity_scale": 0.7, "angle": 0.2}],
+        "thrust": [{"body": "ship", "force": [1.0, 12.0], "point": [0.2, -0.25]}],
+    },
     "bounds": {
         "grid": [
             {
@@ -502,3 +512,10 @@ def test_all_reasons_are_given_at_once() -> None:
     assert {each.path for each in found} == paths
     messages = " ".join(each.message for each in found)
     assert all(name in messages for name in ("'corner'", "'gate'", "'late'"))
+
+
+@pytest.mark.parametrize("key", ["linear_damping", "rolling_resistance"])
+def test_keys_of_bodies_that_need_the_engine_are_refused_by_name(key: str) -> None:
+    ball = {"position": [0.0, 0.5], "radius": 0.5, key: 0.1}
+    (found,) = obstacles(from_document(BASE | {"ball": [ball]}))
+    assert key in found.message

@@ -248,8 +248,9 @@ class Particles:
         forces = np.zeros_like(self._position)
         for index, (force, _) in self._forces.items():
             forces[index] = force
-        extra = (self._bodies.gravity_scale[self._scaled] - 1.0)[:, None] * np.asarray(self.world.gravity)
-        forces[self._scaled] += extra * self._mass[self._scaled][:, None]
+        if len(self._scaled):  # in the operations of `PymunkBodies`, for bodies in the space
+            world, scale = np.asarray(self.world.gravity), self._bodies.gravity_scale[self._scaled]
+            forces[self._scaled] += (scale[:, None] * world - world) * self._mass[self._scaled][:, None]
         return forces
 
     def _turn_with_torques(self) -> None:

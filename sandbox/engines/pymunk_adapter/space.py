@@ -405,13 +405,14 @@ class SpaceBodies:
             record = self._members[index].body._body
             velocity, turning = lib.cpBodyGetVelocity(record), lib.cpBodyGetAngularVelocity(record)
             x, y = velocity.x, velocity.y
-            factor, turned = min(speed / max(math.hypot(x, y), speed), 1.0), max(min(turning, spin), -spin)
-            if factor < 1.0:
-                lib.cpBodySetVelocity(record, (factor * x, factor * y))
+            fast, turned = math.hypot(x, y), max(min(turning, spin), -spin)
+            change = speed / fast - 1.0 if fast > speed else 0.0
+            if change:
+                lib.cpBodySetVelocity(record, (x + change * x, y + change * y))
             if turned != turning:
                 lib.cpBodySetAngularVelocity(record, turned)
-            if factor < 1.0 or turned != turning:
-                self.limit_changes.append((index, (factor - 1.0) * x, (factor - 1.0) * y, turned - turning))
+            if change or turned != turning:
+                self.limit_changes.append((index, change * x, change * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
         """Set the forces of a substep that starts at a time, s: constant forces, thrusts and those of the air."""
