@@ -74,6 +74,8 @@ def _flight(scene: Scene) -> Iterator[Diagnostic]:
         return
     own_pull = np.maximum(pull * np.abs(bodies.gravity_scale[moving]), np.finfo(np.float64).tiny)
     time = np.minimum(scene.world.duration, top_speeds(scene, matrix)[moving] / own_pull)
+    damping = bodies.linear_damping[moving]
+    time = np.minimum(time, np.divide(1.0, damping, out=np.full(len(damping), np.inf), where=damping > 0.0))
     error = 0.5 * own_pull * solver.h * time
     down = np.asarray(scene.world.gravity) / pull
     excess = error / bodies.thin[moving]
