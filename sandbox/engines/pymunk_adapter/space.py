@@ -205,6 +205,7 @@ class SpaceBodies:
     def release(self, index: int) -> None:
         """Release a body that was held."""
         body = self._members[index].body
+        self.rolling.leave(body)
         body.body_type = pymunk.Body.DYNAMIC
         body.mass, body.moment = self._resting.pop(index)
         body.force, body.torque = (0.0, 0.0), 0.0  # of thrusts, set while it was held
