@@ -14,6 +14,7 @@ from sandbox.engines.switching import start as start_switchable
 from sandbox.measure.analytic.solve import solution
 from sandbox.measure.metrics.invariants import momentum_drift
 from sandbox.measure.preflight.speed_bound import top_speeds
+from sandbox.measure.run.ensemble import ensemble
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
@@ -25,8 +26,6 @@ from tests.accounts import closed_account
 G = 9.81
 ABLE = ["pymunk", "box2d", "reference"]
 LEDGERS = ["pymunk", "reference"]
-pytestmark = pytest.mark.fail_slow(60)  # kernels compile on first use
-
 ORDERS = {"explicit_euler": 1, "semi_implicit_euler": 1, "velocity_verlet": 2, "leapfrog": 2, "rk4": 4}
 
 
@@ -44,6 +43,7 @@ def rounding(engine: str) -> float:
     return 1e-4 if engine == "box2d" else 1e-12
 
 
+@pytest.mark.fail_slow(60)  # kernels are loaded on first use
 @pytest.mark.parametrize("collides", ["all", "none"])
 @pytest.mark.parametrize("engine", ABLE)
 def test_gravity_accelerates_each_body_by_its_own_factor(engine: str, collides: str) -> None:
@@ -259,6 +259,18 @@ def test_reference_continues_from_a_snapshot_bit_for_bit() -> None:
         ends.append(simulation.state_hash())
         simulation.restore(kept)
     assert ends[0] == ends[1]
+
+
+@pytest.mark.fail_slow(60)  # several runs on each engine
+@pytest.mark.parametrize("engine", ABLE)
+def test_ensembles_have_the_keys(engine: str) -> None:
+    """Compiled steps and batches of worlds either have them or are not taken."""
+    floor = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "friction": 0.5}
+    for more in ({"gravity_scale": 0.5}, {"max_speed": 1.0}, {"linear_damping": 1.0}, {"rolling_resistance": 0.1}):
+        thing = ball(y=0.4, velocity=[2.0, 0.0], **more)
+        scene = scene_of(thing, duration=0.5, plane=[floor])
+        many = ensemble(scene, 2, engine=engine, vary={"ball.a.velocity": 0.0})
+        assert (many.position == run(scene, engine).position[-1]).all(), more
 
 
 def test_the_keys_hold_after_a_change_of_the_engine() -> None:

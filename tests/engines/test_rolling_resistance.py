@@ -46,6 +46,7 @@ def scene_of(
     return from_document({"world": world, "solver": dt, "ball": [*balls], "plane": [plane], **more})
 
 
+@pytest.mark.fail_slow(60)  # 1920 steps
 @pytest.mark.parametrize("beta", [DISC, SPHERE])
 @pytest.mark.parametrize("engine", ABLE)
 def test_a_ball_stops_after_the_distance_of_the_formula(engine: str, beta: float) -> None:

@@ -84,7 +84,7 @@ class StepEnergyLedger:
     def enter_step(self, record: StepRecord) -> None:
         """Enter a step: its contacts and joints, the impact at its end, drives, forces and the integrator."""
         if record.unlimited is not None:
-            self.account.add(Cause.SPEED_LIMITS, self._limits(record.unlimited, record.after))
+            self._enter_limits(record.motion.start[1], record.unlimited, record.after)
             record = record._replace(after=record.unlimited)
         start, impact = record.motion.start[1], record.impact
         mean = 0.5 * (start + record.end)
@@ -109,10 +109,16 @@ class StepEnergyLedger:
         other = np.where(contacts.second >= 0, spin[np.maximum(contacts.second, 0)], 0.0)
         return float(impulse @ (other - spin[contacts.first]))
 
-    def _limits(self, before: State, after: State) -> float:
-        """Return the energy change, J, by the reduction of speeds to their limits, and by positions that follow it."""
+    def _enter_limits(self, start: FloatArray, before: State, after: State) -> None:
+        """Enter the reduction of speeds to their limits, in a step that began with rates `start`, (N, D).
+
+        It reverses a part of the step's kicks, and positions follow it: that is the integrator's, as for contacts.
+        """
+        work = self._product(after[1] - before[1], 0.5 * (start + after[1]))
         change = self._kinetic(before[1], after[1]) + self._potential_change(before[0], after[0])
-        return change + self._spring_energy_change(before[0], after[0])
+        change += self._spring_energy_change(before[0], after[0])
+        self.account.add(Cause.SPEED_LIMITS, work)
+        self.account.add(Cause.INTEGRATOR, change - work)
 
     def _enter_drives(self, drives: Drives, work: DriveWork, record: StepRecord, mean: FloatArray) -> None:
         """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
