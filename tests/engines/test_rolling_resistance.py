@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.action import ActionError, SetParameter, Spawn
+from sandbox.action import ActionError, Drive, SetParameter, Spawn
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
@@ -156,6 +156,40 @@ def test_the_account_of_energy_names_the_loss(engine: str) -> None:
         scene_of(ball, rolling(slope=0.0) | {"name": "b", "position": [1.5, 0.6]}), 300, engine=engine, closes=1e-12
     )
     assert account[Cause.ROLLING] < -1.0
+
+
+@pytest.mark.parametrize("engine", LEDGERS)
+@pytest.mark.parametrize("kind", ["torque", "stroke"])
+def test_the_account_balances_with_balls_on_driven_bodies(engine: str, kind: str) -> None:
+    bat = {"name": "bat", "position": [0.0, 1.0], "size": [1.0, 0.1], "mass": 0.5, "friction": 0.5}
+    drive = {"name": "d", "kind": kind, "body": "bat", "pivot": [-0.45, 1.0], "stops": [0.0, 0.6]}
+    drive |= {"torque": 5.0} if kind == "torque" else {"rate": 3.0}
+    ball = {
+        "name": "a",
+        "position": [0.2, 1.15],
+        "radius": 0.1,
+        "mass": 0.1,
+        "friction": 1.0,
+        "rolling_resistance": 0.2,
+    }
+    actions = [(20, Drive(time=0.0, drive="d", level=1.0))]
+    account = closed_account(scene_of(ball, box=[bat], drive=[drive]), 150, actions, engine=engine, closes=1e-12)
+    assert account[Cause.ROLLING] != 0.0
+
+
+@pytest.mark.parametrize("engine", LEDGERS)
+def test_the_account_balances_with_balls_on_kinematic_bodies(engine: str) -> None:
+    drum = {"name": "drum", "position": [0.0, R], "radius": R, "kinematic": True, "angular_velocity": 3.0}
+    ball = {
+        "name": "a",
+        "position": [0.02, 3.0 * R],
+        "radius": R,
+        "mass": M,
+        "friction": 1.0,
+        "rolling_resistance": 0.2,
+    }
+    account = closed_account(scene_of({**drum, "friction": 1.0}, ball), 200, engine=engine, closes=1e-12)
+    assert account[Cause.ROLLING] < 0.0
 
 
 @pytest.mark.fail_slow(60)  # 1920 steps with an account, twice

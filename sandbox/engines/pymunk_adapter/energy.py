@@ -132,6 +132,8 @@ class DriveWorkSums(NamedTuple):
     """by the weight of bodies driven by torque, as computed in the steps"""
     potential_change: float
     """gain of potential energy of bodies driven by torque"""
+    rolling: float
+    """by the rolling resistance of balls on bodies driven by torque, which the drive does not hold at a stop"""
 
 
 def set_mean_driven_velocity(
@@ -154,6 +156,7 @@ def drive_work(
     bodies: Bodies,
     gravity: tuple[float, float],
     h: float,
+    rolled: IntArray,
 ) -> DriveWorkSums:
     """Return the work on driven bodies in a substep.
 
@@ -165,12 +168,13 @@ def drive_work(
         bodies: all.
         gravity: m/s².
         h: substep, s.
+        rolled: bodies on which rolling resistance acted.
     """
     before, now = states
     velocity, spin = means
     contact_impulses = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), np.empty(0, np.int64))
     contact_impulses.subtract(points.joint_impulses)  # the negative of the impulses by contacts
-    driven = weight = potential_change = 0.0
+    driven = weight = potential_change = rolling = 0.0
     for driven_body in driven_bodies:
         n = driven_body.index
         mass = float(bodies.mass[n])
@@ -188,13 +192,13 @@ def drive_work(
         moment = float(bodies.moment[n]) + mass * (x * x + y * y)
         if isinstance(driven_body, SpaceHingeMotor):
             weight += driven_body.weight_torque * h * float(spin[n])
+        impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
+        impulse -= driven_body.weight_torque * h if isinstance(driven_body, SpaceHingeMotor) else 0.0
         if isinstance(driven_body, SpaceHingeMotor) and not driven_body.was_locked:
+            rolling += (impulse - driven_body.drive_impulse) * float(spin[n]) if n in rolled else 0.0
             impulse = driven_body.drive_impulse
-        else:
-            impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
-            impulse -= driven_body.weight_torque * h if isinstance(driven_body, SpaceHingeMotor) else 0.0
         driven += impulse * float(spin[n])
-    return DriveWorkSums(driven, weight, potential_change)
+    return DriveWorkSums(driven, weight, potential_change, rolling)
 
 
 def kinematic_work(
@@ -244,8 +248,8 @@ class PymunkEnergyLedger:
     Impulses of contacts, springs and motors are those that pymunk reports. Of other joints pymunk reports magnitudes
     only: their impulses are the remaining changes of momentum of their bodies, so that in scenes with joints the
     residual checks less. So are the angular impulses of rolling resistance on balls; those on balls with joints count
-    as impulses of the joints. pymunk corrects joints by velocities, which adds energy; that is phantom energy, not
-    position correction.
+    as impulses of the joints, and those on kinematic bodies are left out, as work between the drive and the ball.
+    pymunk corrects joints by velocities, which adds energy; that is phantom energy, not position correction.
 
     The residual is rounding, in pymunk's sums and here. Over the first 0.1 to 1 s of the shipped scenes it was at most
     6e-13 of the largest kinetic energy or energy turned over by one cause: in the pyramid, whose potential energy is
@@ -326,7 +330,10 @@ class PymunkEnergyLedger:
         account.add(Cause.DRIVES, surface_work)
         if driven_bodies:
             gravity = p.scene.world.gravity
-            work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h)
+            rolled = p.space_bodies.rolled if p.space_bodies.rolling.resisted else np.empty(0, np.int64)
+            means = velocity, spin
+            work = drive_work(driven_bodies, (before, now), means, points, p.bodies, gravity, p.h, rolled)
+            account.add(Cause.ROLLING, work.rolling)
             account.add(Cause.DRIVES, work.driven)
             account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 

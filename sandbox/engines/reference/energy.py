@@ -91,7 +91,7 @@ class StepEnergyLedger:
         if self._penalty is None:
             self._enter_contacts(record.contacts, record.impulse, mean, record.kick_energy)
         if record.rolling is not None:
-            self.account.add(Cause.ROLLING, self._rolling_work(record.contacts, record.rolling, mean))
+            self._enter_rolling(record.contacts, record.rolling, mean[:, 2])
         assert record.work is not None  # this ledger has switched it on
         if self._joints is not None and self._joints.method == "impulses":
             self.account.add(Cause.JOINTS, record.work.joints)
@@ -103,11 +103,16 @@ class StepEnergyLedger:
             self._enter_drives(self._drives, record.work.drives, record, mean)
         self._enter_motion(record, record.work.motors)
 
-    def _rolling_work(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
-        """Return the work, J, of angular impulses (K,) at mean rates, without that on driven bodies."""
-        spin = np.where(self._store.driven, 0.0, mean[:, 2])
-        other = np.where(contacts.second >= 0, spin[np.maximum(contacts.second, 0)], 0.0)
-        return float(impulse @ (other - spin[contacts.first]))
+    def _enter_rolling(self, contacts: Manifolds, impulse: FloatArray, spin: FloatArray) -> None:
+        """Enter the work of angular impulses (K,), N·m·s, at mean spins (N,); drives supply that on their bodies."""
+        is_body = contacts.second >= 0
+        second = np.where(is_body, contacts.second, 0)
+
+        def work(spins: FloatArray) -> float:
+            return float(impulse @ (np.where(is_body, spins[second], 0.0) - spins[contacts.first]))
+
+        self.account.add(Cause.ROLLING, work(spin))
+        self.account.add(Cause.DRIVES, -work(np.where(self._store.driven, spin, 0.0)))
 
     def _enter_limits(self, start: FloatArray, before: State, after: State) -> None:
         """Enter the reduction of speeds to their limits, in a step that began with rates `start`, (N, D).
