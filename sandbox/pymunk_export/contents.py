@@ -241,7 +241,12 @@ class Contents:
         if bodies.gravity_scale[index] != 1.0:
             kind = f"{kind} with a gravity scale"
             values["gravity_scale"] = literal(float(bodies.gravity_scale[index]))
-            state.append("body.gravity_scale = {gravity_scale}")
+            own = (
+                "velocity_func = gravity_times({gravity_scale})"
+                if self.has_sleep
+                else "gravity_scale = {gravity_scale}"
+            )
+            state.append(f"body.{own}")
         if bodies.limited[index]:
             kind = f"{kind} with speed limits"
             values["limits"] = literal((float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])))

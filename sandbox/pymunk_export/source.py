@@ -227,6 +227,18 @@ def _helpers(contents: Contents) -> Iterator[str]:
             "        arbiter.surface_velocity = (velocity.x + slip * normal.y, velocity.y - slip * normal.x)",
             "",
         )
+    if contents.scales_gravity and contents.has_sleep:
+        yield from (
+            "",
+            "def gravity_times(scale):",
+            '    """Return a velocity function with scaled gravity: a force would keep a body awake."""',
+            "",
+            "    def update_velocity(body, gravity, damping, dt):",
+            "        pymunk.Body.update_velocity(body, (scale * gravity[0], scale * gravity[1]), damping, dt)",
+            "",
+            "    return update_velocity",
+            "",
+        )
     if len(contents.setup.joints):
         yield from (
             "",
@@ -320,7 +332,7 @@ def _step(contents: Contents) -> Iterator[str]:
             "        body.torque = torque",
             "",
         )
-    if contents.scales_gravity:
+    if contents.scales_gravity and not contents.has_sleep:
         yield from (
             "",
             "def scale_gravity(body):",
@@ -355,7 +367,7 @@ def _step(contents: Contents) -> Iterator[str]:
     )
     if contents.has_thrusts:
         yield from ("        for body in space.bodies:", "            apply_thrust(body, h)")
-    if contents.scales_gravity:
+    if contents.scales_gravity and not contents.has_sleep:
         yield from ("        for body in space.bodies:", "            scale_gravity(body)")
     yield "        space.step(h)"
     if contents.has_limits:

@@ -233,6 +233,36 @@ def test_the_account_of_energy_balances(engine: str, collides: str, more: dict[s
         assert account[cause] < 0.0
 
 
+@pytest.mark.parametrize("engine", ["pymunk", "box2d"])
+def test_bodies_with_scaled_gravity_fall_asleep_and_wake(engine: str) -> None:
+    """On pymunk a body that is asleep has no contacts in the log; a new one that falls onto it wakes it."""
+    floor = {"point": [0.0, 0.0], "normal": [0.0, 1.0]}
+    solver = {"sleeping": True}
+    scene = scene_of(ball(y=0.1, gravity_scale=2.0), duration=4.0, plane=[floor], solver=solver)
+    simulation = start(scene, engine)
+    for _ in range(200):
+        simulation.step()
+    at_rest = simulation.frame().position[0].copy()
+    if engine == "pymunk":
+        simulation.contacts()
+        simulation.step()
+        assert not len(simulation.contacts())
+    simulation.apply(Spawn(time=0.0, ball=Ball(**ball("new", x=0.05, y=1.0, gravity_scale=0.5))))
+    for _ in range(100):
+        simulation.step()
+    frame = simulation.frame()
+    assert np.hypot(*(frame.position[0] - at_rest)) > 0.01  # pushed aside
+    assert frame.velocity[1, 1] > -0.5 * G  # it has been stopped
+
+
+def test_pymunk_accounts_for_sleeping_bodies_with_scaled_gravity() -> None:
+    floor = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": 0.3}
+    things = ball(y=0.5, gravity_scale=2.0), ball("b", x=1.0, y=0.3, gravity_scale=0.5), ball("c", x=2.0, y=0.3)
+    scene = scene_of(*things, plane=[floor], solver={"sleeping": True, "sleep_time": 0.2})
+    account = closed_account(scene, 300, engine="pymunk", closes=1e-12)
+    assert account[Cause.RESTITUTION] < 0.0
+
+
 @pytest.mark.parametrize("engine", LEDGERS)
 def test_the_account_balances_with_springs_and_rods_on_limited_bodies(engine: str) -> None:
     joints = [
@@ -302,8 +332,8 @@ def test_pymunk_refuses_what_it_does_not_combine_by_name() -> None:
     for key, solver in (("gravity_scale", "half_kick"), ("max_speed", "half_kick"), ("linear_damping", "half_kick")):
         with pytest.raises(Refusal, match="half_kick does not support"):
             start(scene_of(ball(**{key: 0.5}), solver={solver: True}), "pymunk")
-    with pytest.raises(Refusal, match="sleeping does not support gravity_scale"):
-        start(scene_of(ball(gravity_scale=0.5), solver={"sleeping": True}), "pymunk")
+    with pytest.raises(Refusal, match="sleeping does not support damping of bodies"):
+        start(scene_of(ball(linear_damping=0.5), solver={"sleeping": True}), "pymunk")
     with pytest.raises(Refusal, match="it does not model damping of bodies and damping together"):
         start(scene_of(ball(linear_damping=0.5), world={"damping": 0.9}), "pymunk")
 

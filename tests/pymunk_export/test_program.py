@@ -145,6 +145,15 @@ CONTENTS: dict[str, dict[str, Any]] = {
         "box": [{"name": "ship", "position": [-2.0, 3.0], "size": [1.0, 0.5], "gravity_scale": 0.7, "angle": 0.2}],
         "thrust": [{"body": "ship", "force": [1.0, 12.0], "point": [0.2, -0.25]}],
     },
+    "gravity scales with sleep": {
+        "ball": [
+            {"name": "rock", "position": [1.0, 3.0], "radius": 0.3, "gravity_scale": 1.7},
+            {"name": "ghost", "position": [2.0, 3.0], "radius": 0.3, "gravity_scale": 0.3, "collides": "none"},
+            {"name": "leaf", "position": [3.0, 0.7], "radius": 0.3, "gravity_scale": 0.4},
+        ],
+        "plane": [{"name": "level", "point": [0.0, 0.0], "normal": [0.0, 1.0], "friction": 0.6}],
+        "solver": {"dt": 0.01, "substeps": 2, "sleeping": True, "sleep_time": 0.3},
+    },
     "bounds": {
         "grid": [
             {

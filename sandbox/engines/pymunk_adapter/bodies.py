@@ -125,9 +125,14 @@ class PymunkBodies(BodyStore):
 
     def _update_scaled_gravity(self, indices: IntArray) -> None:
         """Update the gravity on those of some bodies in the space that scale it."""
-        if self.bodies.scales_gravity:
+        if self.scales_by_force:
             for index in indices[self.bodies.gravity_scale[indices] != 1.0].tolist():
                 self._update_gravity(index)
+
+    @property
+    def scales_by_force(self) -> bool:
+        """Whether gravity scales are forces on bodies in the space; else they act in pymunk's velocity update."""
+        return self.bodies.scales_gravity and not self._settings.sleeping
 
     def _update_gravity(self, index: int) -> None:
         """Apply the force by which gravity on a body in the space differs from the world's."""
@@ -181,7 +186,7 @@ class PymunkBodies(BodyStore):
         else:
             self.space_bodies.rebuild(setup.scene, self._air, self.contact_matrix)
         self.space_bodies.joints.update(setup.joints)
-        if self.bodies.scales_gravity:
+        if self.scales_by_force:
             self._update_scaled_gravity(np.asarray(self.space_bodies.movable_indices(), np.int64))
 
     def _demands(self, world: World) -> frozenset[Demand]:

@@ -68,7 +68,7 @@ def applied_impulses(
     mass = np.where(included, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(store)
     gravity = store.world_gravity
-    if bodies.scales_gravity:  # in the space it is a part of the constant forces
+    if store.scales_by_force:  # in the space it is a part of the constant forces
         excess = bodies.mass[:, None] * (gravity - np.asarray(world.gravity))
         excess[store.particles.indices] = 0.0
         constant -= excess

@@ -14,7 +14,8 @@ by a rotary spring, the two differ by the factor φ.
 
 Damping of the world is pymunk's own: in a step it multiplies velocities and spins by a factor before it adds forces.
 That of a body, of its velocity and of its spin, is part of the air. Its gravity scale is a constant force, that of a
-zone's gravity too: what it has more than the world's gravity.
+zone's gravity too: what it has more than the world's gravity. Where bodies can fall asleep, a gravity scale acts in the
+velocity update.
 """
 
 import math
@@ -247,6 +248,18 @@ def damping_factor(damping: float, h: float) -> float:
     return body.velocity.x
 
 
+def scale_gravity(body: pymunk.Body, scale: float) -> None:
+    """Let gravity act on a body by a factor, in pymunk's velocity update.
+
+    A force would keep the body awake: to set it resets the time for which a body has been idle.
+    """
+
+    def update_velocity(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
+        pymunk.Body.update_velocity(body, (scale * gravity[0], scale * gravity[1]), damping, dt)
+
+    body.velocity_func = update_velocity
+
+
 class ConstantForces:
     """Constant force (N) and torque (N·m) on each body, by body index."""
 
@@ -255,11 +268,6 @@ class ConstantForces:
         self._gravity_forces: dict[int, FloatArray] = {}
         self._total: dict[int, tuple[FloatArray, float]] = {}  # sums of both
         self._prepared: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
-
-    @property
-    def with_gravity_force(self) -> list[int]:
-        """Indices of the bodies on which another gravity than the world's acts."""
-        return list(self._gravity_forces)
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._total)

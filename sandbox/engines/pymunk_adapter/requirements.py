@@ -54,7 +54,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
         ("thrusts", scene.thrusts),
         ("drives", scene.drives),
         ("zones", scene.zones),
-        *((str(demand), demand in wanted) for demand in (Demand.GRAVITY_SCALE, Demand.ROLLING)),
+        (str(Demand.ROLLING), Demand.ROLLING in wanted),
         ("one-way walls", any(wall.one_way for wall in scene.walls)),
         ("joints that can break", any(joint.strength is not None for joint in scene.joints)),
         ("a [surface]", on_floor(scene)),

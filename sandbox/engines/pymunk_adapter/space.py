@@ -28,7 +28,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
-from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
+from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts, scale_gravity
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.engines.pymunk_adapter.rolling import SpaceRolling
@@ -259,6 +259,8 @@ class SpaceBodies:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
                 self.thrusts.join(index, body)
+            if self._settings.sleeping and bodies.gravity_scale[index] != 1.0:
+                scale_gravity(body, float(bodies.gravity_scale[index]))
             if bodies.limited[index]:
                 self.limits[index] = float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])
 
