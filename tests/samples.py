@@ -1,4 +1,4 @@
-"""Sample scenes: fourteen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: sixteen shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -13,6 +13,7 @@ from sandbox.scene.files.shipped_scenes import shipped
 SAMPLE_SCENES = (
     "benchmark/incline",
     "benchmark/kepler",
+    "benchmark/rolling_resistance",
     "billiards/9-ball",
     "games/conveyor",
     "games/curling",
@@ -25,6 +26,7 @@ SAMPLE_SCENES = (
     "joints/slider_crank",
     "particles/sparks",
     "pinball/full",
+    "tutorial/balloon_and_feather",
 )
 
 

@@ -169,7 +169,7 @@ class Starts:
         velocity = own.velocity * factor[:, None]
         velocity[free] = _rotated(velocity, self.spread * turn)[free]
         times = time * _motion_fraction(scene, own, velocity, step)[:, None]
-        fall = np.asarray(scene.world.gravity) * times
+        fall = own.gravity_scale[:, None] * np.asarray(scene.world.gravity) * times
         shift = self.distance * length[:, None] * np.column_stack((np.cos(heading), np.sin(heading)))
         shift += (velocity + 0.5 * fall) * times
         velocity[free] += fall[free]
@@ -275,7 +275,8 @@ def _without_faults(base: _Unperturbed, changed: Bodies, free: BoolArray) -> Bod
 
 def _motion_fraction(scene: Scene, bodies: Bodies, velocity: FloatArray, step: float) -> FloatArray:
     """Return the fraction of a step, s, in which each body covers at most `MAX_WIDTHS` of its half widths, (N,)."""
-    distance = np.hypot(*velocity.T) * step + 0.5 * math.hypot(*scene.world.gravity) * step**2
+    gravity = math.hypot(*scene.world.gravity) * np.abs(bodies.gravity_scale)
+    distance = np.hypot(*velocity.T) * step + 0.5 * gravity * step**2
     with np.errstate(divide="ignore", over="ignore"):
         return np.asarray(np.fmin(1.0, MAX_WIDTHS * bodies.thin / distance))
 

@@ -154,7 +154,8 @@ class Contents:
         bodies = setup.bodies
         self._thrusts = _thrusts_by_body(setup)
         pushed = np.asarray([name in self._thrusts for name in bodies.names], np.bool_)
-        self._is_in_space: BoolArray = np.asarray(~self._matrix.free | pushed | bodies.kinematic | self.has_sleep)
+        in_space = ~self._matrix.free | pushed | bodies.kinematic | bodies.limited | self.has_sleep
+        self._is_in_space: BoolArray = np.asarray(in_space)
         collides = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element]
         self._has_shapes: BoolArray = self._is_in_space & (self._matrix.touches | (bodies.fixed & collides))
         self.hidden: IntArray = np.flatnonzero(~self._has_shapes)
@@ -169,6 +170,16 @@ class Contents:
     def has_paths(self) -> bool:
         """Whether a body moves along a path."""
         return bool(self.setup.bodies.paths)
+
+    @property
+    def scales_gravity(self) -> bool:
+        """Whether gravity acts on a body by another factor than 1."""
+        return self.setup.bodies.scales_gravity
+
+    @property
+    def has_limits(self) -> bool:
+        """Whether the speed of a body is limited."""
+        return bool(self.setup.bodies.limited.any())
 
     @property
     def static_order(self) -> list[int] | None:
@@ -244,6 +255,19 @@ class Contents:
         if name in self._thrusts:
             values["thrust"] = literal(self._thrusts[name])
             state.append("body.thrust = {thrust}")
+        if bodies.gravity_scale[index] != 1.0:
+            kind = f"{kind} with a gravity scale"
+            values["gravity_scale"] = literal(float(bodies.gravity_scale[index]))
+            own = (
+                "velocity_func = gravity_times({gravity_scale})"
+                if self.has_sleep
+                else "gravity_scale = {gravity_scale}"
+            )
+            state.append(f"body.{own}")
+        if bodies.limited[index]:
+            kind = f"{kind} with speed limits"
+            values["limits"] = literal((float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])))
+            state.append("body.limits = {limits}")
         shapes, columns = self._shapes(index)
         lines = (new, *state, "space.add(body)", *shapes, "bodies[{name}] = body")
         return Block(kind, literal(name), lines, values | columns)

@@ -69,6 +69,12 @@ def _world(setup: Setup, settings: Settings) -> Iterator[Obstacle]:
             yield Obstacle(f"world.{key}", message)
     if Demand.LIFT in demands(setup):
         yield Obstacle("", "pymunk has no lift of spinning bodies; set it to 0")
+    if Demand.BODY_DAMPING in demands(setup):
+        message = (
+            "linear_damping and angular_damping follow the velocity of a body in every step; a velocity_func that "
+            "multiplies body.velocity by exp(-k·dt) does nearly the same in a game; set them to 0"
+        )
+        yield Obstacle("", message)
 
 
 def _forces(setup: Setup) -> Iterator[Obstacle]:
@@ -127,6 +133,8 @@ def _contacts(setup: Setup) -> Iterator[Obstacle]:
         yield Obstacle(path, f"walls and posts that kick have no counterpart in pymunk: {_listed(names)}")
     if (touching & ~kicks & (surfaces.falloff != 0.0)).any():
         yield Obstacle("material", "restitution_falloff makes restitution depend on speed, unlike shape.elasticity")
+    if Demand.ROLLING in demands(setup):
+        yield Obstacle("material", "rolling_resistance needs a motor for each contact of a ball; set it to 0")
 
 
 def _bent_walls(setup: Setup) -> Iterator[Obstacle]:

@@ -78,11 +78,11 @@ def program_text(
         *_main(contents),
     ]
     text = "\n".join(parts)
-    header = _header(setup.scene, note, has_infinity="INFINITY" in text, has_paths=contents.has_paths)
+    header = _header(setup.scene, note, has_infinity="INFINITY" in text, has_math="math." in text)
     return "\n".join([*header, text]) + "\n"
 
 
-def _header(scene: Scene, note: str, *, has_infinity: bool, has_paths: bool) -> Iterator[str]:
+def _header(scene: Scene, note: str, *, has_infinity: bool, has_math: bool) -> Iterator[str]:
     yield from (
         '"""A scene as a program for pymunk, written by `sandbox export`.',
         "",
@@ -90,7 +90,7 @@ def _header(scene: Scene, note: str, *, has_infinity: bool, has_paths: bool) -> 
         f"of `sandbox run` on the engine pymunk, bit for bit, with pymunk {version('pymunk')}.",
         '"""',
         "",
-        *(("import math", "") if has_paths else ()),
+        *(("import math", "") if has_math else ()),
         "import pymunk",
         "",
     )
@@ -227,6 +227,18 @@ def _helpers(contents: Contents) -> Iterator[str]:
             "    if slip:  # a moving surface: the speed at which two surfaces do not rub, along the contact",
             "        normal, velocity = arbiter.normal, arbiter.surface_velocity",
             "        arbiter.surface_velocity = (velocity.x + slip * normal.y, velocity.y - slip * normal.x)",
+            "",
+        )
+    if contents.scales_gravity and contents.has_sleep:
+        yield from (
+            "",
+            "def gravity_times(scale):",
+            '    """Return a velocity function with scaled gravity: a force would keep a body awake."""',
+            "",
+            "    def update_velocity(body, gravity, damping, dt):",
+            "        pymunk.Body.update_velocity(body, (scale * gravity[0], scale * gravity[1]), damping, dt)",
+            "",
+            "    return update_velocity",
             "",
         )
     if len(contents.setup.joints):
@@ -420,6 +432,32 @@ def _step(contents: Contents) -> Iterator[str]:
             "        body.torque = torque",
             "",
         )
+    if contents.scales_gravity and not contents.has_sleep:
+        yield from (
+            "",
+            "def scale_gravity(body):",
+            '    """Add the force by which the gravity on a body differs: pymunk resets forces after each step."""',
+            '    scale = getattr(body, "gravity_scale", 1.0)',
+            "    if scale != 1.0:",
+            "        x, y = GRAVITY",
+            "        body.force += ((scale * x - x) * body.mass, (scale * y - y) * body.mass)",
+            "",
+        )
+    if contents.has_limits:
+        yield from (
+            "",
+            "def limit_speed(body):",
+            '    """Reduce velocity and angular velocity of a body to its limits."""',
+            "    speed, spin = body.limits",
+            "    x, y = body.velocity",
+            "    fast = math.hypot(x, y)",
+            "    if fast > speed:",
+            "        change = speed / fast - 1.0",
+            "        body.velocity = x + change * x, y + change * y",
+            "    if abs(body.angular_velocity) > spin:",
+            "        body.angular_velocity = math.copysign(spin, body.angular_velocity)",
+            "",
+        )
     yield from (
         "",
         "def step(space):",
@@ -434,7 +472,15 @@ def _step(contents: Contents) -> Iterator[str]:
         yield "    for _ in range(SUBSTEPS):"
     if contents.has_thrusts:
         yield from ("        for body in space.bodies:", "            apply_thrust(body, h)")
+    if contents.scales_gravity and not contents.has_sleep:
+        yield from ("        for body in space.bodies:", "            scale_gravity(body)")
     yield "        space.step(h)"
+    if contents.has_limits:
+        yield from (
+            "        for body in space.bodies:",
+            '            if hasattr(body, "limits"):',
+            "                limit_speed(body)",
+        )
     if contents.has_paths:
         yield "    space.frames += 1"
     if contents.setup.scene.world.bounds is not None:

@@ -193,7 +193,8 @@ def _flight_boxes(scene: Scene, bodies: Bodies) -> list[Corners]:
     time = np.linspace(0.0, duration, FLIGHT_SAMPLES)[:, None, None]
     start, velocity = bodies.position[chosen], bodies.velocity[chosen]
     with np.errstate(all="ignore"):
-        position = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
+        gravity = bodies.gravity_scale[chosen, None] * np.asarray(world.gravity)
+        position = start + velocity * time + 0.5 * gravity * time**2
     radius = np.broadcast_to(bodies.radius[chosen], position.shape[:2])
     with np.errstate(all="ignore"):
         is_counted = (np.abs(position) < MAX_VIEW).all(axis=2)

@@ -114,6 +114,10 @@ FEATURES: dict[str, Document] = {
     },
     "bounds": {"world": {"bounds": [[-9.0, 2.9], [9.0, 9.0]]}},
     "lift": {"ball": [_ball("c", -2.0, lift=0.1, angular_velocity=3.0, velocity=[1.0, 0.0])]},
+    "gravity scale": {"ball": [_ball("c", -2.0, gravity_scale=-0.5)]},
+    "damped body": {"ball": [_ball("c", -2.0, linear_damping=0.5, angular_damping=2.0, angular_velocity=3.0)]},
+    "limited body": {"ball": [_ball("c", -2.0, max_speed=0.5, max_angular_velocity=1.0, angular_velocity=3.0)]},
+    "rolling resistance": {"wall": [{**_WALL, "friction": 0.5, "rolling_resistance": 0.1}]},
     "air": {"world": {"linear_drag": 0.5, "quadratic_drag": 0.5, "wind": [1.0, 0.0]}},
     "damping": {"world": {"damping": 0.5}},
     "materials": {

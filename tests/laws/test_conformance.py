@@ -157,6 +157,23 @@ PROOFS: dict[Demand, Proof] = {
     Demand.GRAVITY: Proof(scene(world=GRAVITY, ball=[ball(vx=1.0)]), position(1.0, -5.0)),
     Demand.DRAG: Proof(scene(world={"linear_drag": 2.0}, ball=[ball(vx=1.0)]), velocity(math.exp(-2.0), 0.0)),
     # in a second, lift turns the velocity by s·ω = π/2
+    Demand.GRAVITY_SCALE: Proof(scene(world=GRAVITY, ball=[ball(gravity_scale=-0.5)]), velocity(0.0, 5.0)),
+    Demand.BODY_DAMPING: Proof(
+        scene(ball=[ball(vx=1.0, linear_damping=2.0, angular_damping=1.0, angular_velocity=3.0)]),
+        both(velocity(math.exp(-2.0), 0.0), spin(3.0 * math.exp(-1.0))),
+    ),
+    Demand.SPEED_LIMITS: Proof(
+        scene(world=GRAVITY, ball=[ball(max_speed=2.0, max_angular_velocity=1.0, angular_velocity=3.0)]),
+        both(velocity(0.0, -2.0), spin(1.0), position(0.0, -1.8)),
+    ),
+    Demand.ROLLING: Proof(
+        scene(
+            world=GRAVITY,
+            ball=[ball(y=0.25, vx=1.0, angular_velocity=-4.0, rolling_resistance=0.05, friction=1.0)],
+            plane=[FLOOR],
+        ),
+        both(velocity(1.0 - 0.5 / 1.5, 0.0), spin(-4.0 * (1.0 - 0.5 / 1.5), error=4.0 * ERROR)),
+    ),
     Demand.LIFT: Proof(scene(ball=[ball(vx=1.0, angular_velocity=5.0, lift=0.1 * math.pi)]), velocity(0.0, 1.0)),
     # velocity and spin keep a quarter of their values
     Demand.DAMPING: Proof(

@@ -138,6 +138,25 @@ CONTENTS: dict[str, dict[str, Any]] = {
         "ball": [{"name": "ghost", "position": [0.0, 3.0], "radius": 0.5, "collides": "none"}],
         "thrust": [{"body": "ghost", "force": [2.0, 9.0]}],
     },
+    "gravity scales and speed limits": {
+        "ball": [
+            {"name": "balloon", "position": [0.0, 1.0], "radius": 0.3, "mass": 0.7, "gravity_scale": -0.3},
+            {"name": "rock", "position": [1.0, 3.0], "radius": 0.3, "gravity_scale": 1.7, "max_speed": 3.1},
+            {"name": "ghost", "position": [2.0, 3.0], "radius": 0.3, "gravity_scale": 0.3, "collides": "none"},
+            {"name": "top", "position": [3.0, 0.5], "radius": 0.3, "angular_velocity": 9, "max_angular_velocity": 4.3},
+        ],
+        "box": [{"name": "ship", "position": [-2.0, 3.0], "size": [1.0, 0.5], "gravity_scale": 0.7, "angle": 0.2}],
+        "thrust": [{"body": "ship", "force": [1.0, 12.0], "point": [0.2, -0.25]}],
+    },
+    "gravity scales with sleep": {
+        "ball": [
+            {"name": "rock", "position": [1.0, 3.0], "radius": 0.3, "gravity_scale": 1.7},
+            {"name": "ghost", "position": [2.0, 3.0], "radius": 0.3, "gravity_scale": 0.3, "collides": "none"},
+            {"name": "leaf", "position": [3.0, 0.7], "radius": 0.3, "gravity_scale": 0.4},
+        ],
+        "plane": [{"name": "level", "point": [0.0, 0.0], "normal": [0.0, 1.0], "friction": 0.6}],
+        "solver": {"dt": 0.01, "substeps": 2, "sleeping": True, "sleep_time": 0.3},
+    },
     "bounds": {
         "grid": [
             {
@@ -580,3 +599,10 @@ def test_bodies_on_paths_and_their_passengers_have_the_states_of_the_engine(subs
     carried = [passenger(name=f"passenger-{k}", position=[0.3, 10.0 * k + 0.15]) for k in range(len(boxes))]
     scene = scene_with_paths(*boxes, *carried, dt=1 / 60, solver={"substeps": substeps})
     assert not differing(scene, 900)
+
+
+@pytest.mark.parametrize("key", ["linear_damping", "rolling_resistance"])
+def test_keys_of_bodies_that_need_the_engine_are_refused_by_name(key: str) -> None:
+    ball = {"position": [0.0, 0.5], "radius": 0.5, key: 0.1}
+    (found,) = obstacles(from_document(BASE | {"ball": [ball]}))
+    assert key in found.message

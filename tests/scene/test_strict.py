@@ -89,10 +89,10 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
     [
         (f"{BALL}bullet = true", "sandbox check"),
         (f"{BALL}isSensor = true", r"\[\[zone\]\]"),
-        (f"{BALL}gravityScale = 0.5", r"world\.gravity"),
-        (f"{BALL}linear_damping = 0.1", r"world\.damping"),
-        (f"{BALL}rollingResistance = 0.1", r"surface\.rolling_friction"),
-        (f"{BALL}max_speed = 3", r"world\.quadratic_drag"),
+        (f"{BALL}gravityScale = 0.5", "did you mean 'gravity_scale'"),
+        (f"{BALL}drag = 0.1", "did you mean 'linear_damping'"),
+        (f"{BALL}rollingFriction = 0.1", "did you mean 'rolling_resistance'"),
+        (f"{BALL}maxVelocity = 3", "did you mean 'max_speed'"),
         (f"{BALL}[[joint]]\nkind = 'LineJoint'\nbetween = ['ball-1']", "did you mean 'wheel'"),
         (f"{BALL}[[joint]]\nkind = 'RevoluteJoint'\nbetween = ['ball-1']", "did you mean 'pivot'"),
         (

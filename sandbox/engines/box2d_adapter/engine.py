@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS
 from sandbox.engines.box2d_adapter.materials import FILTER_BITS, mixing_faults
-from sandbox.engines.box2d_adapter.requirements import joint_faults, size_faults
+from sandbox.engines.box2d_adapter.requirements import joint_faults, rolling_faults, size_faults
 from sandbox.engines.common.collision_bits import too_many_categories
 from sandbox.engines.common.solver_settings import setting_faults, slop_of
 from sandbox.engines.common.workload import overload
@@ -46,6 +46,10 @@ OWN = frozenset(
     {
         Demand.DAMPING,
         Demand.LIFT,
+        Demand.BODY_DAMPING,
+        Demand.GRAVITY_SCALE,
+        Demand.SPEED_LIMITS,
+        Demand.ROLLING,
         Demand.POLYGONS,
         Demand.PASSABLE,
         Demand.SURFACE_SPEED,
@@ -122,6 +126,7 @@ class Box2DEngine:
         missing += _first(joint_faults(setup.joints))
         matrix = contact_matrix(setup)
         missing += _first(mixing_faults(setup.scene, matrix))
+        missing += _first(rolling_faults(setup))
         missing += _first(size_faults(setup, self.resolve(setup, settings)))
         return (*missing, *overload(setup, settings))
 

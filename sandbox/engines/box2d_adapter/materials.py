@@ -1,7 +1,8 @@
-"""Friction and restitution of shapes, so that Box2D's mixing gives each pair exactly its coefficients.
+"""Coefficients of shapes, so that Box2D's mixing gives each pair exactly its own.
 
-Box2D takes the square root of the product of two frictions, and the larger of two restitutions. So frictions of
-shapes are factors of the squared coefficients, and restitutions the smallest of those of a surface's pairs.
+Box2D takes the square root of the product of two frictions, the larger of two restitutions, and the larger of two
+rolling resistances. So frictions of shapes are factors of the squared coefficients, and restitutions and rolling
+resistances the smallest of those of a surface's pairs.
 
 Where no such values exist, as for balls that roll on a rough plane but slide on each other, a moving body has a shape
 of the same form for each surface that it can touch, which meets that surface only and has the coefficients of the
@@ -13,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.arrays import FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.common.collision_bits import KINDS, repeated
 from sandbox.engines.common.pair_factors import factors
 from sandbox.scene.compile.contacts import ContactMatrix
@@ -44,6 +45,8 @@ class ShapeMaterials(NamedTuple):
     each surface, and of a static object against all"""
     restitution: FloatArray
     """(S, K), of the same"""
+    rolling: FloatArray
+    """(S, K), rolling resistance, of the same"""
 
     @property
     def is_split(self) -> bool:
@@ -54,15 +57,26 @@ class ShapeMaterials(NamedTuple):
 def shape_materials(matrix: ContactMatrix) -> ShapeMaterials:
     """Return the values of shapes with the S surfaces of a contact matrix."""
     friction, restitution, touching = matrix.surfaces.friction, matrix.surfaces.restitution, matrix.touching
+    rolling = matrix.surfaces.rolling
     factor = np.asarray(factors(friction**2, touching, [None] * len(touching)))
-    smallest = np.where(touching, restitution, np.inf).min(axis=1, initial=np.inf)
-    smallest = np.where(np.isfinite(smallest), smallest, 0.0)
-    mixed = (np.sqrt(np.outer(factor, factor)), friction), (np.maximum.outer(smallest, smallest), restitution)
+    bounce, roll = _smallest(restitution, touching), _smallest(rolling, touching)
+    mixed = (
+        (np.sqrt(np.outer(factor, factor)), friction),
+        (np.maximum.outer(bounce, bounce), restitution),
+        (np.maximum.outer(roll, roll), rolling),
+    )
     if not any(((np.abs(found - wanted) > TOLERANCE * wanted) & touching).any() for found, wanted in mixed):
-        return ShapeMaterials(factor[:, None], smallest[:, None])
-    # A static object has friction 1 and restitution 0, which leaves a square root and the other's restitution.
+        return ShapeMaterials(factor[:, None], bounce[:, None], roll[:, None])
+    # A static object has friction 1 and the others 0, which leaves a square root and the values of the other shape.
     one = np.ones((len(touching), 1))
-    return ShapeMaterials(np.hstack((friction**2, friction, one)), np.hstack((restitution, restitution, 0.0 * one)))
+    larger = (np.hstack((table, table, 0.0 * one)) for table in (restitution, rolling))
+    return ShapeMaterials(np.hstack((friction**2, friction, one)), *larger)
+
+
+def _smallest(table: FloatArray, touching: BoolArray) -> FloatArray:
+    """Return the smallest value of each surface with those that it can touch, (S,); 0 if it can touch none."""
+    smallest = np.where(touching, table, np.inf).min(axis=1, initial=np.inf)
+    return np.where(np.isfinite(smallest), smallest, 0.0)
 
 
 def roles(

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.box2d_adapter.limits import (
     FARTHEST_LENGTHS,
     FASTEST_LENGTHS,
@@ -17,8 +17,11 @@ from sandbox.engines.box2d_adapter.limits import (
     scale_for,
 )
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import Demand
 from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.shapes import UNTURNABLE
 
@@ -46,6 +49,35 @@ def joint_faults(joints: JointArrays) -> Iterator[str]:
                 yield f"{name}: a {MERGED[kind]} that breaks, or whose pivot breaks, is not supported"
         if kind == JointKind.ROTARY_LIMIT and not joints.figures[k, 1] - joints.figures[k, 0] < 2.0 * math.pi:
             yield f"{name}: a range of a whole turn or more is not supported, as Box2D knows angles modulo 2π"
+
+
+def rolling_faults(setup: Setup) -> Iterator[str]:
+    """Yield the contacts with rolling resistance at which Box2D takes another radius than that of a ball.
+
+    It multiplies the coefficient by the larger radius of the two shapes, those of posts, walls and round corners too.
+    """
+    matrix, bodies, scene = contact_matrix(setup), setup.bodies, setup.scene
+    if not matrix.rolling:
+        return
+    surfaces = matrix.surfaces
+    resists: BoolArray = np.asarray(((surfaces.rolling > 0.0) & matrix.touching).any(axis=1))
+    balls = bodies.round & matrix.touches & ~bodies.immovable
+    smallest = float(np.min(bodies.radius[balls], initial=math.inf))
+    for name, collider, surface in zip(scene.fixed_names, scene.fixed, surfaces.of_fixed.tolist(), strict=False):
+        radius = collider.radius if isinstance(collider, Post) else 0.0
+        radius = 0.5 * collider.thickness if isinstance(collider, Wall) else radius
+        if radius > smallest and resists[surface]:
+            yield (
+                f"{name!r} has a radius of {radius:g} m, with which Box2D computes the {Demand.ROLLING} of smaller "
+                f"balls, such as one of {smallest:g} m"
+            )
+    if bodies.all_round:
+        return
+    shapes = bodies.shapes
+    is_rounded = (shapes.radius > 0.0) & ~bodies.round[shapes.body] & resists[surfaces.of_shape]
+    for piece in np.flatnonzero(is_rounded)[:1].tolist():
+        name = bodies.names[int(shapes.body[piece])]
+        yield f"{name!r} has round corners or ends, to which Box2D applies {Demand.ROLLING}, as if they were balls"
 
 
 def size_faults(setup: Setup, settings: Settings) -> Iterator[str]:

@@ -17,6 +17,7 @@ from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import HasBodyStore
 from sandbox.engines.common.contact_log import ContactLog, join_batches
+from sandbox.engines.common.speed_limits import SpeedLimits
 from sandbox.engines.contract import Divergence, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.forces.air import ALL, Air, mean_acceleration
@@ -89,21 +90,26 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _set_air(self, scene: Scene) -> None:
         """Apply gravity, drag and damping of a scene.
 
-        Box2D has drag in still air, and damping. With wind, quadratic drag or lift, the air is a force, constant during
-        a substep.
+        Box2D has drag in still air, and damping, also for each body. With wind, quadratic drag or lift, the air is a
+        force, constant during a substep.
         """
-        self._air = air = Air.of(scene.world, self._store.bodies, self._store.present)
+        air = Air.of(scene.world, self._store.bodies, self._store.present)
+        self._air = air._replace(damps_bodies=False)
         self._world.set_gravity(scene.world.gravity)
         is_still = air.is_linear and not any(scene.world.wind)
         self._has_air_forces = air.flows and not is_still
+        self._limits = SpeedLimits.of(self._store.bodies, self._store.present)
         self._world.set_damping(air.linear_drag * is_still + air.damping_rate, air.damping_rate)
 
     @property
     def _has_varying_forces(self) -> bool:
-        """Whether each substep is a step of Box2D: forces depend on the state, or there are drives, paths or zones."""
+        """Whether each substep has to be a step of Box2D.
+
+        Forces depend on the state, or there are drives, motors along an axis, paths, zones or limits of speeds.
+        """
         forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
         moves = self._joints.has_linear_motors or self._drives is not None or self._paths is not None
-        return forces or moves or self._zoned is not None
+        return forces or moves or self._zoned is not None or self._limits is not None
 
     @property
     def _has_forces(self) -> bool:
@@ -120,7 +126,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         mass, moving = store.bodies.mass, store.moving & ~store.kinematic
         gravity = store.gravity
         if gravity.ndim == 2:  # some bodies have that of a zone
-            force += np.where(moving[:, None], mass[:, None] * (gravity - np.asarray(store.scene.world.gravity)), 0.0)
+            force += np.where(moving[:, None], mass[:, None] * (gravity - store.world_gravity), 0.0)
         if not self._field.empty:
             x = np.zeros((2, len(mass), 3))
             x[0, :, :2], x[0, :, 2] = store.position, store.angle
@@ -130,10 +136,16 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         if self._joints.has_springs:
             self._joints.add_spring_forces(force, torque)
         if self._has_air_forces:
-            world_gravity, applied = store.scene.world.gravity, force / mass[:, None]
+            world_gravity, applied = store.world_gravity, force / mass[:, None]
             state = store.velocity, store.angular_velocity
             mean = mean_acceleration(air, ALL, world_gravity, *state, applied, length)
-            force = np.where(moving[:, None], mass[:, None] * (mean - np.asarray(world_gravity)), 0.0)
+            force = np.where(moving[:, None], mass[:, None] * (mean - world_gravity), 0.0)
+        if self._limits is not None:  # positions follow the velocities that these forces give
+            own = store.world_gravity + force / mass[:, None], torque * store.inverse_moment
+            rates = np.column_stack((store.velocity + length * own[0], store.angular_velocity + length * own[1]))
+            excess = rates - self._limits.reduced(rates)
+            force -= mass[:, None] * excess[:, :2] / length
+            torque -= store.bodies.moment * excess[:, 2] / length
         for index in np.flatnonzero((force.any(axis=1) | (torque != 0.0)) & moving).tolist():
             self._world.push(index, force[index], float(torque[index]))
 
@@ -162,6 +174,8 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         rows = world.raw_rows(1)
         changed = world.step(length, substeps, rows, 0)
         world.read(rows, 1, length, substeps)
+        if self._limits is not None:
+            self._limit_speeds(self._limits)
         if self._drives is not None:
             self._drives.place()
         if self._paths is not None:
@@ -174,6 +188,16 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         if self._observer is not None and start is not None:
             self._observe_last()
             self._unobserved = time, start, store.position.copy()
+
+    def _limit_speeds(self, limits: SpeedLimits) -> None:
+        """Reduce speeds to their limits, in the store and in the world."""
+        store = self._store
+        rates = np.column_stack((store.velocity, store.angular_velocity))
+        reduced = limits.reduced(rates)
+        if reduced is not rates:
+            store.velocity[:], store.angular_velocity[:] = reduced[:, :2], reduced[:, 2]
+            for index in np.flatnonzero((reduced != rates).any(axis=1)).tolist():
+                self._world.set_motion(index)
 
     def _visit_zones(self, time: float, store: ZonedBox2DBodies) -> None:
         """Apply zones to the bodies that have entered or left one, and record the entries at a time, s."""

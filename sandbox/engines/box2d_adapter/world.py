@@ -105,7 +105,7 @@ class Box2DWorld:
         self._first = len(store.scene.fixed)  # user data of shapes: index + number of static colliders
         self._bodies: dict[int, Any] = {}
         self._shapes: dict[int, list[tuple[ShapeRole, Any]]] = {}  # by the index of the body
-        self._speeds: dict[int, list[float]] = {}  # m/s, other than 0, of the surfaces of shapes
+        self._fixed_values: dict[int, list[tuple[float, float]]] = {}  # as `_fixed_value`, other than 0, of shapes
         self._pairs = TouchingPairs(self._first, self.scale)
         self.ground = self._world.create_static_body(position=(0.0, 0.0))
         """static body at the origin, for joints to the world"""
@@ -167,7 +167,7 @@ class Box2DWorld:
         shape_def.material = self._material(surface, role)
         shape_def.filter = _filter(role, group)
         shape_def.user_data = index + self._first
-        self._note_speed(index, surface)
+        self._note_fixed_value(index, surface, role)
         return shape_def
 
     def _material(self, surface: int, role: ShapeRole) -> Any:
@@ -175,14 +175,20 @@ class Box2DWorld:
         return box2d.surface_material(
             friction=float(self._materials.friction[surface, role.column]),
             restitution=float(self._materials.restitution[surface, role.column]),
+            rolling_resistance=float(self._materials.rolling[surface, role.column]),
             tangent_speed=self._store.contact_matrix.surfaces.surfaces[surface].speed * self.scale,
         )
 
-    def _note_speed(self, index: int, surface: int) -> None:
-        """Note the speed of the surface of a new shape, if it has one."""
+    def _fixed_value(self, surface: int, role: ShapeRole) -> tuple[float, float]:
+        """Return what the binding cannot change in a shape: speed of the surface, m/s, and rolling resistance."""
         speed = self._store.contact_matrix.surfaces.surfaces[surface].speed
-        if speed:
-            self._speeds.setdefault(index, []).append(speed)
+        return speed, float(self._materials.rolling[surface, role.column])
+
+    def _note_fixed_value(self, index: int, surface: int, role: ShapeRole) -> None:
+        """Note the fixed value of a new shape, if it is not 0."""
+        value = self._fixed_value(surface, role)
+        if any(value):
+            self._fixed_values.setdefault(index, []).append(value)
 
     def _surfaces_of_parts(self, index: int) -> list[int]:
         """Return the surface of each part of a body."""
@@ -202,14 +208,17 @@ class Box2DWorld:
             return []
         return [(part, role) for part in self._surfaces_of_parts(index) for role in self._roles(index, part)]
 
-    def _with_new_speed(self) -> set[int]:
-        """Return the bodies and static colliders whose surfaces have another speed than their shapes."""
-        surfaces = self._store.contact_matrix.surfaces.surfaces
-        speeds = [surface.speed for surface in surfaces]
-        if not (self._speeds or any(speeds)):
+    def _with_new_value(self) -> set[int]:
+        """Return the bodies and static colliders whose surfaces have another fixed value than their shapes."""
+        speeds = [surface.speed for surface in self._store.contact_matrix.surfaces.surfaces]
+        if not (self._fixed_values or any(speeds) or self._materials.rolling.any()):
             return set()
-        wanted = {index: [speeds[k] for k, _ in self._parts_of(index) if speeds[k]] for index in self._shapes}
-        return {index for index in self._shapes if self._shapes[index] and wanted[index] != self._speeds.get(index, [])}
+        found = set()
+        for index in self._shapes:
+            wanted = [value for part in self._parts_of(index) if any(value := self._fixed_value(*part))]
+            if self._shapes[index] and wanted != self._fixed_values.get(index, []):
+                found.add(index)
+        return found
 
     def add(self, index: int) -> None:
         """Add a body in its present state."""
@@ -235,6 +244,7 @@ class Box2DWorld:
             self.set_motion(index)
         if not (fixed or kinematic):
             self.set_mass(index)
+            body.gravity_scale = float(bodies.gravity_scale[index])
 
     def _has_contacts(self, index: int) -> bool:
         """Return whether a body can touch something, or is fixed, so that others may touch it."""
@@ -321,7 +331,7 @@ class Box2DWorld:
             for shape in self._bodies[index].create_chain(definition).get_segments():
                 shape.user_data = index + self._first
                 self._shapes[index].append((role, shape))
-                self._note_speed(index, surface)
+                self._note_fixed_value(index, surface, role)
 
     def _origin_of(self, collider: Plane | Wall | Post) -> tuple[float, float]:
         """Return the position of the body of a static collider; of a plane, the point nearest to the middle."""
@@ -374,10 +384,10 @@ class Box2DWorld:
         replaced: set[int] = set()
         store, materials = self._store, shape_materials(self._store.contact_matrix)
         self._materials, self._known_roles = materials, {}
-        with_new_speed = self._with_new_speed()
+        with_new_value = self._with_new_value()
         for index, shapes in list(self._shapes.items()):
             parts = self._parts_of(index)
-            if index not in with_new_speed and [role for _, role in parts] == [role for role, _ in shapes]:
+            if index not in with_new_value and [role for _, role in parts] == [role for role, _ in shapes]:
                 for (surface, role), (_, shape) in zip(parts, shapes, strict=True):
                     shape.friction = float(materials.friction[surface, role.column])
                     shape.restitution = float(materials.restitution[surface, role.column])
@@ -399,7 +409,7 @@ class Box2DWorld:
     def _replace(self, index: int) -> None:
         """Replace a body by one with other shapes, in the same state.
 
-        The binding can neither remove shapes nor change the speed of their surface.
+        The binding can neither remove shapes nor change the speed and rolling resistance of their surface.
         """
         replaced = self._bodies[index]
         linear, angular = replaced.linear_damping, replaced.angular_damping
@@ -412,9 +422,11 @@ class Box2DWorld:
         self._world.gravity = self._vector(gravity)
 
     def set_damping(self, linear: float, angular: float) -> None:
-        """Set the damping rates of the velocities and spins of all bodies that forces move, 1/s."""
+        """Set the damping rates of the velocities and spins of all bodies that forces move, 1/s, besides their own."""
+        bodies = self._store.bodies
         for index in self.indices[~self._store.kinematic[self.indices]].tolist():
-            self._bodies[index].linear_damping, self._bodies[index].angular_damping = linear, angular
+            self._bodies[index].linear_damping = linear + float(bodies.linear_damping[index])
+            self._bodies[index].angular_damping = angular + float(bodies.angular_damping[index])
 
     def remove(self, indices: list[int]) -> None:
         """Remove bodies; their contacts end."""
@@ -431,7 +443,7 @@ class Box2DWorld:
     def _destroy(self, index: int) -> None:
         self._bodies.pop(index).destroy()
         del self._shapes[index]
-        self._speeds.pop(index, None)
+        self._fixed_values.pop(index, None)
 
     def _collect(self) -> None:
         """Collect the moving bodies, whose states are read at once."""

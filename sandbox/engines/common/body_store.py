@@ -152,8 +152,17 @@ class BodyStore:
 
     @property
     def gravity(self) -> FloatArray:
-        """Gravity, m/s²: (2,) for all bodies, or (N, 2) for each."""
-        return np.asarray(self.scene.world.gravity, dtype=np.float64)
+        """Gravity, m/s²: (2,) for all bodies, or (N, 2) for each, times its gravity scale."""
+        return self._scaled(np.asarray(self.scene.world.gravity, dtype=np.float64))
+
+    @property
+    def world_gravity(self) -> FloatArray:
+        """Gravity of the world, m/s²: likewise, whatever zones the bodies are in."""
+        return self._scaled(np.asarray(self.scene.world.gravity, dtype=np.float64))
+
+    def _scaled(self, gravity: FloatArray) -> FloatArray:
+        """Return gravity, (2,) or (N, 2) m/s², times the gravity scale of each body if one is not 1."""
+        return self.bodies.gravity_scale[:, None] * gravity if self.bodies.scales_gravity else gravity
 
     @property
     def retired(self) -> Mapping[int, float]:

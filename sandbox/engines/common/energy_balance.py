@@ -29,7 +29,7 @@ def energy_of(
     Args:
         frame: the state.
         bodies: at least those of the frame, with the same indices.
-        gravity: m/s².
+        gravity: of the world, m/s².
         start: scene or setup whose springs and attractions are included; None: none are.
         breaks: (J,) s, time at which each joint of the scene broke; inf if it did not. None: no joint broke.
     """
@@ -41,7 +41,8 @@ def energy_of(
         kinetic = 0.5 * float(mass @ speed_squared + moment @ np.square(frame.angular_velocity[included]))
         if frame.roll is not None:
             kinetic += 0.5 * float(moment @ np.square(frame.roll[included]).sum(axis=1))
-        potential = -float(mass @ (frame.position[included] @ np.asarray(gravity)))
+        weight = mass * bodies.gravity_scale[:count][included] if bodies.scales_gravity else mass
+        potential = -float(weight @ (frame.position[included] @ np.asarray(gravity)))
         if start is not None:
             frame_bodies = bodies if count == len(bodies) else bodies.some(np.arange(count))
             stored = Potential(start, frame_bodies, breaks=breaks)

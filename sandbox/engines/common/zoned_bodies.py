@@ -194,11 +194,11 @@ class ZonedBodyStore(BodyStore):
     @property
     def gravity(self) -> FloatArray:
         """Gravity of all bodies, (2,), or of each body, (N, 2), m/s²."""
-        gravity = super().gravity
+        gravity = np.asarray(self.scene.world.gravity, dtype=np.float64)
         if self._gravities:
             gravity = np.tile(gravity, (len(self.position), 1))
             gravity[self.with_own_gravity] = list(self._gravities.values())
-        return gravity
+        return self._scaled(gravity)
 
     def set_layer(self, index: int) -> None:
         """Record that the layer of a body has changed."""

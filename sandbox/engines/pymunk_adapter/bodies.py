@@ -18,7 +18,7 @@ from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.demands import Demand, air_demands, demands_of_body
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, BodySpec, Collides
+from sandbox.scene.description.base import BodySource, BodySpec, Collides, Point
 from sandbox.scene.description.world import Settings, World
 
 MAX_OVERLAPPED_BODIES = 100
@@ -120,11 +120,37 @@ class PymunkBodies(BodyStore):
         in_space = indices[~is_particle]
         position, velocity, angle, spin = (array[in_space] for array in state)
         self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])
+        self._update_scaled_gravity(in_space)
         self.space_bodies.add_joints(self.setup.joints)
+
+    def _update_scaled_gravity(self, indices: IntArray) -> None:
+        """Update the gravity on those of some bodies in the space that scale it."""
+        if self.scales_by_force:
+            for index in indices[self.bodies.gravity_scale[indices] != 1.0].tolist():
+                self._update_gravity(index)
+
+    @property
+    def scales_by_force(self) -> bool:
+        """Whether gravity scales are forces on bodies in the space; else they act in pymunk's velocity update."""
+        return self.bodies.scales_gravity and not self._settings.sleeping
+
+    def _update_gravity(self, index: int) -> None:
+        """Apply the force by which gravity on a body in the space differs from the world's."""
+        world, scale = np.asarray(self.scene.world.gravity), self.bodies.gravity_scale[index]
+        zone = self._zone_gravity(index)
+        force: FloatArray | None = None
+        if zone is not None or scale != 1.0:
+            force = (scale * (world if zone is None else np.asarray(zone)) - world) * self.bodies.mass[index]
+        self.space_bodies.constant_forces.set_gravity_force(index, force)
+
+    def _zone_gravity(self, index: int) -> Point | None:
+        """Return the gravity, m/s², that a zone applies to a body in place of the world's; None without."""
+        del index
+        return None
 
     @property
     def _needs_space(self) -> BoolArray:
-        """(N,) bodies that only the space can move: kinematic ones, and those with thrusts or drives.
+        """(N,) bodies that only the space can move: kinematic ones, those with thrusts, drives or speed limits.
 
         All bodies if they attract each other or can fall asleep.
         """
@@ -132,10 +158,10 @@ class PymunkBodies(BodyStore):
         if space_bodies.field.between_bodies or self._settings.sleeping:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not (scene.thrusts or scene.drives):
-            return self.bodies.kinematic
+            return self.bodies.kinematic | self.bodies.limited
         has_thrust, is_driven = space_bodies.thrusts.acts_on, space_bodies.drives.holds
         driven = [has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)]
-        return self.bodies.kinematic | np.asarray(driven, np.bool_)
+        return self.bodies.kinematic | self.bodies.limited | np.asarray(driven, np.bool_)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
         """Continue with a changed scene, as `BodyStore.change`.
@@ -160,11 +186,18 @@ class PymunkBodies(BodyStore):
         else:
             self.space_bodies.rebuild(setup.scene, self._air, self.contact_matrix)
         self.space_bodies.joints.update(setup.joints)
+        if self.scales_by_force:
+            self._update_scaled_gravity(np.asarray(self.space_bodies.movable_indices(), np.int64))
 
     def _demands(self, world: World) -> frozenset[Demand]:
         """Return the demands of the bodies, with those that actions have added, and of a world."""
-        kinematic = {Demand.KINEMATIC} if (self.bodies.kinematic & self.present).any() else set()
-        return air_demands(world, self.bodies, self.present) | kinematic
+        bodies, present = self.bodies, self.present
+        others = {
+            Demand.KINEMATIC: bodies.kinematic & present,
+            Demand.GRAVITY_SCALE: (bodies.gravity_scale != 1.0) & present,
+            Demand.SPEED_LIMITS: bodies.limited & present,
+        }
+        return air_demands(world, bodies, present) | {demand for demand, which in others.items() if which.any()}
 
     @property
     def _air(self) -> Air:
@@ -176,7 +209,7 @@ class PymunkBodies(BodyStore):
         Raises:
             ActionError: as `BodyStore.add`, or pymunk does not support the body in the scene.
         """
-        wanted = self._demands(self.scene.world) | demands_of_body(single)
+        wanted = self._demands(self.scene.world) | demands_of_body(single, self.scene)
         if faults := combination_faults(self.scene, self._settings, wanted):
             raise ActionError(f"pymunk: {faults[0]}")
         self.refresh()

@@ -65,7 +65,7 @@ def skip_numbers(space: pymunk.Space, count: int) -> None:
 
 def gravity_of(world: World, air: Air) -> tuple[float, float]:
     """Return the gravity of the space: 0 where air acts, whose forces then include gravity."""
-    return (0.0, 0.0) if air.flows else world.gravity
+    return (0.0, 0.0) if air.acts_by_force else world.gravity
 
 
 @cache

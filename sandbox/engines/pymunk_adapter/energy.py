@@ -11,7 +11,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
-from sandbox.engines.forces.air import ALL, mean_acceleration
+from sandbox.engines.forces.air import ALL, mean_acceleration, mean_angular_acceleration
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactPoints
 from sandbox.engines.pymunk_adapter.drives import SpaceDrivenBody, SpaceHingeMotor, SpacePlunger
@@ -19,6 +19,7 @@ from sandbox.engines.pymunk_adapter.forces import damping_factor
 from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpulses, motors, set_unknown_sums, springs
 from sandbox.engines.pymunk_adapter.joints import spring_forces
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.compile.potential import Potential
 from sandbox.scene.compile.scene import Scene
 
@@ -66,20 +67,30 @@ def applied_impulses(
     bodies, world = store.bodies, store.scene.world
     mass = np.where(included, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(store)
+    gravity = store.world_gravity
+    if store.scales_by_force:  # in the space it is a part of the constant forces
+        excess = bodies.mass[:, None] * (gravity - np.asarray(world.gravity))
+        excess[store.particles.indices] = 0.0
+        constant -= excess
     attraction, (thrust, thrust_torque) = _attraction(store), _thrusts(store)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
     air = store.space_bodies.air
-    if air.flows:
+    if air.acts_by_force:
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
-        mean = mean_acceleration(air, ALL, world.gravity, before.velocity, before.spin, applied, store.h)
-        drag = mass * (mean - np.asarray(world.gravity) - applied) * h
+        mean = mean_acceleration(air, ALL, gravity, before.velocity, before.spin, applied, store.h)
+        drag = mass * (mean - gravity - applied) * h
+    if air.damps_bodies:
+        turning = (torque + thrust_torque) / bodies.moment
+        mean_turning = mean_angular_acceleration(air, ALL, before.spin, turning, store.h)
+        is_damped = included & (air.angular_damping > 0.0)
+        angular_drag = np.where(is_damped, bodies.moment * (mean_turning - turning) * h, 0.0)
     if world.has_damping:
         lost = (damping_factor(world.damping, store.h) - 1.0) * (h / store.h)
         drag = lost * mass * before.velocity
         angular_drag = lost * np.where(included, bodies.moment, 0.0) * before.spin
     driven = np.where(included[:, None], constant + thrust, 0.0)
     angular = np.where(included, torque + thrust_torque, 0.0)
-    weight = mass * (np.asarray(world.gravity) + attraction) * h
+    weight = mass * (gravity + attraction) * h
     return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag)
 
 
@@ -121,6 +132,8 @@ class DriveWorkSums(NamedTuple):
     """by the weight of bodies driven by torque, as computed in the steps"""
     potential_change: float
     """gain of potential energy of bodies driven by torque"""
+    rolling: float
+    """by the rolling resistance of balls on bodies driven by torque, which the drive does not hold at a stop"""
 
 
 def set_mean_driven_velocity(
@@ -143,6 +156,7 @@ def drive_work(
     bodies: Bodies,
     gravity: tuple[float, float],
     h: float,
+    rolled: IntArray,
 ) -> DriveWorkSums:
     """Return the work on driven bodies in a substep.
 
@@ -154,12 +168,13 @@ def drive_work(
         bodies: all.
         gravity: m/s².
         h: substep, s.
+        rolled: bodies on which rolling resistance acted.
     """
     before, now = states
     velocity, spin = means
     contact_impulses = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), np.empty(0, np.int64))
     contact_impulses.subtract(points.joint_impulses)  # the negative of the impulses by contacts
-    driven = weight = potential_change = 0.0
+    driven = weight = potential_change = rolling = 0.0
     for driven_body in driven_bodies:
         n = driven_body.index
         mass = float(bodies.mass[n])
@@ -177,13 +192,13 @@ def drive_work(
         moment = float(bodies.moment[n]) + mass * (x * x + y * y)
         if isinstance(driven_body, SpaceHingeMotor):
             weight += driven_body.weight_torque * h * float(spin[n])
+        impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
+        impulse -= driven_body.weight_torque * h if isinstance(driven_body, SpaceHingeMotor) else 0.0
         if isinstance(driven_body, SpaceHingeMotor) and not driven_body.was_locked:
+            rolling += (impulse - driven_body.drive_impulse) * float(spin[n]) if n in rolled else 0.0
             impulse = driven_body.drive_impulse
-        else:
-            impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
-            impulse -= driven_body.weight_torque * h if isinstance(driven_body, SpaceHingeMotor) else 0.0
         driven += impulse * float(spin[n])
-    return DriveWorkSums(driven, weight, potential_change)
+    return DriveWorkSums(driven, weight, potential_change, rolling)
 
 
 def kinematic_work(
@@ -232,8 +247,9 @@ class PymunkEnergyLedger:
 
     Impulses of contacts, springs and motors are those that pymunk reports. Of other joints pymunk reports magnitudes
     only: their impulses are the remaining changes of momentum of their bodies, so that in scenes with joints the
-    residual checks less. pymunk corrects joints by velocities, which adds energy; that is phantom energy, not position
-    correction.
+    residual checks less. So are the angular impulses of rolling resistance on balls; those on balls with joints count
+    as impulses of the joints, and those on kinematic bodies are left out, as work between the drive and the ball.
+    pymunk corrects joints by velocities, which adds energy; that is phantom energy, not position correction.
 
     The residual is rounding, in pymunk's sums and here. Over the first 0.1 to 1 s of the shipped scenes it was at most
     6e-13 of the largest kinetic energy or energy turned over by one cause: in the pyramid, whose potential energy is
@@ -299,12 +315,14 @@ class PymunkEnergyLedger:
                 tuple(each.without(asleep) for each in impulses) for impulses in (by_stiffness, by_damping)
             )
         points = p.space_bodies.contact_reader.points()
+        by_limits = self._limit_impulses()
 
         self._move(before, now, drifts, applied, (velocity, spin))
         for each in by_stiffness:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
         account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1]) + applied.angular_drag @ spin[:-1]))
         account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
+        account.add(Cause.SPEED_LIMITS, by_limits.work(velocity, spin))
         account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
         normal_work, tangential_work, kick_work, surface_work = points.work(velocity, spin)
         account.add_contacts(normal_work, tangential_work)
@@ -312,11 +330,14 @@ class PymunkEnergyLedger:
         account.add(Cause.DRIVES, surface_work)
         if driven_bodies:
             gravity = p.scene.world.gravity
-            work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h)
+            rolled = p.space_bodies.rolled if p.space_bodies.rolling.resisted else np.empty(0, np.int64)
+            means = velocity, spin
+            work = drive_work(driven_bodies, (before, now), means, points, p.bodies, gravity, p.h, rolled)
+            account.add(Cause.ROLLING, work.rolling)
             account.add(Cause.DRIVES, work.driven)
             account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
-        other_impulses, joint_sums = [*by_stiffness, *by_damping, points.joint_impulses], None
+        other_impulses, joint_sums = [*by_stiffness, *by_damping, by_limits, points.joint_impulses], None
         if len(joints.rigid):
             joint_sums = self._unexplained_impulses(before, now, included, applied)
             for impulses in other_impulses:
@@ -327,8 +348,23 @@ class PymunkEnergyLedger:
             means, gravity = (velocity, spin), p.scene.world.gravity
             driven = kinematic_work(kinematic, (before, now), means, other_impulses, joint_sums, p.bodies, gravity)
             account.add(Cause.DRIVES, driven)
+        if p.space_bodies.rolling.resisted:
+            rolling_sums = self._unexplained_impulses(before, now, included, applied)
+            for impulses in other_impulses:
+                rolling_sums.subtract(impulses)
+            rolled = p.space_bodies.rolled
+            rolled = np.setdiff1d(rolled[included[rolled]], np.union1d(joints.rigid.a, joints.rigid.b))
+            account.add(Cause.ROLLING, float(rolling_sums.angular[rolled] @ spin[rolled]))
         if joint_sums is not None:
             self._joints(joint_sums, now, velocity, spin, asleep)
+
+    def _limit_impulses(self) -> JointImpulses:
+        """Return the impulses, from the world, that reduced speeds to their limits in the last substep."""
+        p = self._store
+        changes = np.asarray(p.space_bodies.limit_changes, np.float64).reshape(-1, 4)
+        body, no_arm = changes[:, 0].astype(np.int64), np.zeros((len(changes), 2))
+        impulse, angular = p.bodies.mass[body, None] * changes[:, 1:3], p.bodies.moment[body] * changes[:, 3]
+        return JointImpulses(np.full(len(body), WORLD), body, no_arm, no_arm, impulse, angular)
 
     def joints_broken(self, indices: IntArray) -> None:
         """Account the stored energy of joints, by their indices, that have broken."""
@@ -369,7 +405,7 @@ class PymunkEnergyLedger:
         h = p.h
         drift = np.where(drifts[:, None], before.position + before.velocity * h, now.position)
         drift_angle = np.where(drifts, before.angle + before.spin * h, now.angle)
-        weight = np.where(drifts, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
+        weight = np.where(drifts, p.bodies.mass, 0.0)[:, None] * p.world_gravity
         drift_work = float(np.sum(weight * np.where(drifts[:, None], drift - before.position, 0.0)))
         correction_work = float(np.sum(weight * (now.position - drift)))
         start, middle, end = self._stored_energy(before, EnergyState(drift, drift_angle, *now[2:]), now).tolist()

@@ -7,12 +7,15 @@ Euler and gains energy. In the velocity update the scheme is semi-implicit, whos
 `Thrusts` evaluates thrusts before a step, at the angle to which the step turns the body. The same direction would
 result in the velocity update, but for overlap corrections; a callback from Munk2D takes ten times as long.
 
-The air gives the acceleration `air.mean_acceleration` of one step. A force F adds φ·(F/m)·h to the velocity of a
-mass m, φ being the mean fraction, and not (F/m)·h, so forces that balance each other balance at any h. Spin has no
-drag, and torques act unchanged. Where a joint turns a force into a torque, as on a lever held by a rotary spring, the
-two differ by the factor φ.
+The air gives the acceleration `air.mean_acceleration` of one step. A force F adds φ·(F/m)·h to the velocity of a mass
+m, φ being the mean fraction, and not (F/m)·h, so forces that balance each other balance at any h. Spin has no drag, and
+torques act unchanged unless the body has angular damping. Where a joint turns a force into a torque, as on a lever held
+by a rotary spring, the two differ by the factor φ.
 
-Damping is pymunk's own: in a step it multiplies velocities and spins by a factor before it adds forces.
+Damping of the world is pymunk's own: in a step it multiplies velocities and spins by a factor before it adds forces.
+That of a body, of its velocity and of its spin, is part of the air. Its gravity scale is a constant force, that of a
+zone's gravity too: what it has more than the world's gravity. Where bodies can fall asleep, a gravity scale acts in the
+velocity update.
 """
 
 import math
@@ -25,7 +28,7 @@ import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.forces.air import Air, mean_acceleration
+from sandbox.engines.forces.air import Air, mean_acceleration, mean_angular_acceleration
 from sandbox.engines.forces.attraction import pull
 from sandbox.engines.forces.thrust import load
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
@@ -245,19 +248,26 @@ def damping_factor(damping: float, h: float) -> float:
     return body.velocity.x
 
 
+def scale_gravity(body: pymunk.Body, scale: float) -> None:
+    """Let gravity act on a body by a factor, in pymunk's velocity update.
+
+    A force would keep the body awake: to set it resets the time for which a body has been idle.
+    """
+
+    def update_velocity(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
+        pymunk.Body.update_velocity(body, (scale * gravity[0], scale * gravity[1]), damping, dt)
+
+    body.velocity_func = update_velocity
+
+
 class ConstantForces:
     """Constant force (N) and torque (N·m) on each body, by body index."""
 
     def __init__(self) -> None:
         self._action_forces: dict[int, tuple[FloatArray, float]] = {}
-        self._zone_forces: dict[int, FloatArray] = {}
+        self._gravity_forces: dict[int, FloatArray] = {}
         self._total: dict[int, tuple[FloatArray, float]] = {}  # sums of both
         self._prepared: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
-
-    @property
-    def with_zone_force(self) -> list[int]:
-        """Indices of the bodies on which a zone's gravity acts."""
-        return list(self._zone_forces)
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._total)
@@ -277,29 +287,29 @@ class ConstantForces:
             self._action_forces.pop(index, None)
         self._sum(index)
 
-    def set_zone_force(self, index: int, force: FloatArray | None) -> None:
-        """Apply a zone's force (2,), N, to a body from now on, in place of any other zone's; None: no zone's."""
-        if force is None and index not in self._zone_forces:
+    def set_gravity_force(self, index: int, force: FloatArray | None) -> None:
+        """Set the force (2,), N, that makes up for another gravity than the world's on a body; None: no such force."""
+        if force is None and index not in self._gravity_forces:
             return
         if force is None:
-            del self._zone_forces[index]
+            del self._gravity_forces[index]
         else:
-            self._zone_forces[index] = force
+            self._gravity_forces[index] = force
         self._sum(index)
 
     def _sum(self, index: int) -> None:
         self._prepared = None
-        action, zone_force = self._action_forces.get(index), self._zone_forces.get(index)
+        action, gravity_force = self._action_forces.get(index), self._gravity_forces.get(index)
         if action is not None:
-            self._total[index] = action if zone_force is None else (action[0] + zone_force, action[1])
-        elif zone_force is not None:
-            self._total[index] = zone_force, 0.0
+            self._total[index] = action if gravity_force is None else (action[0] + gravity_force, action[1])
+        elif gravity_force is not None:
+            self._total[index] = gravity_force, 0.0
         else:
             self._total.pop(index, None)
 
     def drop(self, index: int) -> None:
         """Remove all forces on a body."""
-        for each in (self._action_forces, self._zone_forces, self._total):
+        for each in (self._action_forces, self._gravity_forces, self._total):
             each.pop(index, None)
         self._prepared = None
 
@@ -360,5 +370,14 @@ class ConstantForces:
         torques = {index: torque for index, (_, torque) in self._total.items()}
         for index, (_, _, torque) in loads.items():
             torques[index] = torques.get(index, 0.0) + torque
+        if air.damps_bodies:
+            rows = [
+                r for r, n in enumerate(indices.tolist()) if air.angular_damping[n] and body_of(n).moment < math.inf
+            ]
+            damped = indices[rows]
+            moment = np.asarray([body_of(n).moment for n in damped.tolist()], np.float64)
+            given = np.asarray([torques.get(n, 0.0) for n in damped.tolist()], np.float64)
+            mean_turn = moment * mean_angular_acceleration(air, damped, values[rows, 5], given / moment, h)
+            torques |= dict(zip(damped.tolist(), mean_turn.tolist(), strict=True))
         for index, torque in torques.items():
             body_of(index).torque = torque

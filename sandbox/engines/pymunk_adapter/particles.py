@@ -11,7 +11,14 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.forces.air import Air, mean_acceleration, mean_fraction, rates, scaled
+from sandbox.engines.forces.air import (
+    Air,
+    mean_acceleration,
+    mean_angular_acceleration,
+    mean_fraction,
+    rates,
+    scaled,
+)
 from sandbox.engines.pymunk_adapter.forces import AttractionField, damping_factor
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
@@ -90,7 +97,7 @@ class Particles:
     @property
     def has_only_gravity(self) -> bool:
         """Whether only gravity acts."""
-        is_slowed = self._air.flows or self.world.has_damping
+        is_slowed = self._air.acts_by_force or self.world.has_damping
         return self._field is None and not (self._has_force or self._has_torque or is_slowed)
 
     @property
@@ -101,7 +108,8 @@ class Particles:
     def rebuild(self) -> None:
         """Update the forces that a substep needs."""
         world = self.world
-        self._has_force = any(force.any() for force, _ in self._forces.values())
+        self._scaled: IntArray = self.indices[self._bodies.gravity_scale[self.indices] != 1.0]
+        self._has_force = any(force.any() for force, _ in self._forces.values()) or len(self._scaled) > 0
         self._has_torque = any(torque for _, torque in self._forces.values())
         self._air = Air.of(world, self._bodies, self.indices)
         self._damping_factor = damping_factor(world.damping, self._h) if world.has_damping else 1.0
@@ -112,7 +120,7 @@ class Particles:
         from sandbox.engines.pymunk_adapter.particle_kernels import tile_of
 
         self._kick_tile = tile_of(self._kick)
-        if self._air.flows:
+        if self._air.flows and self._air.is_linear:
             fraction = float(mean_fraction(np.asarray([world.linear_drag]), self._h)[0])
             self._drift = np.repeat(self._mass, 2), tile_of(world.gravity), tile_of(world.wind)
             self._drag = world.linear_drag, fraction
@@ -149,7 +157,7 @@ class Particles:
 
         Under gravity alone nothing is checked: every valid start stays finite for the largest number of steps.
         """
-        if not (self._has_force or self._has_torque or self._air.flows or self._field is not None):
+        if not (self._has_force or self._has_torque or self._air.acts_by_force or self._field is not None):
             return None
         # Quick test: if both coordinates are below half a bound, the length is below the bound.
         if self._compiled and not self._has_torque:
@@ -174,20 +182,22 @@ class Particles:
         """Advance by some substeps: in each, positions by the old velocity, then velocities."""
         if not len(self.indices):
             return
-        if substeps > 1 and self._has_torque and self._air.depends_on_spin:  # which changes from substep to substep
+        turns_faster = self._has_torque or self._air.damps_bodies
+        if substeps > 1 and turns_faster and self._air.depends_on_spin:  # which changes from substep to substep
             for _ in range(substeps):
                 self.step()
             return
         compiled = self._compiled and not self.world.has_damping
-        has_forces = self._has_force or self._field is not None or not self._air.is_linear
+        has_uniform_air = self._air.is_linear and not self._air.damps_bodies
+        has_forces = self._has_force or self._field is not None or not has_uniform_air
         if compiled and not has_forces:
             self._step_compiled(substeps)
         else:
-            self._step_with_numpy(substeps, has_forces or self._air.flows)
+            self._step_with_numpy(substeps, has_forces or self._air.acts_by_force)
         if self._has_torque:
             for _ in range(substeps):
                 self._turn_with_torques()
-        elif self.can_turn and compiled:
+        elif self.can_turn and compiled and not self._air.damps_bodies:
             from sandbox.engines.pymunk_adapter.particle_kernels import turn
 
             turn(self._angle, self._spin, self._runs, self._h, substeps)
@@ -238,20 +248,35 @@ class Particles:
         forces = np.zeros_like(self._position)
         for index, (force, _) in self._forces.items():
             forces[index] = force
+        if len(self._scaled):  # in the operations of `PymunkBodies`, for bodies in the space
+            world, scale = np.asarray(self.world.gravity), self._bodies.gravity_scale[self._scaled]
+            forces[self._scaled] += (scale[:, None] * world - world) * self._mass[self._scaled][:, None]
         return forces
 
     def _turn_with_torques(self) -> None:
-        """Advance angles, then the spins of bodies with a constant torque."""
+        """Advance angles, then the spins of bodies with a constant torque; those of damped ones are up to date."""
         for piece in self._pieces():
             self._turn(piece)
         for index, (_, torque) in self._forces.items():
-            self._spin[index] += torque * (1.0 / self._moment[index]) * self._h
+            if not self._air.angular_damping[index]:
+                self._spin[index] += torque * (1.0 / self._moment[index]) * self._h
 
     def _turn(self, piece: slice | IntArray) -> None:
         """Advance the angles of some rows by a substep, then damp their spins."""
         self._angle[piece] += self._spin[piece] * self._h
+        if self._air.damps_bodies:
+            self._damp_spins(piece)
         if self.world.has_damping:
             self._spin[piece] *= self._damping_factor
+
+    def _damp_spins(self, piece: slice | IntArray) -> None:
+        """Advance the spins of those of some rows that have angular damping."""
+        rows = np.arange(len(self._spin))[piece]
+        rows = rows[self._air.angular_damping[rows] > 0.0]
+        torque = np.asarray([self._forces[n][1] if n in self._forces else 0.0 for n in rows.tolist()], np.float64)
+        inverse = 1.0 / self._moment[rows]
+        mean = mean_angular_acceleration(self._air, rows, self._spin[rows], torque * inverse, self._h)
+        self._spin[rows] += (self._moment[rows] * mean) * inverse * self._h
 
     def _forced_kick(
         self,
@@ -263,7 +288,7 @@ class Particles:
     ) -> FloatArray:
         """Return (g + a + f/m)·h of some rows, a the attraction; with air, whose force includes gravity, g is 0."""
         inverse = 1.0 / mass
-        if self._air.flows:
+        if self._air.acts_by_force:
             acceleration_by_force = None if force is None else force * inverse
             air, spin = self._air, self._spin[piece]
             mean = mean_acceleration(air, piece, self.world.gravity, velocity, spin, acceleration_by_force, self._h)

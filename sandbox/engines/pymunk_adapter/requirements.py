@@ -29,6 +29,9 @@ def combination_faults(scene: Scene, settings: Settings, wanted: frozenset[Deman
         found.append("half_kick supports gravity only, and the scene has other forces")
     if half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
         found.append("half_kick does not support zones with their own gravity")
+    if half_kick:
+        of_bodies = sorted(wanted & {Demand.GRAVITY_SCALE, Demand.SPEED_LIMITS})
+        found += [f"half_kick does not support {demand}" for demand in of_bodies]
     if half_kick and has_kinematic:
         found.append("half_kick does not support kinematic bodies")
     for first, second, together in (
@@ -53,6 +56,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
         ("thrusts", scene.thrusts),
         ("drives", scene.drives),
         ("zones", scene.zones),
+        (str(Demand.ROLLING), Demand.ROLLING in wanted),
         ("one-way walls", any(wall.one_way for wall in scene.walls)),
         ("one-way bodies", Demand.ONE_WAY_BODIES in wanted),
         ("joints that can break", bool(np.isfinite(scene.joint_arrays.strength).any())),

@@ -28,9 +28,10 @@ from sandbox.engines.pymunk_adapter.colliders import (
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives, SpacePaths
-from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts
+from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts, scale_gravity
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
+from sandbox.engines.pymunk_adapter.rolling import SpaceRolling
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
@@ -90,6 +91,12 @@ class SpaceBodies:
         self._continues = setup.time > 0.0  # until the first bodies have joined
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
+        self.rolling = SpaceRolling(self._space, settings.h)
+        """rolling resistance of balls"""
+        self.limits: dict[int, tuple[float, float]] = {}
+        """largest speed, m/s, and angular speed, rad/s, of each body in the space that has a limit, by its index"""
+        self.limit_changes: list[tuple[int, float, float, float]] = []
+        """bodies whose speed was reduced in the last substep, and the changes of velocity, m/s, and spin, rad/s"""
         self._moving = 0
         self._needs_check: StateCheck | None = None
 
@@ -192,6 +199,7 @@ class SpaceBodies:
         if index in self._resting:  # it is kinematic already and has no mass in pymunk
             return
         body = self._members[index].body
+        self.rolling.leave(body)
         self._resting[index] = body.mass, body.moment
         body.velocity, body.angular_velocity = (0.0, 0.0), 0.0
         body.body_type = pymunk.Body.KINEMATIC
@@ -201,6 +209,7 @@ class SpaceBodies:
     def release(self, index: int) -> None:
         """Release a body that was held."""
         body = self._members[index].body
+        self.rolling.leave(body)
         body.body_type = pymunk.Body.DYNAMIC
         body.mass, body.moment = self._resting.pop(index)
         body.force, body.torque = (0.0, 0.0), 0.0  # of thrusts, set while it was held
@@ -251,6 +260,8 @@ class SpaceBodies:
         if self._can_touch[index] or (fixed and bodies.elements[bodies.element[index]].collides != "none"):
             self._add_shapes(index, bodies)
         self._by_name[name], self._name_of[index] = body, name
+        if bodies.round[index]:
+            self.rolling.join(body, float(bodies.radius[index]))
         if driven:
             self.drives.join(name, index, body, state)
         elif index in bodies.paths:
@@ -260,6 +271,10 @@ class SpaceBodies:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
                 self.thrusts.join(index, body)
+            if self._settings.sleeping and bodies.gravity_scale[index] != 1.0:
+                scale_gravity(body, float(bodies.gravity_scale[index]))
+            if bodies.limited[index]:
+                self.limits[index] = float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])
 
     def _add_shapes(self, index: int, bodies: Bodies) -> None:
         """Add the shapes of a body in the space."""
@@ -313,10 +328,12 @@ class SpaceBodies:
             for _, shape in member.shapes:
                 self._surface_setter.one_way_walls.platforms.pop(shape, None)
             self._moving -= member.moves
+            self.rolling.leave(member.body)
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
             self.thrusts.leave(index)
+            self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
 
@@ -354,6 +371,7 @@ class SpaceBodies:
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch = matrix.touches
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
+        self.rolling.rebuild(matrix)
         for index, (_, shapes) in self._members.items():
             for piece, shape in shapes:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
@@ -390,13 +408,39 @@ class SpaceBodies:
             self.drives.after()
         else:
             self._space.step(self._h)
+        if self.rolling.is_active:
+            self.rolling.update()
+        if self.limits:
+            self._limit_speeds()
         self._state = None
+
+    @property
+    def rolled(self) -> IntArray:
+        """Indices of the bodies on which rolling resistance acted in the last substep."""
+        ids = self.rolling.resisted
+        return np.asarray([n for n, member in self._members.items() if member.body.id in ids], np.int64)
+
+    def _limit_speeds(self) -> None:
+        """Reduce speeds to their limits."""
+        self.limit_changes.clear()
+        for index, (speed, spin) in self.limits.items():
+            record = self._members[index].body._body
+            velocity, turning = lib.cpBodyGetVelocity(record), lib.cpBodyGetAngularVelocity(record)
+            x, y = velocity.x, velocity.y
+            fast, turned = math.hypot(x, y), max(min(turning, spin), -spin)
+            change = speed / fast - 1.0 if fast > speed else 0.0
+            if change:
+                lib.cpBodySetVelocity(record, (x + change * x, y + change * y))
+            if turned != turning:
+                lib.cpBodySetAngularVelocity(record, turned)
+            if change or turned != turning:
+                self.limit_changes.append((index, change * x, change * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
         """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and the air."""
         if self._paths:
             self._paths.before(time)
-        if self.air.flows:
+        if self.air.acts_by_force:
             self.thrusts.update_loads(time, self._h)
             self._apply_air(*self._read())
             return
@@ -410,12 +454,14 @@ class SpaceBodies:
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
-            or self.air.flows
+            or self.air.acts_by_force
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
             or self._surface_setter.one_way_walls.any_left
             or self.joints.has_breakable
+            or self.limits
+            or self.rolling.is_active
         )
 
     def batch_steps(self, substeps: int, lists_substeps: bool) -> int:

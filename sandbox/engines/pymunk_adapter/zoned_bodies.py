@@ -71,6 +71,7 @@ class ZonedPymunkBodies(PymunkBodies, ZonedBodyStore):
     def set_gravity(self, index: int, gravity: Point | None) -> None:
         """Replace the world's gravity on a body by another, m/s², by a force that makes up the difference."""
         super().set_gravity(index, gravity)
-        world = np.asarray(self.scene.world.gravity)
-        force = None if gravity is None else (np.asarray(gravity) - world) * self.bodies.mass[index]
-        self.space_bodies.constant_forces.set_zone_force(index, force)
+        self._update_gravity(index)
+
+    def _zone_gravity(self, index: int) -> Point | None:
+        return self._gravities.get(index)

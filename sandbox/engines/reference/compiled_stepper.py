@@ -140,6 +140,7 @@ class CompiledStepper:
             and world.pipeline.filter is None
             and (world.joints is None or not world.joints.has_forces)
             and not world.field.attracting
+            and world.limits is None
             and settings.broad_phase in BROAD_PHASE_CODES
             and settings.integrator in INTEGRATOR_CODES
             and not (world.records_work or world.records_joint_load)

@@ -34,7 +34,7 @@ from sandbox.engines.reference.joint_data import select_joints
 from sandbox.engines.reference.joint_rows import VelocityConstraints, make_velocity_constraints
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.engines.reference.manifold import Manifolds
-from sandbox.engines.reference.sequential_impulses import AngularStops, solve_together
+from sandbox.engines.reference.sequential_impulses import AngularStops, RollingRows, solve_together
 from sandbox.engines.reference.velocity_solver import ContactMemory, ImpulseSolver, Motion, SpringContacts
 from sandbox.scene.compile.drives import Mount, about_hinge
 from sandbox.scene.compile.paths import PathMotion
@@ -477,6 +477,7 @@ class Drives:
         contacts: Manifolds,
         bounce: FloatArray,
         rows: VelocityConstraints | None,
+        rolling: RollingRows,
         velocity: FloatArray,
         impulse: FloatArray,
         iterations: int,
@@ -495,7 +496,7 @@ class Drives:
         )
         rows = self._no_rows if rows is None else rows
         inverse = self._store.inverse_mass, inverse_moment
-        solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
+        solve_together(contacts, bounce, rows, stops, rolling, velocity, *inverse, impulse, iterations)
         given = dict(zip(stops.body.tolist(), stops.impulse.tolist(), strict=True))
         for hinge in self._hinges:
             hinge.store_stop_impulse(given.get(hinge.index, 0.0))
@@ -584,7 +585,7 @@ class DrivenSolver(ImpulseSolver):
         impulse: FloatArray,
     ) -> None:
         """Iterate over contacts, joints and stops; the arguments are those of `ImpulseSolver.iterate`."""
-        self._drives.solve(contacts, bounce, rows, velocity, impulse, self._iterations)
+        self._drives.solve(contacts, bounce, rows, self._rolling, velocity, impulse, self._iterations)
 
 
 def _left(normal: FloatArray) -> FloatArray:

@@ -62,8 +62,8 @@ class StepEnergyLedger:
         if self._drives is not None:  # the motion of driven bodies is entered separately
             self._inertia = self._all_inertia.copy()
             self._inertia[store.driven] = 0.0
-        self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
-        self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
+        self._weight: FloatArray = self._inertia[:, :1] * store.world_gravity
+        self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - store.world_gravity)
         breaks = np.full(len(store.setup.joints), np.inf)
         breaks[list(store.broken)] = -np.inf
         self._potential = Potential(store.setup, store.bodies, breaks=breaks)
@@ -83,10 +83,15 @@ class StepEnergyLedger:
 
     def enter_step(self, record: StepRecord) -> None:
         """Enter a step: its contacts and joints, the impact at its end, drives, forces and the integrator."""
+        if record.unlimited is not None:
+            self._enter_limits(record.motion.start[1], record.unlimited, record.after)
+            record = record._replace(after=record.unlimited)
         start, impact = record.motion.start[1], record.impact
         mean = 0.5 * (start + record.end)
         if self._penalty is None:
             self._enter_contacts(record.contacts, record.impulse, mean, record.kick_energy)
+        if record.rolling is not None:
+            self._enter_rolling(record.contacts, record.rolling, mean[:, 2])
         assert record.work is not None  # this ledger has switched it on
         if self._joints is not None and self._joints.method == "impulses":
             self.account.add(Cause.JOINTS, record.work.joints)
@@ -97,6 +102,28 @@ class StepEnergyLedger:
         if self._drives is not None and record.work.drives is not None:
             self._enter_drives(self._drives, record.work.drives, record, mean)
         self._enter_motion(record, record.work.motors)
+
+    def _enter_rolling(self, contacts: Manifolds, impulse: FloatArray, spin: FloatArray) -> None:
+        """Enter the work of angular impulses (K,), N·m·s, at mean spins (N,); drives supply that on their bodies."""
+        is_body = contacts.second >= 0
+        second = np.where(is_body, contacts.second, 0)
+
+        def work(spins: FloatArray) -> float:
+            return float(impulse @ (np.where(is_body, spins[second], 0.0) - spins[contacts.first]))
+
+        self.account.add(Cause.ROLLING, work(spin))
+        self.account.add(Cause.DRIVES, -work(np.where(self._store.driven, spin, 0.0)))
+
+    def _enter_limits(self, start: FloatArray, before: State, after: State) -> None:
+        """Enter the reduction of speeds to their limits, in a step that began with rates `start`, (N, D).
+
+        It reverses a part of the step's kicks, and positions follow it: that is the integrator's, as for contacts.
+        """
+        work = self._product(after[1] - before[1], 0.5 * (start + after[1]))
+        change = self._kinetic(before[1], after[1]) + self._potential_change(before[0], after[0])
+        change += self._spring_energy_change(before[0], after[0])
+        self.account.add(Cause.SPEED_LIMITS, work)
+        self.account.add(Cause.INTEGRATOR, change - work)
 
     def _enter_drives(self, drives: Drives, work: DriveWork, record: StepRecord, mean: FloatArray) -> None:
         """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
@@ -244,7 +271,7 @@ class StepEnergyLedger:
         store = self._store
         pose = np.column_stack((store.position, store.angle))
         rate = np.column_stack((store.velocity, store.angular_velocity))
-        weight = self._all_inertia[:, :1] * store.scene.world.gravity
+        weight = self._all_inertia[:, :1] * store.world_gravity
         total = 0.5 * float((self._all_inertia * rate * rate).sum()) - float((weight * store.position).sum())
         if self._potential.attracts:
             total += self._attraction_energy(pose)

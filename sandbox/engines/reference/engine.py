@@ -117,6 +117,10 @@ class ReferenceEngine:
         Demand.MAX_BIAS,
         Demand.DAMPING,
         Demand.LIFT,
+        Demand.BODY_DAMPING,
+        Demand.GRAVITY_SCALE,
+        Demand.SPEED_LIMITS,
+        Demand.ROLLING,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
@@ -160,11 +164,14 @@ class ReferenceEngine:
                 for demand in (Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY)
                 if demand in wanted
             ]
+        if settings.impact == "dissipative" and Demand.ROLLING in wanted:
+            missing.append(f"impact 'dissipative' does not support {Demand.ROLLING}; use 'newton'")
         if settings.response == "penalty":
             missing += self._penalty_faults(setup, settings)
             if settings.impact is not None:
                 missing.append("impact applies to response 'impulse' only")
-            for demand in (Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY):
+            unsupported = Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED, Demand.SURFACE_VELOCITY, Demand.ROLLING
+            for demand in unsupported:
                 if demand in wanted:
                     missing.append(f"response 'penalty' does not model {demand}; 'impulse' does")
         else:

@@ -1,5 +1,8 @@
 """Sequential impulses: kernels that solve contacts, and contacts together with joints (Catto 2005).
 
+Rolling resistance is a friction of the relative spin of two bodies: a row for each contact, whose angular impulse stays
+within c·r times the accumulated normal impulse, as in Box2D v3.
+
 As in Munk2D (`cpArbiter.c`), accumulated impulses are clamped to the friction cone and warm-started by those of the
 last substep. Overlap is corrected by pseudo-velocities, which move bodies but are not part of their motion.
 
@@ -350,25 +353,66 @@ class AngularStops(NamedTuple):
 NO_STOPS = AngularStops(np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 
+class RollingRows(NamedTuple):
+    """Rolling resistance of K contacts: an angular impulse up to `reach` times the normal impulse opposes rolling."""
+
+    reach: FloatArray
+    """(K,) c·r, m; 0 for contacts without. Empty if there is no such contact"""
+    impulse: FloatArray
+    """(K,) N·m·s on the second body, and its opposite on the first: initial, then accumulated"""
+
+
+NO_ROLLING = RollingRows(np.empty(0), np.empty(0))
+
+
+@bare_kernel
+def _apply_rolling(contacts: Manifolds, k: int, change: float, spin: FloatArray, inverse_moment: FloatArray) -> None:
+    """Apply an angular impulse to the second body of a contact, and its opposite to the first."""
+    i, j = contacts.first[k], contacts.second[k]
+    spin[i] -= inverse_moment[i] * change
+    if j >= 0:
+        spin[j] += inverse_moment[j] * change
+
+
+@bare_kernel
+def solve_rolling_once(
+    contacts: Manifolds, rolling: RollingRows, spin: FloatArray, inverse_moment: FloatArray, impulse: FloatArray
+) -> None:
+    """Pass over the rolling resistance of all contacts once, within the bounds by their normal impulses so far."""
+    for k in range(len(rolling.reach)):
+        i, j = contacts.first[k], contacts.second[k]
+        inverse, rate = inverse_moment[i], -spin[i]
+        if j >= 0:
+            inverse += inverse_moment[j]
+            rate += spin[j]
+        if rolling.reach[k] == 0.0 or inverse == 0.0:
+            continue
+        bound, old = rolling.reach[k] * impulse[k, 0], rolling.impulse[k]
+        rolling.impulse[k] = min(max(old - rate / inverse, -bound), bound)
+        _apply_rolling(contacts, k, rolling.impulse[k] - old, spin, inverse_moment)
+
+
 @bare_kernel
 def solve_together(
     contacts: Manifolds,
     bounce: FloatArray,
     rows: VelocityConstraints,
     stops: AngularStops,
+    rolling: RollingRows,
     velocity: FloatArray,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
     impulse: FloatArray,
     iterations: int,
 ) -> None:
-    """Solve contacts, joints and stops by impulses, in this order in each pass, as Munk2D does.
+    """Solve contacts, rolling resistance, joints and stops by impulses, in this order in each pass, as Munk2D does.
 
     Args:
         contacts: K contacts.
         bounce: (K,) m/s, as in `solve_velocities`.
         rows: of the joints, prepared.
         stops: one-sided constraints.
+        rolling: of the contacts.
         velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
@@ -377,11 +421,14 @@ def solve_together(
     """
     spin = velocity[:, 2]
     warm_start_contacts(contacts, velocity, spin, inverse_mass, inverse_moment, impulse)
+    for k in range(len(rolling.reach)):
+        _apply_rolling(contacts, k, rolling.impulse[k], spin, inverse_moment)
     warm_start_joints(rows, velocity, inverse_mass, inverse_moment)
     for k in range(len(stops.body)):
         spin[stops.body[k]] -= stops.direction[k] * stops.impulse[k] * inverse_moment[stops.body[k]]
     for _ in range(iterations):
         solve_contacts_once(contacts, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
+        solve_rolling_once(contacts, rolling, spin, inverse_moment, impulse)
         solve_joints_once(rows, velocity, inverse_mass, inverse_moment)
         for k in range(len(stops.body)):
             n, direction, old = stops.body[k], stops.direction[k], stops.impulse[k]

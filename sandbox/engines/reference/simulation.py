@@ -35,6 +35,7 @@ from sandbox.engines.reference.step_kernels import STOPPED, UNCHECKED
 from sandbox.engines.reference.world_batch import ConvexWorldBatch
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.contacts import surface_parts
+from sandbox.scene.compile.demands import may_resist_rolling
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
@@ -332,6 +333,11 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         if spec.kinematic and (self._settings.impact == "dissipative" or self.scene.attractions):
             other = "attraction" if self.scene.attractions else "impact 'dissipative'"
             raise ActionError(f"reference does not model {other} and kinematic bodies together")
+        resists = may_resist_rolling(spec, self.scene)
+        if resists and self._settings.response == "penalty":
+            raise ActionError("response 'penalty' does not support rolling_resistance; response 'impulse' does")
+        if resists and self._settings.impact == "dissipative":
+            raise ActionError("impact 'dissipative' does not support rolling_resistance; impact 'newton' does")
         if self._settings.response == "penalty" and _has_falloff(spec, self.scene):
             raise ActionError("response 'penalty' does not support restitution_falloff; response 'impulse' does")
 

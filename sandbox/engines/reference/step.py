@@ -18,6 +18,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.speed_limits import SpeedLimits
 from sandbox.engines.forces.field import ForceField
 from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
 from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
@@ -68,10 +69,14 @@ class StepRecord(NamedTuple):
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
     impact: Impact | None
     """contacts that act only at the end of the step; None with discrete detection"""
+    rolling: FloatArray | None
+    """(K,) N·m·s on the second bodies of the contacts, by rolling resistance; None without any"""
     joint_load: FloatArray | None
     """(L, 2) N or N·m, force of each joint on its second body; None if no joint can break"""
     work: "SolverWork | None"
     """work of joints and drives; None while energy accounting is off"""
+    unlimited: State | None = None
+    """(2, N, D) end before speeds were reduced to their limits; None if they were not"""
 
     def all_contacts(self) -> tuple[Manifolds, FloatArray]:
         """Return all contacts, those of the impact last, and their impulses (K, 2), N·s."""
@@ -174,6 +179,7 @@ class WorldState:
         if self.drives is not None:
             self.drives.use_hinges(self.x)
         self.memory.rebuild(store.moving)
+        self.limits = SpeedLimits.of(store.bodies, store.moving)
         if not is_suitable(self.pipeline, store):  # keys mean other pairs in the new pipeline
             self.pipeline = self._new_pipeline(self.work)
             self._penalty = self._new_penalty(self.pipeline)
@@ -288,10 +294,20 @@ class WorldState:
     def commit(self, motion: Motion, solution: ImpulseSolution, h: float) -> StepRecord:
         """Take a solution at the end of h, s, as the present state."""
         before, start = self.x, self.time
-        self.x, self.time = self.solver.finish(solution.after), start + h
+        after = self.solver.finish(solution.after)
+        self.x, self.time = self._limited(after, h), start + h
         load = self.joints.load(self.x) if self.joints is not None and self.records_joint_load else None
         work = self._solver_work(before, motion, solution.end, h) if self.records_work else None
-        return StepRecord(start, h, before, motion, self.x, *solution[1:], load, work)
+        unlimited = None if self.x is after else after
+        return StepRecord(start, h, before, motion, self.x, *solution[1:], load, work, unlimited)
+
+    def _limited(self, x: State, h: float) -> State:
+        """Return the end of a step of h, s, with speeds within their limits.
+
+        Positions follow as far as the integrator moves them within the step.
+        """
+        rates = x[1] if self.limits is None else self.limits.reduced(x[1])
+        return x if rates is x[1] else np.stack((x[0] + (self.position_fraction * h) * (rates - x[1]), rates))
 
     def _solver_work(self, before: State, motion: Motion, end: FloatArray, h: float) -> SolverWork:
         """Return the work of joints and drives in a step of h, s, that ended with rates `end` before its impact."""

@@ -276,7 +276,8 @@ _air_law = inline_kernel(air_law)
 @inline_kernel
 def air_acts(air: Air) -> bool:
     """Return `Air.acts`, in a kernel."""
-    return air.linear_drag > 0.0 or air.quadratic_drag > 0.0 or air.damping_rate > 0.0 or air.depends_on_spin
+    damps = air.damping_rate > 0.0 or air.damps_bodies
+    return air.linear_drag > 0.0 or air.quadratic_drag > 0.0 or damps or air.depends_on_spin
 
 
 @inline_kernel

@@ -19,13 +19,16 @@ from sandbox.engines.common.restitution_kernels import compiled_rebound
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.collision import CollisionPipeline
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, State, Step, transition
-from sandbox.engines.reference.joint_rows import VelocityConstraints
+from sandbox.engines.reference.joint_data import select_joints
+from sandbox.engines.reference.joint_rows import VelocityConstraints, make_velocity_constraints
 from sandbox.engines.reference.joints import JointSolver, kick_pose
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import (
+    NO_ROLLING,
     NO_STOPS,
     TURNOVER_ROUNDING,
     GroupWork,
+    RollingRows,
     approach,
     largest_fractions,
     match_impulses,
@@ -37,6 +40,7 @@ from sandbox.engines.reference.sequential_impulses import (
     warm_start_contacts,
 )
 from sandbox.resource_limits import STEP_WORK
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Kick, Settings
@@ -98,6 +102,31 @@ class ReboundModel:
             fraction = min((_squared_distance(a, b, point), fraction_at(a, b, part, point)) for a, b, part in each)[1]
         speed = kicked(kick.speed, kick.threshold, middle, fraction, closing)
         return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)
+
+
+class RollingModel:
+    """Rolling resistance of contacts of balls."""
+
+    def __init__(self, store: BodyStore) -> None:
+        self._coefficients: FloatArray = store.contact_matrix.surfaces.rolling.ravel()
+        self._radius: FloatArray = np.where(store.bodies.round, store.bodies.radius, 0.0)
+
+    @staticmethod
+    def is_needed(store: BodyStore) -> bool:
+        """Return whether some contact of a ball has rolling resistance."""
+        matrix = store.contact_matrix
+        return matrix.rolling > 0.0 and bool((store.bodies.round & matrix.touches).any())
+
+    def rows(self, contacts: Manifolds, memory: "ContactMemory", fraction: float) -> RollingRows:
+        """Return the rows of contacts, with a fraction of the impulses of the last step as initial ones."""
+        radius = self._radius[contacts.first]
+        other = np.where(contacts.second >= 0, self._radius[np.maximum(contacts.second, 0)], 0.0)
+        reach = self._coefficients[contacts.surface_pair] * np.maximum(radius, other)
+        impulse = np.zeros(contacts.size)
+        if len(memory.rolling):
+            row = np.minimum(np.searchsorted(memory.key, contacts.key), len(memory.key) - 1)
+            impulse = np.where(memory.key[row] == contacts.key, fraction * memory.rolling[row], 0.0)
+        return RollingRows(reach, impulse)
 
 
 def _kick_of(collider: object) -> Kick | None:
@@ -173,6 +202,8 @@ class ImpulseSolution(NamedTuple):
     kick_energy: FloatArray | None
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
     impact: Impact | None = None
+    rolling: FloatArray | None = None
+    """(K,) N·m·s on the second bodies, by rolling resistance; None without any"""
 
 
 class ContactMemory:
@@ -189,6 +220,8 @@ class ContactMemory:
         """Forget the impulses, because keys now mean other pairs; h is the substep, s."""
         self.key: IntArray = np.empty(0, np.int64)
         self.impulse: FloatArray = np.empty((0, 2))
+        self.rolling: FloatArray = np.empty(0)
+        """(K,) N·m·s, by rolling resistance; empty without any"""
         self.h = h
 
     def rebuild(self, moving: BoolArray) -> None:
@@ -243,6 +276,8 @@ class ImpulseSolver:
         self._restitution: FloatArray = store.restitution.ravel()
         self._rebound_model = ReboundModel(store) if ReboundModel.is_needed(store) else None
         """for kicks and velocity-dependent restitution; None if every pair has constant restitution and no kick"""
+        self._rolling_model = RollingModel(store) if RollingModel.is_needed(store) else None
+        self._rolling, self._no_rows = NO_ROLLING, make_velocity_constraints(select_joints(JointArrays.none()))
 
     @property
     def scheme(self) -> Step:
@@ -296,18 +331,24 @@ class ImpulseSolver:
         bounce = self.bounce(contacts, motion.start[1])
         match_impulses(contacts.key, memory.key, memory.impulse, impulse)
         # The impulse of a resting contact is proportional to the step. It is not scaled up: that of an impact is not.
-        impulse *= min(h / memory.h, 1.0)
+        fraction_kept = min(h / memory.h, 1.0)
+        impulse *= fraction_kept
+        if self._rolling_model is not None and after.shape[2] == 3:
+            self._rolling = self._rolling_model.rows(contacts, memory, fraction_kept)
         self._resolve(contacts, bounce, motion.start[1], after[1], impulse, with_joints=True)
+        rolling, self._rolling = self._rolling, NO_ROLLING
         if fraction:
             change = after[1] - self.remove_stop_rates(placed[1])
             after[0] += (fraction * h) * change
             contacts.separation[:] += (fraction * h) * self.approach(contacts, change)
-        return ImpulseSolution(after, after[1], contacts, impulse, bounce.kick_energy)
+        given = rolling.impulse if len(rolling.impulse) else None
+        return ImpulseSolution(after, after[1], contacts, impulse, bounce.kick_energy, None, given)
 
     def impact(self, motion: Motion, persistent: Manifolds, colliding: Manifolds, h: float) -> ImpulseSolution:
         """Return the state at the end of a motion over h, s, with persistent contacts and an impact at its end.
 
-        The engine refuses drives and joints with the detections that solve impacts one by one.
+        The engine refuses drives and joints with the detections that solve impacts one by one. Rolling resistance acts
+        in persistent contacts only.
         """
         through = self.solve(motion, persistent, h)
         after, impulse = through.after.copy(), np.zeros((colliding.size, 2))
@@ -322,6 +363,7 @@ class ImpulseSolver:
             memory.has_pseudo_velocity = False
             memory.pseudo_velocity[:] = 0.0
         memory.key, memory.impulse, memory.h = contacts.key, solution.impulse, h
+        memory.rolling = np.empty(0) if solution.rolling is None else solution.rolling
         if len(contacts.key):
             memory.key = contacts.key.copy()
             target = self.correction_rate(h) * np.minimum(contacts.separation + self._slop, 0.0)
@@ -345,7 +387,8 @@ class ImpulseSolver:
     @property
     def is_plain(self) -> bool:
         """Whether there are only contacts by Newton's law of constant restitution, and joints by impulses."""
-        return not (self._position_joints is not None or self._dissipative) and self._rebound_model is None
+        has_other_methods = self._position_joints is not None or self._dissipative
+        return not has_other_methods and self._rebound_model is None and self._rolling_model is None
 
     def finish(self, after: State) -> State:
         """Return the state with which the next step begins."""
@@ -407,13 +450,15 @@ class ImpulseSolver:
         velocity: FloatArray,
         impulse: FloatArray,
     ) -> None:
-        """Iterate over contacts and the rows of joints, if any; the other arguments are those of `_solve`."""
-        if rows is None:
+        """Iterate over contacts, their rolling resistance and rows of joints; other arguments are those of `_solve`."""
+        if rows is None and not len(self._rolling.reach):
             solve_velocities(
                 contacts, bounce, velocity, self._spin(velocity), *self._inverse, impulse, self._iterations
             )
         else:
-            solve_together(contacts, bounce, rows, NO_STOPS, velocity, *self._inverse, impulse, self._iterations)
+            rows = self._no_rows if rows is None else rows
+            own = velocity, *self._inverse, impulse, self._iterations
+            solve_together(contacts, bounce, rows, NO_STOPS, self._rolling, *own)
 
     def _solve_until_converged(
         self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray

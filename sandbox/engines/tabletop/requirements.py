@@ -6,7 +6,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import SURFACES, air_demands, demands
+from sandbox.scene.compile.demands import SURFACES, Demand, air_demands, demands
 from sandbox.scene.compile.demands import on_floor as has_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -49,7 +49,8 @@ def unsupported_by_steppers(setup: Setup, bodies: Bodies | None = None) -> Itera
     """Yield the features that no time-step solver supports on a surface, with the scene's bodies or with given ones."""
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     yield from unsupported_on_surface(setup, bodies)
-    for demand in sorted(air_demands(scene.world, bodies)):
+    of_bodies = (Demand.GRAVITY_SCALE, bodies.scales_gravity), (Demand.SPEED_LIMITS, bool(bodies.limited.any()))
+    for demand in sorted({*air_demands(scene.world, bodies), *(demand for demand, on in of_bodies if on)}):
         yield f"it does not model {demand} on a floor"
     if len(setup.joints) or scene.attractions or scene.thrusts or scene.drives:
         yield "it does not model joints, attraction, thrusts or drives on a floor"

@@ -31,7 +31,7 @@ from sandbox.measure.analytic.static_stack import static_stack
 from sandbox.measure.metrics.clearance import plane_clearance
 from sandbox.scene.compile.ballistics import free_rotation
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import on_floor
+from sandbox.scene.compile.demands import OWN_MOTION, Demand, demands, on_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import ContactEvent, Contacts, Trajectory
 
@@ -111,6 +111,8 @@ def solution(scene: Scene) -> Solution | None:
     changes = scene.zones or scene.events or scene.bodies.kinematic.any()
     if on_floor(scene) or changes or has_filters:  # no formula includes them
         return None
+    if demands(scene) & (OWN_MOTION | {Demand.ROLLING}):  # nor these
+        return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:
         found = next((form for form in (assemble(facts) for assemble in COUPLED_SOLUTIONS) if form is not None), None)
@@ -170,11 +172,19 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     acted = trajectory.info.get("actions") or scene.events
     if acted or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
         return None
-    if any(zone.holds or zone.gravity is not None for zone in scene.zones):
+    if any(zone.holds or zone.gravity is not None for zone in scene.zones) or _moves_its_own_way(bodies, number):
         return None
-    form = _solved(trajectory, scene, number) or _bouncing(trajectory, scene, number)
+    form = _solved(trajectory, scene, number)
+    if Demand.ROLLING not in demands(scene):
+        form = form or _bouncing(trajectory, scene, number)
     form = form or _flying(trajectory, scene, bodies, number)
     return form if form is not None and np.count_nonzero(form.valid) > 1 else None
+
+
+def _moves_its_own_way(bodies: Bodies, number: int) -> bool:
+    """Return whether a body scales gravity, is damped, or has a limit of its speed, which no formula includes."""
+    damped = bodies.linear_damping[number] + bodies.angular_damping[number] > 0.0
+    return bool(damped or bodies.gravity_scale[number] != 1.0 or bodies.limited[number])
 
 
 def _is_driven(scene: Scene, bodies: Bodies) -> BoolArray:

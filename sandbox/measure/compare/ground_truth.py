@@ -288,7 +288,9 @@ def _conserves_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[f
         return end, ""
     energy = energies(run, scene)
     counted = run.time < np.nanmin(run.retired_time, initial=np.inf)  # a retired body takes its energy with it
-    weight = float(np.where(scene.bodies.fixed, 0.0, scene.bodies.mass).sum()) * math.hypot(*scene.world.gravity)
+    bodies = scene.bodies
+    mass = float(np.where(bodies.fixed, 0.0, bodies.mass * np.abs(bodies.gravity_scale)).sum())
+    weight = mass * math.hypot(*scene.world.gravity)
     allowed = GROWTH * float(energy.kinetic.max(initial=0.0)) + weight * tolerance
     grown = energy.total - np.minimum.accumulate(energy.total)
     broken = np.flatnonzero((grown > allowed) & counted)

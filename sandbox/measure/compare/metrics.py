@@ -80,7 +80,8 @@ class EvaluationContext:
         """
         if self.truth is None or self.down is None:
             return np.full(len(self.scene.bodies), np.inf)
-        return times_of_leaving(self.scene, self.truth.trajectory, self.down)
+        times = times_of_leaving(self.scene, self.truth.trajectory, self.down)
+        return np.where(self.scene.bodies.gravity_scale > 0.0, times, np.inf)  # others may come back
 
     def errors(self, run: Trajectory) -> Errors:
         """Return the errors of a run against the truth. Those of the last run are kept: several metrics need them."""

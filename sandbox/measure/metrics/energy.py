@@ -67,6 +67,7 @@ def energies(
 
     mass = np.where(bodies.fixed, 0.0, bodies.mass)[columns]
     moment = np.where(bodies.fixed, 0.0, bodies.moment)[columns]
+    weight = mass * bodies.gravity_scale[columns] if bodies.scales_gravity else mass
     gravity = np.asarray(scene.world.gravity)
     stored = Potential(setup, bodies, body, trajectory.breaks(len(setup.joints)))
     needed = slice(None) if stored else columns  # a body can be joined to any other
@@ -90,7 +91,7 @@ def energies(
             turning = _sum(np.square(spin), counts, moment)
             kinetic[rows] = 0.5 * (_sum(squared, counts, mass) + turning)
             height = position[..., 0] * gravity[0] + position[..., 1] * gravity[1]
-            potential[rows] = -_sum(height, counts, mass)
+            potential[rows] = -_sum(height, counts, weight)
             if stored:
                 state = trajectory.position[rows], trajectory.angle[rows], present
                 potential[rows] += stored.at(trajectory.time[rows], *state)

@@ -10,7 +10,7 @@ from sandbox.measure.metrics.clearance import rotate_points
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.demands import AIR, demands
+from sandbox.scene.compile.demands import AIR, Demand, demands
 from sandbox.scene.compile.joint_arrays import MOTORS, JointArrays, JointKind
 from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
 from sandbox.scene.compile.scene import Scene
@@ -68,10 +68,11 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, lift, damping, friction, damper, thrust, drive, event, motor or kinematic body, no joint that gives
+    It has no drag, lift, damping, speed limit, friction, damper, thrust, drive, event, motor or kinematic body, no joint that gives
     way or that jerks a body when it becomes taut, and elastic contacts.
     """
-    if demands(scene) & AIR or scene.thrusts or scene.drives or scene.events:
+    acts = scene.thrusts or scene.drives or scene.events
+    if demands(scene) & (AIR | {Demand.SPEED_LIMITS}) or acts:
         return False
     if scene.bodies.kinematic.any():
         return False
@@ -120,15 +121,20 @@ def _flight_gain(run: Trajectory, scene: Scene) -> FloatArray:
     settings, gravity = Settings.model_validate(run.info["settings"]), math.hypot(*scene.world.gravity)
     if gravity == 0.0 or settings.half_kick or settings.integrator != "explicit_euler":
         return np.zeros(len(run.time))
-    mass = np.where(scene.bodies.fixed, 0.0, scene.bodies.mass).sum()
-    longest = 2.0 * float(np.nanmax(np.hypot(*np.moveaxis(run.velocity, 2, 0)), initial=0.0)) / gravity
-    return np.asarray(0.5 * mass * gravity**2 * settings.h * np.minimum(run.time, longest))
+    bodies, gain = scene.bodies, np.zeros(len(run.time))
+    twice_fastest = 2.0 * float(np.nanmax(np.hypot(*np.moveaxis(run.velocity, 2, 0)), initial=0.0))
+    for scale in np.unique(np.abs(bodies.gravity_scale)).tolist():
+        if scale > 0.0:
+            mass = bodies.mass[~bodies.fixed & (np.abs(bodies.gravity_scale) == scale)].sum()
+            pull = scale * gravity
+            gain += 0.5 * mass * pull**2 * settings.h * np.minimum(run.time, twice_fastest / pull)
+    return gain
 
 
 def _lift_energy(scene: Scene) -> float:
     """Return the energy that lifts every body by its own width, J."""
     bodies = scene.bodies
-    weight = np.where(bodies.fixed, 0.0, bodies.mass) * math.hypot(*scene.world.gravity)
+    weight = np.where(bodies.fixed, 0.0, bodies.mass * np.abs(bodies.gravity_scale)) * math.hypot(*scene.world.gravity)
     return float(weight @ (2.0 * bodies.thin))
 
 
@@ -136,19 +142,19 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the unexplained momentum at the end as a fraction of the largest Σ|m v| of any frame.
 
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
-    between moving bodies conserve momentum. None with drag, lift, damping, thrusts, drives, joints or attraction
-    between moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was
-    retired with its momentum; with kinematic bodies; or if the run did not reach its end.
+    between moving bodies conserve momentum. None with drag, lift, damping, speed limits, thrusts, drives, joints or
+    attraction between moving and static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if
+    a body was retired with its momentum; with kinematic bodies; or if the run did not reach its end.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
         return None
-    if demands(scene) & AIR or scene.thrusts or scene.drives or _acts_on_static(scene):
+    if demands(scene) & (AIR | {Demand.SPEED_LIMITS}) or scene.thrusts or scene.drives or _acts_on_static(scene):
         return None
     if any(zone.holds or zone.gravity is not None for zone in scene.zones) or bodies.kinematic.any():
         return None
     mass = np.where(bodies.fixed, 0.0, bodies.mass)
-    explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]
+    explained = (mass @ bodies.gravity_scale) * np.asarray(world.gravity) * run.time[-1]
     is_static = np.append(bodies.fixed, np.ones(len(scene.fixed_names), dtype=np.bool_))  # −1 − k counts from the end
     first, second = (is_static[run.contact_pair[:, side]] for side in (0, 1))
     explained = explained - run.contact_impulse[~first & second].sum(axis=0)

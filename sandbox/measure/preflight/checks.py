@@ -37,7 +37,7 @@ def kick_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> It
 
     Contacts are detected at the end of a substep: a body in contact has then gained g·h.
     """
-    fall = math.hypot(*scene.world.gravity) * settings.h
+    fall = math.hypot(*scene.world.gravity) * scene.bodies.largest_gravity_scale * settings.h
     touched = matrix.touching.any(axis=1)
     for name, number in zip(scene.fixed_names, matrix.surfaces.of_fixed.tolist(), strict=False):  # pockets come last
         kick = matrix.surfaces.surfaces[number].kick

@@ -183,7 +183,7 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
 
     Only rods solved by position corrections count.
     """
-    pull = math.hypot(*scene.world.gravity)
+    pull = math.hypot(*scene.world.gravity) * scene.bodies.largest_gravity_scale
     if settings.joints not in ("relaxation", "xpbd", "rattle") or pull == 0.0:
         return
     joints, depth = scene.joint_arrays.of(JointKind.ROD), 0

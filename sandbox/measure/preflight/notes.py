@@ -72,8 +72,11 @@ def _flight(scene: Scene) -> Iterator[Diagnostic]:
     moving = np.flatnonzero(matrix.touches & ~bodies.immovable & (bodies.thin > 0.0))
     if pull == 0.0 or not len(moving) or solver.half_kick or solver.integrator not in FIRST_ORDER:
         return
-    time = np.minimum(scene.world.duration, top_speeds(scene, matrix)[moving] / pull)
-    error = 0.5 * pull * solver.h * time
+    own_pull = np.maximum(pull * np.abs(bodies.gravity_scale[moving]), np.finfo(np.float64).tiny)
+    time = np.minimum(scene.world.duration, top_speeds(scene, matrix)[moving] / own_pull)
+    damping = bodies.linear_damping[moving]
+    time = np.minimum(time, np.divide(1.0, damping, out=np.full(len(damping), np.inf), where=damping > 0.0))
+    error = 0.5 * own_pull * solver.h * time
     down = np.asarray(scene.world.gravity) / pull
     excess = error / bodies.thin[moving]
     excess[np.isfinite(tether_reach(scene, down)[moving])] = 0.0

@@ -34,7 +34,7 @@ from sandbox.measure.metrics.perturbation import PERTURBATION
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.speed_bound import top_speeds
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.demands import AIR, FLOOR, demands
+from sandbox.scene.compile.demands import AIR, FLOOR, OWN_MOTION, demands
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.geometry.neighbours import near_pairs
 
@@ -168,7 +168,7 @@ def lyapunov_time(scene: Scene) -> float | None:
     """Return the time in which a perturbation of 1e-12 m grows to a hundredth of a radius, s; None if there is no gas.
 
     A gas consists of balls that collide with each other in a box of level and upright planes, without gravity, joints,
-    drag, lift or damping.
+    drag, lift, damping or speed limits.
     """
     bodies, world, matrix = scene.bodies, scene.world, contact_matrix(scene)
     movers = matrix.touches & ~bodies.immovable
@@ -181,7 +181,7 @@ def lyapunov_time(scene: Scene) -> float | None:
         or scene.attractions
     ):
         return None
-    if any(world.gravity) or demands(scene) & AIR or bodies.kinematic.any():
+    if any(world.gravity) or demands(scene) & (AIR | OWN_MOTION) or bodies.kinematic.any():
         return None
     area = _area(scene)
     if area is None:

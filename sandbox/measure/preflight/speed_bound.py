@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sandbox.arrays import FloatArray
+from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.preflight.diagnostic import ROUNDING
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointKind
@@ -170,6 +170,16 @@ class SpeedBounds:
         return math.hypot(*self.scene.world.gravity)
 
     @cached_property
+    def pull(self) -> FloatArray:
+        """(N,) m/s², gravity on each body, upwards or downwards."""
+        return np.asarray(self.gravity * np.abs(self.scene.bodies.gravity_scale))
+
+    @cached_property
+    def falls(self) -> BoolArray:
+        """(N,) whether gravity does not make the body rise, so that what is below it limits its speed."""
+        return np.asarray(self.scene.bodies.gravity_scale >= 0.0)
+
+    @cached_property
     def down(self) -> FloatArray:
         """(2,) unit vector of gravity; only with gravity."""
         return np.asarray(self.scene.world.gravity) / self.gravity
@@ -183,16 +193,17 @@ class SpeedBounds:
         obstacles.
         """
         scene, bodies = self.scene, self.scene.bodies
-        speed = np.sqrt(self.squared) + self.gravity * scene.world.duration
+        speed = np.sqrt(self.squared) + self.pull * scene.world.duration
         if self.gravity > 0:
             for plane in scene.planes:
                 normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
                 # Level up to rounding: on other planes bodies slide down without a limit.
                 if float(normal @ self.down) < -1.0 + 1e-12:
                     drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
-                    speed = np.where(~self.matrix.touches, speed, np.minimum(speed, self._speed_after(drop)))
+                    stops = self.matrix.touches & self.falls
+                    speed = np.where(stops, np.minimum(speed, self._speed_after(drop)), speed)
             if len(scene.joint_arrays) or not bodies.round.all():
-                speed = np.minimum(speed, self._speed_after(np.maximum(self._max_fall(), 0.0)))
+                speed = self._limited_by(self._max_fall(), speed)
         return np.where(bodies.kinematic, self.start, self._with_thrust_and_wind(speed))
 
     def toward(self, thing: Plane | Wall | Post) -> FloatArray:
@@ -211,7 +222,8 @@ class SpeedBounds:
         # A body that falls onto a level wall touches its upper side first; otherwise at its lowest point at the latest.
         on_top = level & (depth + bodies.core <= float(depths.max()) - half)
         drop = np.where(on_top, float(depths.max()) - half - bodies.core - depth, lowest + bodies.radius - depth)
-        return np.minimum(self.own, self._with_thrust_and_wind(self._speed_after(drop)))
+        at_contact = self._with_thrust_and_wind(self._speed_after(drop))
+        return np.where(self.falls, np.minimum(self.own, at_contact), self.own)
 
     def _toward_plane(self, plane: Plane) -> FloatArray:
         """Return the bound at a contact with a plane, (N,) m/s.
@@ -223,7 +235,7 @@ class SpeedBounds:
         if len(scene.fixed) > 1 or others or any(scene.world.wind) or bodies.lift.any():
             return self.own
         normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
-        pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
+        pull = np.maximum(-bodies.gravity_scale * float(np.asarray(scene.world.gravity) @ normal), 0.0)
         height = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
         return np.minimum(
             self.own, self._with_thrust_and_wind(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height))
@@ -239,7 +251,8 @@ class SpeedBounds:
         movers = ~bodies.immovable & matrix.touches
         own = self.own
         if self.gravity > 0:
-            own = np.minimum(own, self._with_thrust_and_wind(self._speed_after(np.maximum(self._max_fall(), 0.0))))
+            after_fall = self._with_thrust_and_wind(self._speed_after(np.maximum(self._max_fall(), 0.0)))
+            own = np.where(self.falls, np.minimum(own, after_fall), own)
         speed = np.where(movers, np.maximum(own, _kick_speed(matrix)), own)
         if matrix.mutual and movers.any():
             # From heavy to light: a resting body of mass m takes up to 2M/(M + m) of the speed of the one that hits it.
@@ -253,6 +266,7 @@ class SpeedBounds:
             if not matrix.surfaces.kicks.any():
                 fastest = np.minimum(fastest, np.sqrt(2.0 * energy / masses))
             speed[movers] = np.maximum(speed[movers], fastest[of_body])
+        speed = np.minimum(speed, bodies.max_speed)
         return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
 
     @cached_property
@@ -297,25 +311,32 @@ class SpeedBounds:
 
     def _speed_after(self, drop: FloatArray) -> FloatArray:
         """Return the speeds after a drop, or 0 if a body cannot rise so high, (N,) m/s."""
-        return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.gravity * drop, 0.0)))
+        return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.pull * drop, 0.0)))
+
+    def _limited_by(self, fall: FloatArray, speed: FloatArray) -> FloatArray:
+        """Return speeds (N,), m/s, of which those of bodies that do not rise are limited by a fall, (N,) m."""
+        after_fall = self._speed_after(np.maximum(fall, 0.0))
+        return np.where(self.falls, np.minimum(speed, after_fall), speed)
 
     def _with_thrust_and_wind(self, speed: FloatArray) -> FloatArray:
-        """Return speeds with the contributions of thrusts and wind; 0 for static bodies."""
+        """Return speeds with the contributions of thrusts and wind, up to their limits; 0 for static bodies."""
         world, bodies = self.scene.world, self.scene.bodies
-        if (world.has_drag or world.has_damping) and not len(self.scene.joint_arrays) and not self.scene.attractions:
+        is_slowed = world.has_drag or world.has_damping or bool(bodies.linear_damping.any())
+        if is_slowed and not len(self.scene.joint_arrays) and not self.scene.attractions:
             speed = np.minimum(speed, np.maximum(self.start, self._terminal))
         if world.has_drag:
             speed = speed + math.hypot(*world.wind)
-        speed = speed + self.thrust
+        speed = np.minimum(speed + self.thrust, bodies.max_speed)
         return np.where(bodies.fixed, 0.0, speed)
 
     @property
-    def _terminal(self) -> float:
-        """Speed through the air at which drag and damping balance gravity, m/s."""
+    def _terminal(self) -> FloatArray:
+        """Speed through the air at which drag and damping balance gravity on each body, (N,) m/s."""
         world = self.scene.world
-        linear, quadratic = world.linear_drag + world.damping_rate, world.quadratic_drag
-        by_linear = self.gravity / linear if linear > 0.0 else math.inf
-        return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
+        linear = world.linear_drag + world.damping_rate + self.scene.bodies.linear_damping
+        by_linear = np.divide(self.pull, linear, out=np.full(len(linear), math.inf), where=linear > 0.0)
+        quadratic = world.quadratic_drag
+        return np.asarray(np.minimum(by_linear, np.sqrt(self.pull / quadratic)) if quadratic > 0.0 else by_linear)
 
     def _max_fall(self) -> FloatArray:
         """Return how far each body can fall, (N,) m, until its tether is taut or no obstacle is below it."""

@@ -55,7 +55,7 @@ def stack_warnings(scene: Scene, settings: Settings, close: InitialContacts) -> 
         settings: iterations and substep.
         close: bodies in contact at the start.
     """
-    gravity = math.hypot(*scene.world.gravity)
+    gravity = math.hypot(*scene.world.gravity) * scene.bodies.largest_gravity_scale
     if not gravity or not len(close.clearance) or settings.response == "penalty":
         return
     upper, lower = _resting(scene, close)

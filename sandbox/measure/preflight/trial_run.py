@@ -58,7 +58,9 @@ def _stack_of(setup: Setup) -> StackedBodies | None:
     scene, bodies = setup.scene, setup.scene.bodies
     if not any(scene.world.gravity) or bodies.round.all() or (bodies.velocity[~bodies.fixed] != 0.0).any():
         return None
-    if len(scene.joint_arrays) or scene.thrusts or scene.drives or scene.attractions or bodies.kinematic.any():
+    if bodies.scales_gravity or bodies.kinematic.any() or len(scene.joint_arrays):
+        return None
+    if scene.thrusts or scene.drives or scene.attractions:
         return None
     close = initial_contacts(scene)
     stacked = np.unique(np.concatenate((close.first, close.second)))

@@ -219,6 +219,9 @@ def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[Model
         yield ModelChange("no drag", "the scene can also be simulated without drag", _remove_drag)
     if scene.bodies.lift.any():
         yield ModelChange("no lift", "the scene can also be simulated without lift", _set_to_zero("lift"))
+    for key in ("linear_damping", "angular_damping"):
+        if getattr(scene.bodies, key).any():
+            yield ModelChange(f"no {key}", f"the scene can also be simulated without {key}", _set_to_zero(key))
     if world.has_damping:
         yield ModelChange("no damping", "the scene can also be simulated without damping", _remove_damping)
     if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.body_sources, *scene.fixed)):

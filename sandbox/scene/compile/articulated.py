@@ -26,7 +26,7 @@ def node_count(rope: Rope) -> int:
 
 def rope_layout(rope: Rope, gravity: Point) -> Layout:
     """Return the start state of the nodes or planks of a rope, from its start to its end."""
-    position = rope_course(rope, gravity)
+    position = rope_course(rope, (rope.gravity_scale * gravity[0], rope.gravity_scale * gravity[1]))
     if rope.kind == "planks":
         step = np.diff(position, axis=0)
         return uniform_layout(

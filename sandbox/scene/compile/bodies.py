@@ -102,9 +102,11 @@ def rotated(offset: FloatArray, angle: float) -> FloatArray:
 
 
 SURFACE = (
-    *("material", "restitution", "restitution_falloff", "friction", "surface_speed", "colour"),
+    *("material", "restitution", "restitution_falloff", "friction", "rolling_resistance", "surface_speed", "colour"),
     *("collides", "categories", "mask", "layer"),
 )
+MOTION = ("gravity_scale", "linear_damping", "angular_damping", "max_speed", "max_angular_velocity")
+"""Fields of how a body moves, which generators pass on to their prototypes, as `SURFACE`"""
 
 
 def elements_of(source: BodySource) -> tuple[BodySource, ...]:
@@ -134,7 +136,7 @@ def link_length(rope: Rope) -> float:
 
 
 def _surface(source: BodySource) -> dict[str, Any]:
-    return {key: getattr(source, key) for key in SURFACE}
+    return {key: getattr(source, key) for key in (*SURFACE, *MOTION)}
 
 
 def _mass_and_surface(source: BodySource) -> dict[str, Any]:
@@ -273,6 +275,53 @@ class Bodies:
         """(N,) lift coefficient of each: s of the acceleration s ω ẑ × w."""
         each = [e.lift if isinstance(e, BodySpec) else 0.0 for e in self.elements]
         return np.asarray(each, dtype=np.float64)[self.element]
+
+    @cached_property
+    def gravity_scale(self) -> FloatArray:
+        """(N,) factor of the gravity that acts on each; 1 for immovable bodies."""
+        return self._of_movable([e.gravity_scale for e in self.elements], 1.0)
+
+    @cached_property
+    def scales_gravity(self) -> bool:
+        """Whether gravity acts on a body by another factor than 1."""
+        return bool((self.gravity_scale != 1.0).any())
+
+    @cached_property
+    def largest_gravity_scale(self) -> float:
+        """Largest factor, without its sign, of the gravity that acts on a movable body; 1 without such bodies."""
+        movable = ~self.immovable
+        return float(np.abs(self.gravity_scale[movable]).max()) if movable.any() else 1.0
+
+    @cached_property
+    def linear_damping(self) -> FloatArray:
+        """(N,) 1/s, rate of the own damping of each velocity; 0 for immovable bodies."""
+        return self._of_movable([e.linear_damping for e in self.elements], 0.0)
+
+    @cached_property
+    def angular_damping(self) -> FloatArray:
+        """(N,) 1/s, rate of the own damping of each angular velocity; 0 for immovable bodies."""
+        return self._of_movable([e.angular_damping for e in self.elements], 0.0)
+
+    @cached_property
+    def max_speed(self) -> FloatArray:
+        """(N,) m/s, largest speed of each; inf if it is unlimited."""
+        return self._of_movable([math.inf if e.max_speed is None else e.max_speed for e in self.elements], math.inf)
+
+    @cached_property
+    def max_angular_velocity(self) -> FloatArray:
+        """(N,) rad/s, largest angular speed of each; inf if it is unlimited."""
+        limits = [math.inf if e.max_angular_velocity is None else e.max_angular_velocity for e in self.elements]
+        return self._of_movable(limits, math.inf)
+
+    @cached_property
+    def limited(self) -> BoolArray:
+        """(N,) whether the speed or the angular speed of each is limited."""
+        return np.asarray(np.isfinite(np.minimum(self.max_speed, self.max_angular_velocity)))
+
+    def _of_movable(self, of_element: list[float], of_immovable: float) -> FloatArray:
+        """Return the value of each body (N,), from that of each element."""
+        values = np.asarray(of_element, np.float64)[self.element]
+        return np.where(self.immovable, of_immovable, values)
 
     @cached_property
     def immovable(self) -> BoolArray:

@@ -7,7 +7,8 @@ Restitution and friction belong to a *pair* of materials. A `[[pair]]` states th
 stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and the default is 0. A value
 stated on a shape takes precedence over its material's. The same holds for the falloff of restitution with speed, except
 that the values of two sides add. Surface speeds add as well: each surface runs clockwise around its object. Surface
-velocities of two sides subtract: they are vectors of the world. Kicks and one-way walls belong to one side.
+velocities of two sides subtract: they are vectors of the world. Of two values of rolling resistance the larger applies
+(Box2D's rule), as the softer side is deformed. Kicks and one-way walls belong to one side.
 """
 
 from collections.abc import Iterator, Sequence
@@ -44,6 +45,7 @@ class ContactMaterial(NamedTuple):
     """m/s"""
     velocity: SurfaceVelocity = (0.0, 0.0)
     """m/s"""
+    rolling: float = 0.0
 
 
 def mix(a: float | None, b: float | None) -> float:
@@ -70,6 +72,8 @@ class PairTable:
     """(S, S) of each pair, symmetric"""
     falloff: FloatArray
     """(S, S) s/m, of each pair, symmetric"""
+    rolling: FloatArray
+    """(S, S) rolling resistance of each pair, symmetric; it acts on balls"""
     slip_target: FloatArray
     """(S, S) m/s, of each pair, symmetric: velocity of the second body relative to the first, to the left of the normal
     towards the second, at which their surfaces do not slip; without that by surface velocities"""
@@ -108,6 +112,7 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     surfaces = (*surfaces, *more)
     restitution, friction = _mix_pairs([s.restitution for s in surfaces]), _mix_pairs([s.friction for s in surfaces])
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
+    rolling = np.maximum.outer(*[np.asarray([s.rolling for s in surfaces], dtype=np.float64)] * 2)
     speed = np.asarray([s.speed for s in surfaces], dtype=np.float64)
     slip_target = 0.0 - np.add.outer(speed, speed)  # without speeds +0, not −0
     velocity = np.asarray([s.velocity for s in surfaces], dtype=np.float64).reshape(-1, 2)
@@ -117,7 +122,12 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
         by_material.setdefault(surface.material, []).append(index)
     for pair in scene.pairs:
         first, second = (by_material.get(name, []) for name in pair.between)
-        coefficients = (restitution, pair.restitution), (friction, pair.friction), (falloff, pair.restitution_falloff)
+        coefficients = (
+            (restitution, pair.restitution),
+            (friction, pair.friction),
+            (falloff, pair.restitution_falloff),
+            (rolling, pair.rolling_resistance),
+        )
         for table, stated in coefficients:
             if stated is not None:
                 table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
@@ -128,7 +138,8 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     if not bodies.round.all():
         shapes = bodies.shapes
         of_shape = of_part[begin[bodies.element[shapes.body]] + shapes.part]
-    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff, slip_target, slip_velocity)
+    tables = restitution, friction, falloff, rolling, slip_target, slip_velocity
+    return PairTable(surfaces, of_body, of_shape, of_fixed, *tables)
 
 
 def surface_parts(elements: Sequence[BodySource]) -> list[HasMaterial]:
@@ -151,6 +162,7 @@ def _with_body_surface(part: HasMaterial, body: HasMaterial) -> HasMaterial:
         restitution=body.restitution if part.restitution is None else part.restitution,
         restitution_falloff=body.restitution_falloff if part.restitution_falloff is None else part.restitution_falloff,
         friction=body.friction if part.friction is None else part.friction,
+        rolling_resistance=body.rolling_resistance if part.rolling_resistance is None else part.rolling_resistance,
         surface_speed=part.surface_speed if "surface_speed" in part.model_fields_set else body.surface_speed,
         surface_velocity=(
             part.surface_velocity if "surface_velocity" in part.model_fields_set else body.surface_velocity
@@ -173,17 +185,20 @@ def index_surfaces(
     def index_of(element: HasMaterial) -> int:
         material = None if element.material is None else materials[element.material]
         restitution, friction, falloff = element.restitution, element.friction, element.restitution_falloff
+        rolling = element.rolling_resistance
         if material is not None:
             restitution = material.restitution if restitution is None else restitution
             friction = material.friction if friction is None else friction
             falloff = material.restitution_falloff if falloff is None else falloff
+            rolling = material.rolling_resistance if rolling is None else rolling
         kept = element.material if element.material in paired else None
         kick = element.kick if isinstance(element, Wall | Post) else None
         one_way = (isinstance(element, Wall) and element.one_way) or (
             isinstance(element, BodySpec) and element.one_way is not None
         )
         surface = ContactMaterial(
-            kept, restitution, friction, falloff, kick, one_way, element.surface_speed, element.surface_velocity
+            *(kept, restitution, friction, falloff, kick, one_way),
+            *(element.surface_speed, element.surface_velocity, rolling or 0.0),
         )
         return index_by_surface.setdefault(surface, len(index_by_surface))
 
@@ -212,7 +227,8 @@ class ContactMatrix:
     can_enter_zone: BoolArray
     """(N,) can enter a zone; driven bodies are not detected"""
     turnable: BoolArray
-    """(N,) can rotate: by friction; for other shapes than balls by any contact; by joints, thrusts or drives"""
+    """(N,) can change its spin: by friction or rolling resistance; for other shapes than balls by any contact; by
+    joints, thrusts, drives or damping of its own"""
     mutual: bool
     """whether two bodies can touch"""
     ball_ball: bool
@@ -267,6 +283,11 @@ class ContactMatrix:
     def friction(self) -> float:
         """Largest friction of any possible contact."""
         return float(np.max(self.surfaces.friction[self.touching], initial=0.0))
+
+    @property
+    def rolling(self) -> float:
+        """Largest rolling resistance of any possible contact."""
+        return float(np.max(self.surfaces.rolling[self.touching], initial=0.0))
 
 
 class Kinds(NamedTuple):
@@ -331,7 +352,7 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
     touching = np.zeros((size, size), dtype=bool)
     rows, columns = np.nonzero(pair)
     touching[surface[rows], surface[columns]] = True
-    has_friction = surfaces.friction > 0
+    has_friction = (surfaces.friction > 0) | (surfaces.rolling > 0)
     ground = [
         (
             pushable & (kinds.layers & layers != 0) & (kinds.categories & mask != 0) & (kinds.mask & categories != 0),
@@ -358,7 +379,12 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=joints.held(len(bodies)),
         can_enter_zone=_can_enter_zone(scene, bodies, filters.layers) & ~is_driven(scene, bodies),
-        turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True))
+        turnable=(
+            turnable
+            | _thrust_turned(scene, bodies)
+            | is_driven(scene, bodies, turning=True)
+            | (bodies.angular_damping > 0.0)
+        )
         & ~bodies.fixed
         & (bodies.moment < UNTURNABLE),
         mutual=bool(pair.any()),

@@ -30,6 +30,9 @@ class Demand(StrEnum):
     DRAG = "drag"
     LIFT = "lift"
     DAMPING = "damping"
+    BODY_DAMPING = "damping of bodies"
+    GRAVITY_SCALE = "gravity_scale"
+    SPEED_LIMITS = "speed limits"
     BALL_BALL = "ball-ball"
     BALL_PLANE = "ball-plane"
     BALL_SEGMENT = "ball-segment"
@@ -37,6 +40,7 @@ class Demand(StrEnum):
     POLYGONS = "polygons"
     RESTITUTION = "restitution"
     FRICTION = "friction"
+    ROLLING = "rolling resistance"
     FALLOFF = "falloff"
     KICKS = "kicks"
     SURFACE_SPEED = "surface speed"
@@ -103,8 +107,11 @@ BALLS = frozenset(
 """Demands of scenes of balls and static colliders. Engines list their capabilities; a new demand is supported by
 none."""
 
-AIR = frozenset({Demand.DRAG, Demand.LIFT, Demand.DAMPING})
+AIR = frozenset({Demand.DRAG, Demand.LIFT, Demand.DAMPING, Demand.BODY_DAMPING})
 """Demands of forces that depend on velocity."""
+
+OWN_MOTION = frozenset({Demand.BODY_DAMPING, Demand.GRAVITY_SCALE, Demand.SPEED_LIMITS})
+"""Demands of the keys of how a single body moves."""
 
 SURFACES = frozenset(
     {
@@ -189,6 +196,9 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
 
     gravity = world.gravity != (0.0, 0.0)
     yield Demand.GRAVITY, gravity, f"{list(world.gravity)} m/s²" if gravity else "world.gravity is zero"
+    scaled = int(np.count_nonzero(bodies.gravity_scale != 1.0))
+    none = "no body scales gravity"
+    yield Demand.GRAVITY_SCALE, scaled > 0, _count(scaled, "body scales gravity", "bodies scale gravity", none)
 
     yield from _air(world, bodies)
 
@@ -215,6 +225,10 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     for demand, largest in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):
         why = f"up to {largest:g}" if largest else "0 for every pair that can collide"
         yield demand, largest > 0, why if can_collide else "no collisions possible"
+
+    rolls = bool((bodies.round & matrix.touches).any())
+    why = f"up to {matrix.rolling:g}" if rolls and matrix.rolling else "0 for every contact of a ball"
+    yield Demand.ROLLING, rolls and matrix.rolling > 0.0, why if can_collide else "no collisions possible"
 
     yield from _surfaces(scene, matrix)
     yield from _joints(setup)
@@ -254,6 +268,13 @@ def _air(world: World, bodies: Bodies) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.DAMPING, world.has_damping, why
     lifted = int(np.count_nonzero(bodies.lift))
     yield Demand.LIFT, lifted > 0, _count(lifted, "body has lift", "bodies have lift", "no body has lift")
+    damped = int(np.count_nonzero(bodies.linear_damping + bodies.angular_damping))
+    none = "no body has damping of its own"
+    why = _count(damped, "body has damping of its own", "bodies have damping of their own", none)
+    yield Demand.BODY_DAMPING, damped > 0, why
+    limited = int(np.count_nonzero(bodies.limited))
+    why = _count(limited, "body has a speed limit", "bodies have a speed limit", "no body has a speed limit")
+    yield Demand.SPEED_LIMITS, limited > 0, why
 
 
 def air_demands(world: World, bodies: Bodies, among: BoolArray | slice = slice(None)) -> frozenset[Demand]:
@@ -264,8 +285,13 @@ def air_demands(world: World, bodies: Bodies, among: BoolArray | slice = slice(N
         bodies: all.
         among: bodies that are present.
     """
-    has_lift = bool(bodies.lift[among].any())
-    acts = (Demand.DRAG, world.has_drag), (Demand.DAMPING, world.has_damping), (Demand.LIFT, has_lift)
+    damps = bool(bodies.linear_damping[among].any() or bodies.angular_damping[among].any())
+    acts = (
+        (Demand.DRAG, world.has_drag),
+        (Demand.DAMPING, world.has_damping),
+        (Demand.LIFT, bool(bodies.lift[among].any())),
+        (Demand.BODY_DAMPING, damps),
+    )
     return frozenset(demand for demand, on in acts if on)
 
 
@@ -361,14 +387,26 @@ def curls(setup: Setup) -> bool:
     return any(on and demand is Demand.CURL for demand, on, _ in _floor(setup))
 
 
-def demands_of_body(single: BodySpec) -> frozenset[Demand]:
-    """Return the demands that a body alone adds to those of any scene."""
+def may_resist_rolling(single: BodySpec, scene: Scene) -> bool:
+    """Return whether a body can have contacts with rolling resistance by its own value, its material or a pair."""
+    stated = [single.rolling_resistance]
+    stated += [each.rolling_resistance for each in scene.materials if each.name == single.material]
+    stated += [each.rolling_resistance for each in scene.pairs if single.material in each.between]
+    return any(stated)
+
+
+def demands_of_body(single: BodySpec, scene: Scene) -> frozenset[Demand]:
+    """Return the demands that a body adds to those of a scene, by itself."""
     stated = (
         (Demand.GROUPS, single.group is not None),
         (Demand.KINEMATIC, single.kinematic),
         (Demand.PATHS, single.path is not None),
         (Demand.ONE_WAY_BODIES, single.one_way is not None),
         (Demand.LIFT, single.lift != 0.0),
+        (Demand.GRAVITY_SCALE, single.gravity_scale != 1.0),
+        (Demand.BODY_DAMPING, single.linear_damping > 0.0 or single.angular_damping > 0.0),
+        (Demand.SPEED_LIMITS, single.max_speed is not None or single.max_angular_velocity is not None),
+        (Demand.ROLLING, may_resist_rolling(single, scene)),
     )
     return frozenset(demand for demand, is_stated in stated if is_stated)
 

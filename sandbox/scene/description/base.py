@@ -193,9 +193,17 @@ Moment = Annotated[float, Field(ge=1e-40, le=1e30)]
 """A moment of inertia, kg·m²."""
 Lift = Annotated[float, Field(ge=-1e6, le=1e6)]
 """Lift coefficient of a spinning body."""
+GravityScale = Annotated[float, Field(ge=-1e6, le=1e6)]
+"""Factor of gravity."""
+DampingRate = Annotated[float, Field(ge=0, le=1e6)]
+"""Rate at which damping reduces a velocity, 1/s."""
+SpeedLimit = Annotated[float, Field(gt=0, le=MAX_SPEED)]
+"""Largest speed, m/s, or angular speed, rad/s."""
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
+RollingResistance = Annotated[float, Field(ge=0, le=1000)]
+"""Coefficient of rolling resistance: torque / (radius · normal force)."""
 SurfaceSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
 SurfaceVelocity = tuple[SurfaceSpeed, SurfaceSpeed]
 Falloff = Annotated[float, Field(ge=0, le=1e6)]
@@ -230,6 +238,9 @@ class HasMaterial(Part):
     added"""
     friction: Friction | None = None
     """Coulomb friction μ; if both sides of a contact have a value, they are multiplied"""
+    rolling_resistance: RollingResistance | None = None
+    """c of contacts of balls: a torque up to c·r·N resists rolling, N being the normal force and r the larger radius of
+    the balls; the larger value of the two sides applies"""
     surface_speed: SurfaceSpeed = 0.0
     """speed of the surface, m/s, as of a conveyor belt or a drum: to the right of the outward normal, clockwise around
     the object"""
@@ -265,6 +276,16 @@ class BodySource(Collider):
     """initial angle, rad, counter-clockwise"""
     angular_velocity: AngularVelocity = 0.0
     """initial angular velocity, rad/s"""
+    gravity_scale: GravityScale = 1.0
+    """factor of the gravity that acts on it, of the world or of a zone; 0: none, negative: it rises"""
+    linear_damping: DampingRate = 0.0
+    """k, 1/s: deceleration −k v, in addition to drag and damping of the world"""
+    angular_damping: DampingRate = 0.0
+    """k, 1/s: angular deceleration −k ω, in addition to damping of the world"""
+    max_speed: SpeedLimit | None = None
+    """largest speed, m/s: a higher one is reduced to it at the end of each substep; default: unlimited"""
+    max_angular_velocity: SpeedLimit | None = None
+    """largest angular speed, rad/s: likewise"""
     collides: Collides = "all"
     """bodies that it collides with: `all`, `fixed` (only planes, walls, posts and fixed bodies) or `none`"""
     layer: Name = GROUND

@@ -16,6 +16,7 @@ from sandbox.scene.description.base import (
     Part,
     Point,
     Restitution,
+    RollingResistance,
     VelocityField,
     default,
 )
@@ -209,6 +210,8 @@ class Material(Part):
     """f, s/m: decrease of restitution with the speed of approach, e(v) = e / (1 + f·v)"""
     friction: Friction | None = None
     """Coulomb friction μ"""
+    rolling_resistance: RollingResistance | None = None
+    """c of contacts of balls, which a torque up to c·r·N resists"""
 
 
 class Pair(Part):
@@ -222,6 +225,8 @@ class Pair(Part):
     """f, s/m: decrease of restitution with the speed of approach, e(v) = e / (1 + f·v)"""
     friction: Friction | None = None
     """μ of this pair, in place of the product of the two materials' values"""
+    rolling_resistance: RollingResistance | None = None
+    """c of this pair, in place of the larger of the two materials' values"""
 
 
 MIN_THRESHOLD = 1e-3

@@ -273,12 +273,18 @@ _SYNONYMS: dict[str, set[str]] = {
     "angular_velocity": {"angvel", "omega"},
     "restitution": {"bounce", "bounciness", "elasticity"},
     "friction": {"friction_coefficient", "mu"},
+    "rolling_resistance": {"rollingresistance", "rolling_friction", "rollingfriction"},
     "mass": {"density", "weight"},
     "period": {"cycle", "time"},
     "repeat": {"loop", "mode", "pingpong"},
     "easing": {"ease", "interpolation", "transition"},
     "pause": {"dwell", "wait"},
     "start": {"delay", "offset", "phase"},
+    "gravity_scale": {"gravityscale", "gravity"},
+    "linear_damping": {"lineardamping", "damping", "linear_drag", "lineardrag", "drag"},
+    "angular_damping": {"angulardamping", "angular_drag", "angulardrag"},
+    "max_speed": {"maxspeed", "max_velocity", "maxvelocity", "speed_limit", "velocity_limit"},
+    "max_angular_velocity": {"maxangularvelocity", "max_angular_speed", "max_spin"},
 }
 """Keys of the scene file, and words that other engines and file formats use for them."""
 
@@ -287,10 +293,6 @@ _FAST = (
     'detection = "swept", box2d none with static objects; for pymunk, `sandbox check` states the dt'
 )
 _SENSOR = "a [[sensor]] detects the shapes that overlap it; its key `body` names the body that it moves with"
-_GRAVITY = "no body has a gravity of its own; world.gravity acts on all bodies, that of a [[zone]] on those inside it"
-_DAMPING = "no body has a damping of its own; world.damping and world.linear_drag act on all bodies"
-_ROLLING = "rolling resistance is modelled on a [surface] only: surface.rolling_friction"
-_SPEED = "speeds have no limit; world.quadratic_drag limits that of a fall"
 _PATH = "a body with kinematic = true moves along a `path`, such as { points = [[0, 0], [4, 0]], period = 4.0 }"
 _ELSEWHERE = {
     "bullet": _FAST,
@@ -299,13 +301,6 @@ _ELSEWHERE = {
     "sensor": _SENSOR,
     "trigger": _SENSOR,
     "area": _SENSOR,
-    "gravityscale": _GRAVITY,
-    "lineardamping": _DAMPING,
-    "angulardamping": _DAMPING,
-    "rollingfriction": _ROLLING,
-    "rollingresistance": _ROLLING,
-    "maxspeed": _SPEED,
-    "maxvelocity": _SPEED,
     **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
     **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),
 }

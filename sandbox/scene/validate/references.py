@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection, Iterator, Sequence
 
-from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.bodies import MOTION, Bodies
 from sandbox.scene.compile.drives import is_immovable, moment_of_mass, mount_of, single_bodies
 from sandbox.scene.compile.joints import ends_of
 from sandbox.scene.compile.scene import Scene
@@ -257,6 +257,9 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
         yield "body", f"{drive.body!r} has an initial velocity; a driven body must start at rest"
     if single.lift:
         yield "body", f"{drive.body!r} has lift, which has no effect on a driven body; remove `lift`"
+    for key in MOTION:
+        if getattr(single, key) != BodySource.model_fields[key].default:
+            yield "body", f"{drive.body!r} has `{key}`, which has no effect on a driven body; remove it"
     if any(thrust.body == drive.body for thrust in scene.thrusts):
         yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
 

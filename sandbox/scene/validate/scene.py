@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sandbox.scene.compile.bodies import Bodies, elements_of
+from sandbox.scene.compile.bodies import MOTION, Bodies, elements_of
 from sandbox.scene.compile.contacts import index_surfaces, surface_parts
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.paths import path_faults
@@ -211,6 +211,8 @@ def _check_immovable(single: BodySpec) -> Iterator[tuple[str, str]]:
         yield from _check_one_way(single, single.one_way)
     if single.lift and (single.fixed or single.kinematic):
         yield "lift", f"has no effect on a {'fixed' if single.fixed else 'kinematic'} body; remove it"
+    if single.kinematic:
+        yield from _motion_keys(single, "a kinematic body")
 
 
 def _check_one_way(single: BodySpec, direction: Vector) -> Iterator[tuple[str, str]]:
@@ -224,10 +226,19 @@ def _check_one_way(single: BodySpec, direction: Vector) -> Iterator[tuple[str, s
 
 
 def _check_at_rest(source: BodySpec | Stack) -> Iterator[tuple[str, str]]:
-    """Yield the velocity that a fixed body or stack cannot have, with the reason."""
+    """Yield the keys of motion that a fixed body or stack cannot have, with the reasons."""
+    if source.fixed:
+        yield from _motion_keys(source, "a fixed body")
     if source.fixed and (any(source.velocity) or source.angular_velocity):
         key = "velocity" if any(source.velocity) else "angular_velocity"
         yield key, "a fixed body cannot move; remove this key, or `fixed`"
+
+
+def _motion_keys(source: BodySource, owner: str) -> Iterator[tuple[str, str]]:
+    """Yield the keys of how a body moves that an element states, as those that have no effect on its owner."""
+    for key in MOTION:
+        if getattr(source, key) != BodySource.model_fields[key].default:
+            yield key, f"has no effect on {owner}; remove it"
 
 
 def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:
@@ -254,7 +265,8 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
     if scene.surface is None and not scene.pockets:
         return
     for location, collider in _static_colliders(scene):
-        for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
+        keys = ("restitution_falloff", None), ("rolling_resistance", None)
+        for key, usual in (("kick", None), ("one_way", False), ("solid", True), *keys):
             if getattr(collider, key, usual) != usual:
                 yield (*location, key), "is not supported in a scene with a [surface] or pockets; remove it"
     for location, element in _elements(scene):
@@ -272,6 +284,12 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
                     (kind, k, "restitution_falloff"),
                     "is not supported in a scene with a [surface] or pockets, where restitution does not "
                     "depend on speed; remove it",
+                )
+            if each.rolling_resistance:
+                yield (
+                    (kind, k, "rolling_resistance"),
+                    "is not supported in a scene with a [surface] or pockets, where balls roll by "
+                    "surface.rolling_friction; remove it",
                 )
 
 

@@ -85,7 +85,7 @@ def _is_burst(scene: Scene, box: ViewBox) -> bool:
 def frame_in_flight(scene: Scene, time: float = 0.0) -> Frame:
     """Return the state of the bodies after a time, s, of free flight without drag or collisions."""
     bodies = scene.bodies
-    gravity = np.where(bodies.fixed[:, None], 0.0, np.asarray(scene.world.gravity))
+    gravity = np.where(bodies.fixed[:, None], 0.0, bodies.gravity_scale[:, None] * np.asarray(scene.world.gravity))
     return Frame(
         time,
         bodies.position + bodies.velocity * time + 0.5 * gravity * time**2,

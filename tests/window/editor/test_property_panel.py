@@ -20,11 +20,12 @@ from sandbox.window.render.palette import WARNING
 from sandbox.window.ui.panel import SidePanel
 from tests.window.pressing import FOCUS_LOST, key, move, press, release, wheel
 
-SIZE = (1280, 720)
+SIZE = (1280, 900)  # a ball has 27 fields
 BALL = {"name": "cue", "position": [0.0, 1.5], "radius": 0.05, "restitution": 0.8}
 TYPED_OF_BALL = [
-    "name", "material", "restitution", "restitution_falloff", "friction", "surface_speed", "surface_velocity", "colour",
-    "categories", "mask", "mass", "density", "angle", "angular_velocity", "layer", "position", "velocity", "moment",
+    "name", "material", "restitution", "restitution_falloff", "friction", "rolling_resistance", "surface_speed",
+    "surface_velocity", "colour", "categories", "mask", "mass", "density", "angle", "angular_velocity", "gravity_scale",
+    "linear_damping", "angular_damping", "max_speed", "max_angular_velocity", "layer", "position", "velocity", "moment",
     "lift", "group", "radius", "spin",
 ]  # fmt: skip
 
@@ -342,7 +343,7 @@ def test_click_in_the_edited_text_places_the_caret_and_a_drag_selects() -> None:
 
 
 def test_show_keeps_focus_and_text_while_the_field_exists() -> None:
-    edited = Edited(size=(1280, 900))
+    edited = Edited(size=(1280, 1100))
     edited.click("radius")
     edited.type("2")
     edited.panel.show((section(World, {}), section(Ball, {**BALL, "position": [5.0, 5.0], "radius": 0.1})))

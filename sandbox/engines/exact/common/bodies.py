@@ -109,10 +109,10 @@ class EventDrivenBodies(BodyStore):
         """Add a validated body and return its index.
 
         Raises:
-            ActionError: it overlaps another object, is not a ball, has a group or lift, is kinematic, is not supported
-                on a `[surface]`, or the scene would have more different surfaces than allowed.
+            ActionError: it overlaps another object, is not a ball, adds a demand that `exact` does not model, such as
+                lift, is not supported on a `[surface]`, or the scene would have more different surfaces than allowed.
         """
-        for demand in sorted(demands_of_body(single)):
+        for demand in sorted(demands_of_body(single, self.scene)):
             raise ActionError(f"exact does not model {demand}")
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
