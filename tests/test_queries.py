@@ -79,7 +79,9 @@ def outlines(scene: Scene) -> dict[str, shapely.Geometry]:
 
 SCENE = scene_of(SHAPES)
 OUTLINES = outlines(SCENE)
-POINTS = st.tuples(st.floats(-2.5, 2.5), st.floats(-2.5, 2.5))
+COORDINATE = st.floats(-2.5, 2.5, allow_subnormal=False)
+"""m; shapely's intersections of lines with subnormal coordinates are wrong"""
+POINTS = st.tuples(COORDINATE, COORDINATE)
 
 
 @settings(max_examples=300)
