@@ -35,7 +35,7 @@ ARC = 256
 NEAR = 2e-5
 """m: two shapes of this test overlap or not for certain if their distance or depth is above it, for `ARC`"""
 
-COORDINATE = st.floats(-2.0, 2.0)
+COORDINATE = st.floats(-2.0, 2.0, allow_subnormal=False)
 ANGLE = st.floats(-math.pi, math.pi)
 RADIUS = st.floats(0.05, 0.8)
 POINT = st.tuples(COORDINATE, COORDINATE)
