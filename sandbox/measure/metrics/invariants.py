@@ -68,8 +68,8 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, lift, damping, speed limit, friction, damper, thrust, drive, event, motor or kinematic body, no joint
-    that gives way or that jerks a body when it becomes taut, and elastic contacts.
+    It has no drag, lift, damping, limit of speed, friction, damper, thrust, drive, event, motor or kinematic body, no
+    joint that gives way or that jerks a body when it becomes taut, and elastic contacts.
     """
     acts = scene.thrusts or scene.drives or scene.events
     if demands(scene) & (AIR | {Demand.SPEED_LIMITS}) or acts:
