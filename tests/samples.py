@@ -1,4 +1,4 @@
-"""Sample scenes: eighteen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: nineteen shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -29,6 +29,7 @@ SAMPLE_SCENES = (
     "particles/sparks",
     "pinball/full",
     "tutorial/balloon_and_feather",
+    "tutorial/sensors",
 )
 
 
