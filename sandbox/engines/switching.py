@@ -7,9 +7,9 @@ continue. Other engine state, such as the impulses of lasting contacts, is reset
 import copy
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import count
+from itertools import count, takewhile
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, Self, Unpack
@@ -60,6 +60,7 @@ from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
 from sandbox.scene.validate.references import check_joints, generators
+from sandbox.schedule import ROUNDING
 from sandbox.trajectory import Contacts, Frame, SensorVisit
 
 
@@ -190,23 +191,31 @@ EVENT_ROUNDING = 1e-6
 
 
 class _EventQueue:
-    """Events of a scene that have not happened yet."""
+    """Events of a scene that have not happened yet, in the order of their times."""
 
-    def __init__(self, events: Iterable[Action], time: float) -> None:
-        """Take the events that are at a time, s, or later."""
-        self._events = [event for event in in_order(tuple(events)) if event.time >= time]
-        self.next = self._time_of_first()
-        """time of the next event, s; inf without any"""
+    def __init__(self, events: Iterable[Action]) -> None:
+        self.pending = in_order(tuple(events))
+        """the events"""
 
-    def _time_of_first(self) -> float:
-        return self._events[0].time if self._events else math.inf
+    def __deepcopy__(self, _: dict[int, Any]) -> "_EventQueue":
+        """Return a copy that shares the events, which never change."""
+        return _EventQueue(self.pending)
 
-    def due(self, time: float) -> list[Action]:
+    @property
+    def next(self) -> float:
+        """Time of the next event, s; inf without any."""
+        return self.pending[0].time if self.pending else math.inf
+
+    def due(self, time: float) -> tuple[Action, ...]:
         """Return the events up to a time, s, and remove them."""
-        due = [event for event in self._events if event.time <= time]
-        self._events = self._events[len(due) :]
-        self.next = self._time_of_first()
+        due = tuple(takewhile(lambda event: event.time <= time, self.pending))
+        self.pending = self.pending[len(due) :]
         return due
+
+
+def _events_from(setup: Setup) -> Iterator[Action]:
+    """Yield the events of a scene that follow the beginning of a setup, at times since then."""
+    return (event.at(event.time - setup.time) for event in setup.scene.events if event.time >= setup.time)
 
 
 class SwitchableSimulation:
@@ -227,7 +236,7 @@ class SwitchableSimulation:
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._joined: dict[int, float] = {}
-        self._events = _EventQueue(setup.scene.events, setup.time)
+        self._events = _EventQueue(_events_from(setup))
         self._work: Counter[str] = Counter()
         self._pulls = MouseJoints()
         self._persistent = PersistentActions()
@@ -300,6 +309,7 @@ class SwitchableSimulation:
             setup=self.setup,
             plane_reach=self.plane_reach,
             sensor_visits=self._sensors.open_visits,
+            events=self._events.pending,
         )
 
     @classmethod
@@ -333,7 +343,7 @@ class SwitchableSimulation:
         simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
         simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
         simulation._joined = dict(point.joined)
-        simulation._events = _EventQueue(point.scene.events, point.frame.time)
+        simulation._events = _EventQueue(point.events)
         simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
             None,
             None,
@@ -421,7 +431,7 @@ class SwitchableSimulation:
             Divergence: the state is not finite, or exceeds the bounds.
             Exhaustion: the step needs more memory or work than its limit.
         """
-        self._make_step(1.0, self._segment.simulation.step)
+        self._make_step(1.0, lambda: self._segment.simulation.step())
 
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
@@ -536,9 +546,10 @@ class SwitchableSimulation:
         Raises:
             Exhaustion: one cannot be applied.
         """
-        if self._events.next > self.time:
+        now = self.time + ROUNDING * self.settings.dt  # as for actions
+        if self._events.next > now:
             return
-        for event in self._events.due(self.time):
+        for event in self._events.due(now):
             body = getattr(event, "body", None)
             if body in self.bodies.names and not self.frame().present[self.bodies.names.index(body)]:
                 continue

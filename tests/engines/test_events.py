@@ -151,3 +151,55 @@ def test_events_of_python_are_actions() -> None:
     world = sandbox.World(duration=0.2)
     scene = sandbox.Scene(world=world, balls=[ball], events=[Impulse(time=0.1, body="a", impulse=(1.0, 0.0))])
     assert sandbox.run(scene).velocity[-1, 0, 0] == 1.0
+
+
+@every_engine
+def test_events_from_a_later_setup_happen_at_their_times(engine: str) -> None:
+    """Times of a simulation that starts from a setup count from 0, those of events from the start of the scene."""
+    simulation = sandbox.start(scene_of(impulse(0.1, 2.0), impulse(0.35, 2.0)), engine)
+    for _ in range(20):
+        simulation.step()
+    later = sandbox.start(simulation.checkpoint().present_setup(), engine)
+    for _ in range(30):
+        simulation.step()
+        later.step()
+    assert simulation.frame().velocity[0, 0] == later.frame().velocity[0, 0] == pytest.approx(2.0, abs=1e-6)  # 32 bits
+    assert later.frame().position[0, 0] == pytest.approx(simulation.frame().position[0, 0], abs=1e-6)
+
+
+def test_event_between_two_steps_happens_after_a_checkpoint_before_the_second() -> None:
+    simulation = sandbox.start(scene_of(impulse(0.205, 2.0)))
+    for _ in range(21):
+        simulation.step()
+    resumed = type(simulation).resumed(simulation.checkpoint())
+    simulation.step()
+    resumed.step()
+    assert simulation.frame().velocity[0, 0] == resumed.frame().velocity[0, 0] == 1.0
+
+
+def test_events_happen_in_the_steps_of_actions_at_their_times() -> None:
+    """23 steps of 1/60 s end before 23/60 s, by rounding."""
+    dt = 1.0 / 60.0
+    assert 23 * dt < 23 / 60
+    by_event = sandbox.run(scene_of(impulse(23 / 60, 2.0)), dt=dt)
+    by_action = sandbox.run(scene_of(), dt=dt, actions=[Impulse(time=23 / 60, body="a", impulse=(2.0, 0.0))])
+    assert by_event.position.tolist() == by_action.position.tolist()
+
+
+@pytest.mark.parametrize(
+    ("engine", "account"),
+    [("pymunk", False), ("pymunk", True), ("box2d", False), ("reference", False), ("reference", True)],
+)
+def test_event_that_changes_the_joints_before_a_single_step(engine: str, account: bool) -> None:
+    """Runs with an energy account, and those by hand, make single steps."""
+    rope = {"name": "rope", "kind": "slide", "between": ["a"], "anchors": [[0, 0], [0, 1]], "most": 1.0}
+    scene = scene_of(
+        {"kind": "unjoin", "time": 0.3, "joint": "rope"}, joint=[rope], world={"gravity": [0.0, -10.0]}, duration=0.5
+    )
+    run = sandbox.run(scene, engine, account=account)
+    assert run.status == "ok"
+    assert run.velocity[-1, 0, 1] == pytest.approx(-10.0 * 0.2, abs=0.02)  # the rope yields at up to a few mm/s
+    simulation = sandbox.start(scene, engine)
+    for _ in range(50):
+        simulation.step()
+    assert simulation.state_hash() == run.info["state_hash"]
