@@ -10,6 +10,7 @@ import sandbox
 from sandbox.action import Explosion, Impulse, Switch
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.preflight import run_preflight
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, loads
 from tests.scene.faults import faults_of
@@ -203,3 +204,24 @@ def test_event_that_changes_the_joints_before_a_single_step(engine: str, account
     for _ in range(50):
         simulation.step()
     assert simulation.state_hash() == run.info["state_hash"]
+
+
+def test_check_and_comparison_of_a_scene_whose_events_add_bodies() -> None:
+    """The added ball passes a wall between two steps, which `check` reports; it is not compared."""
+    fast = {"name": "late", "position": [-3.0, 2.0], "velocity": [400.0, 0.0], "radius": 0.1}
+    crate = {"name": "crate", "position": [0.0, -3.0], "size": [1.0, 1.0]}  # `exact`, whose truth is trusted, has none
+    scene = scene_of(
+        {"kind": "spawn", "time": 0.2, "ball": fast},
+        impulse(0.5, 2.0),
+        box=[crate],
+        wall=[{"name": "wall", "points": [[1.0, 1.0], [1.0, 3.0]], "thickness": 0.01}],
+    )
+    found = run_preflight(scene, engine="pymunk", starts=3)
+    assert [each.details["ball"] for each in found.warnings if each.kind == "tunnelling"] == ["late"]
+    comparison = sandbox.compare(scene, engines=["pymunk", "reference"])
+    assert max(row.score.max_position for row in comparison.rows) < 1e-6
+    # The impulse changes momentum and energy, which is no breach of their conservation.
+    assert "trusted until" not in str(comparison.truth)
+    ends = sandbox.ensemble(scene, 3, vary={"ball.*.velocity": 1e-12}, engine="pymunk", keep="frames")
+    assert ends.names == ("a", "crate")
+    assert ends.position[:, 0, 0] == pytest.approx([0.5] * 3, abs=1e-9)
