@@ -110,8 +110,7 @@ class Segment:
         if self.session_setup is None:
             return own_setup
         return replace(
-            self.session_setup,
-            scene=own_setup.scene,
+            self.session_setup.with_scene(own_setup.scene),  # also values of motors that were set
             bodies=replace(self.session_setup.bodies, elements=own_setup.bodies.elements),
         )
 
