@@ -541,7 +541,7 @@ class SwitchableSimulation:
         self._segment.add_body(self.bodies.joined_by(named.single, name))
 
     def _apply_events(self) -> None:
-        """Apply the events of the scene that are due; those of bodies that have left are passed over.
+        """Apply the events of the scene that are due; those of bodies and joints that have left are passed over.
 
         Raises:
             Exhaustion: one cannot be applied.
@@ -550,13 +550,20 @@ class SwitchableSimulation:
         if self._events.next > now:
             return
         for event in self._events.due(now):
-            body = getattr(event, "body", None)
-            if body in self.bodies.names and not self.frame().present[self.bodies.names.index(body)]:
+            if self._is_past(event):
                 continue
             try:
                 self.apply(event)
             except ActionError as error:
                 raise Exhaustion(f"the event {event.kind!r} of {event.time:g} s cannot be applied: {error}") from None
+
+    def _is_past(self, event: Action) -> bool:
+        """Return whether a body of an event, or the joint that it removes, has left."""
+        if isinstance(event, Unjoin):
+            return event.joint in self.setup.joints.names and event.joint not in self._intact_joint_names()
+        bodies = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
+        names, present = self.bodies.names, self.frame().present
+        return any(name in names and not present[names.index(name)] for name in bodies)
 
     def _explode(self, action: Explosion) -> None:
         """Apply the impulses of an explosion."""

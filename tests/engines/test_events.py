@@ -132,6 +132,10 @@ def test_scene_with_events_is_written_and_read_again() -> None:
         ('kind="throttle"\nthrust="t"\nlevel=1', "event[0].thrust", "none"),
         ('kind="unjoin"\njoint="j"', "event[0].joint", "none"),
         ('kind="join"\njoint={kind="rod", between=["a","q"]}', "event[0].joint.between[1]", "'a'"),
+        ('kind="join"\njoint={kind="prismatic", between=["a"], axis=[0,0], travel=[0,1]}', "event[0].joint.axis", "no"),
+        ('kind="join"\njoint={kind="weld", between=["a","a"]}', "event[0].joint.between", "twice"),
+        ('kind="spawn"\nball={position=[3,0], radius=1, layer="x"}', "event[0]", "'ground'"),
+        ('kind="spawn"\nball={position=[3,0], radius=1, kinematic=true, path={angles=[0,1]}}', "event[0]", "path"),
         ('kind="spawn"\nball={name="a", position=[0,0], radius=1}', "event[0]", "already named"),
         ('kind="switch"', "event[0].kind", "explosion"),
     ],
@@ -225,3 +229,21 @@ def test_check_and_comparison_of_a_scene_whose_events_add_bodies() -> None:
     ends = sandbox.ensemble(scene, 3, vary={"ball.*.velocity": 1e-12}, engine="pymunk", keep="frames")
     assert ends.names == ("a", "crate")
     assert ends.position[:, 0, 0] == pytest.approx([0.5] * 3, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
+def test_joints_of_bodies_and_joints_that_have_left_are_passed_over(engine: str) -> None:
+    rope = {"name": "rope", "kind": "slide", "between": ["a"], "anchors": [[0, 0], [0, 1]], "most": 1.0}
+    weak = {**rope, "name": "weak", "strength": 1e-3}
+    scene = scene_of(
+        impulse(0.0, -4.0),  # breaks the weak one
+        {"kind": "unjoin", "time": 0.7, "joint": "weak"},
+        {"kind": "remove", "time": 0.8, "body": "a"},
+        {"kind": "join", "time": 0.9, "joint": {"kind": "weld", "between": ["a"]}},
+        {"kind": "unjoin", "time": 0.95, "joint": "rope"},
+        joint=[weak, rope],
+        world={"gravity": [0.0, -10.0]},
+    )
+    run = sandbox.run(scene, engine)
+    assert (run.status, run.info["reason"]) == ("ok", None)
+    assert run.broken_time[0] < 0.7
