@@ -4,9 +4,10 @@ Each function computes what an action changes; `SwitchableSimulation` applies it
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import count
+from itertools import count, takewhile
+from typing import Any
 
 import numpy as np
 
@@ -164,7 +165,7 @@ def added_joint(action: Join, setup: Setup, bodies: Bodies, frame: Frame, broken
     if faults:
         listed = (f"{'.'.join(map(str, location[2:]))}: {message}" for location, message in faults)
         raise ActionError(f"joint: {'; '.join(listed)}")
-    taken = _intact_joint_names(setup, broken)
+    taken = intact_joint_names(setup, broken)
     name = action.joint.name or next(each for k in count(1) if (each := f"joined-{k}") not in taken)
     if name in taken:
         raise ActionError(f"a joint is already named {name!r}")
@@ -179,12 +180,12 @@ def removed_joint(action: Unjoin, setup: Setup, broken: Mapping[int, float]) -> 
     """
     found = [k for k, name in enumerate(setup.joints.names) if name == action.joint and k not in broken]
     if not found:
-        known = ", ".join(map(repr, sorted(_intact_joint_names(setup, broken))[:MAX_NAMED])) or "none"
+        known = ", ".join(map(repr, sorted(intact_joint_names(setup, broken))[:MAX_NAMED])) or "none"
         raise ActionError(f"no joint is named {action.joint!r}; joints: {known}")
     return [int(row) for row in setup.joints.whole(np.asarray(found))]
 
 
-def _intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
+def intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
     """Return the names of the joints that are there."""
     first = setup.joints.part_of == setup.joints.number
     return {setup.joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
@@ -195,20 +196,28 @@ EVENT_ROUNDING = 1e-6
 
 
 class EventQueue:
-    """Events of a scene that have not happened yet."""
+    """Events of a scene that have not happened yet, in the order of their times."""
 
-    def __init__(self, events: Iterable[Action], time: float) -> None:
-        """Take the events that are at a time, s, or later."""
-        self._events = [event for event in in_order(tuple(events)) if event.time >= time]
-        self.next = self._time_of_first()
-        """time of the next event, s; inf without any"""
+    def __init__(self, events: Iterable[Action]) -> None:
+        self.pending = in_order(tuple(events))
+        """the events"""
 
-    def _time_of_first(self) -> float:
-        return self._events[0].time if self._events else math.inf
+    def __deepcopy__(self, _: dict[int, Any]) -> "EventQueue":
+        """Return a copy that shares the events, which never change."""
+        return EventQueue(self.pending)
 
-    def due(self, time: float) -> list[Action]:
+    @property
+    def next(self) -> float:
+        """Time of the next event, s; inf without any."""
+        return self.pending[0].time if self.pending else math.inf
+
+    def due(self, time: float) -> tuple[Action, ...]:
         """Return the events up to a time, s, and remove them."""
-        due = [event for event in self._events if event.time <= time]
-        self._events = self._events[len(due) :]
-        self.next = self._time_of_first()
+        due = tuple(takewhile(lambda event: event.time <= time, self.pending))
+        self.pending = self.pending[len(due) :]
         return due
+
+
+def events_from(setup: Setup) -> Iterator[Action]:
+    """Yield the events of a scene that follow the beginning of a setup, at times since then."""
+    return (event.at(event.time - setup.time) for event in setup.scene.events if event.time >= setup.time)

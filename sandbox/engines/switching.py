@@ -42,7 +42,9 @@ from sandbox.engines.session_actions import (
     EventQueue,
     PersistentActions,
     added_joint,
+    events_from,
     explosion_impulses,
+    intact_joint_names,
     launch_state,
     removed_joint,
 )
@@ -56,6 +58,7 @@ from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
+from sandbox.schedule import ROUNDING
 from sandbox.trajectory import Contacts, Frame, SensorVisit
 
 
@@ -112,7 +115,7 @@ class SwitchableSimulation:
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._joined: dict[int, float] = {}
-        self._events = EventQueue(setup.scene.events, setup.time)
+        self._events = EventQueue(events_from(setup))
         self._work: Counter[str] = Counter()
         self._pulls = MouseJoints()
         self._persistent = PersistentActions()
@@ -185,6 +188,7 @@ class SwitchableSimulation:
             setup=self.setup,
             plane_reach=self.plane_reach,
             sensor_visits=self._sensors.open_visits,
+            events=self._events.pending,
         )
 
     @classmethod
@@ -218,7 +222,7 @@ class SwitchableSimulation:
         simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
         simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
         simulation._joined = dict(point.joined)
-        simulation._events = EventQueue(point.scene.events, point.frame.time)
+        simulation._events = EventQueue(point.events)
         simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
             None,
             None,
@@ -306,7 +310,7 @@ class SwitchableSimulation:
             Divergence: the state is not finite, or exceeds the bounds.
             Exhaustion: the step needs more memory or work than its limit.
         """
-        self._make_step(1.0, self._segment.simulation.step)
+        self._make_step(1.0, lambda: self._segment.simulation.step())
 
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
@@ -416,21 +420,31 @@ class SwitchableSimulation:
         self._segment.add_body(self.bodies.joined_by(named.single, name))
 
     def _apply_events(self) -> None:
-        """Apply the events of the scene that are due; those of bodies that have left are passed over.
+        """Apply the events of the scene that are due; those of bodies and joints that have left are passed over.
 
         Raises:
             Exhaustion: one cannot be applied.
         """
-        if self._events.next > self.time:
+        now = self.time + ROUNDING * self.settings.dt  # as for actions
+        if self._events.next > now:
             return
-        for event in self._events.due(self.time):
-            body = getattr(event, "body", None)
-            if body in self.bodies.names and not self.frame().present[self.bodies.names.index(body)]:
+        for event in self._events.due(now):
+            if self._is_past(event):
                 continue
             try:
                 self.apply(event)
             except ActionError as error:
                 raise Exhaustion(f"the event {event.kind!r} of {event.time:g} s cannot be applied: {error}") from None
+
+    def _is_past(self, event: Action) -> bool:
+        """Return whether a body of an event, or the joint that it removes, has left."""
+        if isinstance(event, Unjoin):
+            return event.joint in self.setup.joints.names and event.joint not in intact_joint_names(
+                self.setup, self.broken
+            )
+        bodies = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
+        names, present = self.bodies.names, self.frame().present
+        return any(name in names and not present[names.index(name)] for name in bodies)
 
     def _explode(self, action: Explosion) -> None:
         for impulse in explosion_impulses(action, self.scene, self.bodies, self.frame()):
