@@ -90,6 +90,7 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
         (f"{BALL}bullet = true", "sandbox check"),
         (f"{BALL}isSensor = true", r"\[\[sensor\]\]"),
         (f"{BALL}gravityScale = 0.5", "did you mean 'gravity_scale'"),
+        (f"{BALL}elevation = 0.5", "`spin`"),
         (f"{BALL}drag = 0.1", "did you mean 'linear_damping'"),
         (f"{BALL}rollingFriction = 0.1", "did you mean 'rolling_resistance'"),
         (f"{BALL}maxVelocity = 3", "did you mean 'max_speed'"),

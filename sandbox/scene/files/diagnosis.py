@@ -301,6 +301,7 @@ _ELSEWHERE = {
     "sensor": _SENSOR,
     "trigger": _SENSOR,
     "area": _SENSOR,
+    "elevation": "a cue is level; state `velocity` and `spin`, [x, y, z] in rad/s, that the ball has after the stroke",
     **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
     **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),
 }
