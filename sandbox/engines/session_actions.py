@@ -165,7 +165,7 @@ def added_joint(action: Join, setup: Setup, bodies: Bodies, frame: Frame, broken
     if faults:
         listed = (f"{'.'.join(map(str, location[2:]))}: {message}" for location, message in faults)
         raise ActionError(f"joint: {'; '.join(listed)}")
-    taken = intact_joint_names(setup, broken)
+    taken = _intact_joint_names(setup, broken)
     name = action.joint.name or next(each for k in count(1) if (each := f"joined-{k}") not in taken)
     if name in taken:
         raise ActionError(f"a joint is already named {name!r}")
@@ -180,12 +180,12 @@ def removed_joint(action: Unjoin, setup: Setup, broken: Mapping[int, float]) -> 
     """
     found = [k for k, name in enumerate(setup.joints.names) if name == action.joint and k not in broken]
     if not found:
-        known = ", ".join(map(repr, sorted(intact_joint_names(setup, broken))[:MAX_NAMED])) or "none"
+        known = ", ".join(map(repr, sorted(_intact_joint_names(setup, broken))[:MAX_NAMED])) or "none"
         raise ActionError(f"no joint is named {action.joint!r}; joints: {known}")
     return [int(row) for row in setup.joints.whole(np.asarray(found))]
 
 
-def intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
+def _intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
     """Return the names of the joints that are there."""
     first = setup.joints.part_of == setup.joints.number
     return {setup.joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
@@ -221,3 +221,11 @@ class EventQueue:
 def events_from(setup: Setup) -> Iterator[Action]:
     """Yield the events of a scene that follow the beginning of a setup, at times since then."""
     return (event.at(event.time - setup.time) for event in setup.scene.events if event.time >= setup.time)
+
+
+def is_past(event: Action, setup: Setup, bodies: Bodies, frame: Frame, broken: Mapping[int, float]) -> bool:
+    """Return whether a body of an event, or the joint that it removes, has left."""
+    if isinstance(event, Unjoin):
+        return event.joint in setup.joints.names and event.joint not in _intact_joint_names(setup, broken)
+    named = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
+    return any(name in bodies.names and not frame.present[bodies.names.index(name)] for name in named)

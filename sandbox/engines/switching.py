@@ -44,7 +44,7 @@ from sandbox.engines.session_actions import (
     added_joint,
     events_from,
     explosion_impulses,
-    intact_joint_names,
+    is_past,
     launch_state,
     removed_joint,
 )
@@ -429,22 +429,12 @@ class SwitchableSimulation:
         if self._events.next > now:
             return
         for event in self._events.due(now):
-            if self._is_past(event):
+            if is_past(event, self.setup, self.bodies, self.frame(), self.broken):
                 continue
             try:
                 self.apply(event)
             except ActionError as error:
                 raise Exhaustion(f"the event {event.kind!r} of {event.time:g} s cannot be applied: {error}") from None
-
-    def _is_past(self, event: Action) -> bool:
-        """Return whether a body of an event, or the joint that it removes, has left."""
-        if isinstance(event, Unjoin):
-            return event.joint in self.setup.joints.names and event.joint not in intact_joint_names(
-                self.setup, self.broken
-            )
-        bodies = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
-        names, present = self.bodies.names, self.frame().present
-        return any(name in names and not present[names.index(name)] for name in bodies)
 
     def _explode(self, action: Explosion) -> None:
         for impulse in explosion_impulses(action, self.scene, self.bodies, self.frame()):

@@ -19,6 +19,7 @@ from sandbox.engines.common.collision_bits import (
 from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.pymunk_adapter.colliders import half_plane_ends, reach_of, shuffled
 from sandbox.engines.pymunk_adapter.contact_names import is_captured
+from sandbox.engines.pymunk_adapter.joints import anchor_across_axis
 from sandbox.engines.sensors import sensor_names
 from sandbox.pymunk_export.loops import Block, comment
 from sandbox.scene.compile.contacts import contact_matrix
@@ -328,16 +329,21 @@ class Contents:
             kind = JointKind(int(joints.kind[k]))
             values = _joint_values(joints, k, self.setup.bodies.names)
             first = "space.static_body" if int(joints.a[k]) == WORLD else "bodies[{a}]"
-            lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in JOINT_LINES[kind]]
-            columns = {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
+            is_on_axis = kind == JointKind.GROOVE and joints.is_compound[k]
+            own = AXIS_LINES if is_on_axis else JOINT_LINES[kind]
+            lines = [line.replace("<a>", first).replace("<b>", "bodies[{b}]") for line in own]
             limits = {"max_force": joints.max_force[k], "max_bias": joints.max_bias[k], "error_bias": joints.bias[k]}
             if kind == JointKind.LINEAR_MOTOR:
                 limits |= {"max_bias": abs(joints.figures[k, 2]), "error_bias": 0.0}
-            columns |= {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
+            columns = {key: literal(float(value)) for key, value in limits.items() if math.isfinite(value)}
             if joints.pulls_only[k]:
                 lines += ["joint.damping = 0.0", "joint.force_func = pull({rest_length}, {stiffness}, {damping})"]
             stated = "".join(f", {key}={{{key}}}" for key in limits if key in columns)
-            lines.append(f"add_joint(space, joint, collide_bodies={bool(joints.collide[k])}{stated})")
+            added = f"add_joint(space, joint, collide_bodies={bool(joints.collide[k])}{stated})"
+            lines.append(added)
+            if is_on_axis:
+                lines += [AXIS_ENDS.replace("<a>", first).replace("<b>", "bodies[{b}]"), added]
+            columns |= {name: value for name, value in values.items() if any(f"{{{name}}}" in line for line in lines)}
             title = literal(joints.names[k]) if joints.names[k] else f"joint {k + 1}"
             yield Block(f"{kind.name.lower().replace('_', ' ')} joints", title, tuple(lines), columns)
 
@@ -425,6 +431,15 @@ JOINT_LINES: dict[JointKind, tuple[str, ...]] = {
 """Statements that create each kind of joint; <a> and <b> stand for its bodies."""
 
 
+AXIS_LINES = (
+    "# across the axis: a long rod at a right angle to it; then the ends of the travel",
+    "joint = pymunk.PinJoint(<a>, <b>, {across_axis}, {anchor_b})",
+    "joint.distance = {across}",
+)
+AXIS_ENDS = "joint = pymunk.SlideJoint(<a>, <b>, {before_axis}, {anchor_b}, {nearest}, {farthest})"
+"""Statements that create the constraints of a wheel or prismatic joint along its axis"""
+
+
 def _joint_values(joints: JointArrays, k: int, names: Sequence[str]) -> dict[str, str]:
     """Return the expressions of all columns of joint k, by the figures of `JointKind`.
 
@@ -435,9 +450,14 @@ def _joint_values(joints: JointArrays, k: int, names: Sequence[str]) -> dict[str
     opposite = literal(-float(joints.figures[k, 0]))
     a = int(joints.a[k])
     along = joints.figures[k, :2] - joints.anchor_a[k]
-    travel = math.hypot(*along)
+    travel = math.hypot(*along.tolist())
+    across, distance = anchor_across_axis(joints, k)
     return {
-        "before_axis": literal(tuple((joints.anchor_a[k] - along).tolist())),
+        "before_axis": literal(tuple((2.0 * joints.anchor_a[k] - joints.figures[k, :2]).tolist())),
+        "across_axis": literal(across),
+        "across": literal(distance),
+        "nearest": literal(travel),
+        "farthest": literal(2.0 * travel),
         "end": literal(travel if joints.figures[k, 2] < 0.0 else 2.0 * travel),
         "a": literal("" if a == WORLD else names[a]),
         "b": literal(names[int(joints.b[k])]),

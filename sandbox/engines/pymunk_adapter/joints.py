@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import pymunk
@@ -10,6 +10,8 @@ import pymunk
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.springs import SpringExtent, of_bands, rotary_torques, spring_law, spring_tensions
 from sandbox.scene.compile.joint_arrays import MOTORS, WORLD, JointArrays, JointKind
+
+_AnyConstraint = TypeVar("_AnyConstraint", bound=pymunk.Constraint)
 
 
 def constraint_of(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
@@ -22,7 +24,11 @@ def constraint_of(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, b
         b: second body.
         bias: fraction of the error that remains after one second, of joints without their own.
     """
-    constraint = _new_constraint(joints, k, a, b)
+    return _with_limits(_new_constraint(joints, k, a, b), joints, k, bias)
+
+
+def _with_limits(constraint: _AnyConstraint, joints: JointArrays, k: int, bias: float) -> _AnyConstraint:
+    """Set the limits of joint k, and whether its bodies collide; return the constraint."""
     constraint.collide_bodies = bool(joints.collide[k])
     constraint.max_force = float(joints.max_force[k])
     if joints.kind[k] == JointKind.LINEAR_MOTOR:
@@ -45,6 +51,8 @@ def _new_constraint(joints: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body)
             return pymunk.PivotJoint(a, b, anchor_a, anchor_b)
         case JointKind.SLIDE:
             return pymunk.SlideJoint(a, b, anchor_a, anchor_b, x, y)
+        case JointKind.GROOVE if joints.is_compound[k]:
+            return _across_axis(a, b, joints, k)
         case JointKind.GROOVE:
             return pymunk.GrooveJoint(a, b, anchor_a, (x, y), anchor_b)
         case JointKind.ROTARY_LIMIT:
@@ -90,6 +98,40 @@ def _pull(rest: float, stiffness: float, damping: float) -> Callable[[pymunk.Dam
     return force
 
 
+FAR_ANCHOR = 1e5
+"""Distance of an anchor from an axis, as a fraction of its length: a point at an end of the axis is 1e-6 of it off"""
+
+
+def _across_axis(a: pymunk.Body, b: pymunk.Body, joints: JointArrays, k: int) -> pymunk.PinJoint:
+    """Return the constraint of a wheel or prismatic joint across its axis: a long rod at a right angle to it.
+
+    `pymunk.GrooveJoint` projects the impulse of a pivot onto the normal. Where the axis does not pass through the
+    centre of mass, that is not the impulse that stops the motion across the axis, in any number of iterations.
+    """
+    anchor, distance = anchor_across_axis(joints, k)
+    rod = pymunk.PinJoint(a, b, anchor, tuple(joints.anchor_b[k].tolist()))
+    rod.distance = distance
+    return rod
+
+
+def anchor_across_axis(joints: JointArrays, k: int) -> tuple[tuple[float, float], float]:
+    """Return the far anchor of the rod of `_across_axis` in the first body's frame, m, and its length, m."""
+    (x, y), along = joints.anchor_a[k].tolist(), joints.figures[k, :2] - joints.anchor_a[k]
+    dx, dy = along.tolist()
+    return (x + 0.5 * dx - FAR_ANCHOR * dy, y + 0.5 * dy + FAR_ANCHOR * dx), FAR_ANCHOR * math.hypot(dx, dy)
+
+
+def _axis_ends(a: pymunk.Body, b: pymunk.Body, joints: JointArrays, k: int) -> pymunk.SlideJoint:
+    """Return the constraint of a wheel or prismatic joint at the ends of its travel."""
+    before, length = 2.0 * joints.anchor_a[k] - joints.figures[k, :2], axis_length(joints, k)
+    return pymunk.SlideJoint(a, b, tuple(before.tolist()), tuple(joints.anchor_b[k].tolist()), length, 2.0 * length)
+
+
+def axis_length(joints: JointArrays, k: int) -> float:
+    """Return the length of the axis of joint k, m."""
+    return math.hypot(*(joints.figures[k, :2] - joints.anchor_a[k]).tolist())
+
+
 def _linear_motor(a: pymunk.Body, b: pymunk.Body, joints: JointArrays, k: int) -> pymunk.PinJoint:
     """Return a motor along an axis, which pymunk lacks: a rod that corrects its length at a constant speed.
 
@@ -108,7 +150,7 @@ def rod_anchors(joints: JointArrays) -> FloatArray:
 
 
 def _set_speed(rod: pymunk.PinJoint, joints: JointArrays, k: int) -> None:
-    speed, travel = float(joints.figures[k, 2]), float(np.hypot(*(joints.figures[k, :2] - joints.anchor_a[k])))
+    speed, travel = float(joints.figures[k, 2]), axis_length(joints, k)
     rod.distance = travel if speed < 0.0 else 2.0 * travel
     rod.max_bias = abs(speed)
 
@@ -168,6 +210,7 @@ class SpaceJoints:
         self._space = space
         self._joints: JointArrays | None = None
         self._constraints: dict[int, pymunk.Constraint] = {}
+        self._ends: dict[int, pymunk.SlideJoint] = {}  # of the axes of wheels and prismatic joints
         self._by_kind: JointsByKind | None = None
         self.count = 0
         """number of constraints"""
@@ -189,6 +232,9 @@ class SpaceJoints:
             constraint = constraint_of(joints, k, first, body(b), bias)
             self._space.add(constraint)
             self._constraints[k] = constraint
+            if joints.kind[k] == JointKind.GROOVE and joints.is_compound[k]:
+                self._ends[k] = _with_limits(_axis_ends(first, body(b), joints, k), joints, k, bias)
+                self._space.add(self._ends[k])
         self._rebuild(joints.counted())
 
     def update(self, joints: JointArrays) -> None:
@@ -233,7 +279,7 @@ class SpaceJoints:
             h: substep, s.
         """
         rigid, springs, rotary = self._breakable_joints, self._breakable_springs, self._breakable_rotary
-        force = np.asarray([self._constraints[k].impulse for k in rigid.number.tolist()]) / h
+        force = np.asarray([self._impulse(k) for k in rigid.number.tolist()]) / h
         broken = [rigid.number[force > rigid.strength]]
         if len(springs):
             tensions = spring_tensions(springs, SpringExtent.of(springs, position, angle), velocity, spin)
@@ -265,11 +311,18 @@ class SpaceJoints:
         """
         return np.asarray([self._constraints[k].impulse for k in joints.number.tolist()], dtype=np.float64)
 
+    def _impulse(self, k: int) -> float:
+        """Return the magnitude of the impulse of joint k, N·s or N·m·s."""
+        ends = self._ends.get(k)
+        return self._constraints[k].impulse if ends is None else math.hypot(self._constraints[k].impulse, ends.impulse)
+
     def _remove(self, indices: list[int]) -> None:
         if not indices:
             return
         for k in indices:
             self._space.remove(self._constraints.pop(k))
+            if k in self._ends:
+                self._space.remove(self._ends.pop(k))
         self._rebuild(self._of_constraints())
 
     def _of_constraints(self) -> JointArrays:
