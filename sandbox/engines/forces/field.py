@@ -182,7 +182,7 @@ class ForceField:
         force, torque = liquids.buoyancy(submerged, store.scene.world.gravity)
         if liquids.has_drag:
             rates = x[1, :, :2], x[1, :, 2] if turns else np.zeros(len(pose))
-            (pull, turn), _ = liquids.drag(submerged, rates)
+            pull, turn = liquids.drag(submerged, rates, liquids.resistance(submerged, rates))
             force, torque = force + pull, torque + turn
         linear = force * store.inverse_mass[:, None]
         return np.column_stack((linear, torque * store.inverse_moment)) if turns else linear

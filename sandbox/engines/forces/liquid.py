@@ -169,24 +169,22 @@ class Liquids:
         torque = (submerged[:, :, 1] * lift[:, 1] - submerged[:, :, 2] * lift[:, 0]).sum(axis=1)
         return force, torque
 
-    def drag(self, submerged: FloatArray, rates: Rates) -> tuple[Loads, FloatArray]:
-        """Return the drag on N bodies at some rates, and its matrix (N, 3, 3) in the coordinates (x, y, angle)."""
+    def resistance(self, submerged: FloatArray, rates: Rates) -> FloatArray:
+        """Return κ of N bodies in L liquids, (N, L) N·s/m³, at some rates."""
         velocity, spin = rates
-        area, mx, my, second = np.moveaxis(submerged, 2, 0)
-        size = np.where(area > 0.0, area, 1.0)
+        size = np.where(submerged[:, :, 0] > 0.0, submerged[:, :, 0], 1.0)
+        wx = velocity[:, 0, None] - self._current[:, 0] - spin[:, None] * submerged[:, :, 2] / size
+        wy = velocity[:, 1, None] - self._current[:, 1] + spin[:, None] * submerged[:, :, 1] / size
+        kappa: FloatArray = self._linear + self._quadratic * np.sqrt(wx * wx + wy * wy)
+        return kappa
+
+    def drag(self, submerged: FloatArray, rates: Rates, kappa: FloatArray) -> Loads:
+        """Return the drag on N bodies at some rates, by the resistance κ (N, L)."""
+        velocity, turn = rates[0], rates[1][:, None]
+        area, sx, sy, second = np.moveaxis(kappa[:, :, None] * submerged, 2, 0)
         ux, uy = velocity[:, 0, None] - self._current[:, 0], velocity[:, 1, None] - self._current[:, 1]
-        wx, wy = ux - spin[:, None] * my / size, uy + spin[:, None] * mx / size
-        kappa = self._linear + self._quadratic * np.sqrt(wx * wx + wy * wy)
-        a, sx, sy, j = kappa * area, kappa * mx, kappa * my, kappa * second
-        turn = spin[:, None]
-        force = -np.column_stack(((a * ux - sy * turn).sum(axis=1), (a * uy + sx * turn).sum(axis=1)))
-        torque = -(sx * uy - sy * ux + j * turn).sum(axis=1)
-        matrix = np.zeros((len(velocity), 3, 3))
-        matrix[:, 0, 0] = matrix[:, 1, 1] = a.sum(axis=1)
-        matrix[:, 0, 2] = matrix[:, 2, 0] = -sy.sum(axis=1)
-        matrix[:, 1, 2] = matrix[:, 2, 1] = sx.sum(axis=1)
-        matrix[:, 2, 2] = j.sum(axis=1)
-        return (force, torque), matrix
+        force = -np.column_stack(((area * ux - sy * turn).sum(axis=1), (area * uy + sx * turn).sum(axis=1)))
+        return force, -(sx * uy - sy * ux + second * turn).sum(axis=1)
 
     def step_loads(
         self,
@@ -199,7 +197,8 @@ class Liquids:
     ) -> Loads:
         """Return the mean forces and torques of the liquids on N bodies in a step of h, s.
 
-        The drag D of the step solves (M + hD) Δ = −h (drag at the rates that all other forces lead to).
+        With the matrix D of the drag at the start, (1 + h D M⁻¹) L = −D r is solved for its mean load L, at the rates r
+        that all other forces lead to: the drag at the end of the step.
 
         Args:
             submerged: (N, L, 4), see `submerged`.
@@ -213,10 +212,14 @@ class Liquids:
         wet = np.flatnonzero(submerged[:, :, 0].any(axis=1))
         if not self.has_drag or not len(wet):
             return force, torque
-        inverse_mass, inverse_moment = inertia[0][wet], inertia[1][wet]
+        part, inverse_mass, inverse_moment = submerged[wet], inertia[0][wet], inertia[1][wet]
+        kappa = self.resistance(part, (rates[0][wet], rates[1][wet]))
         velocity = rates[0][wet] + h * inverse_mass * (applied[0] + force)[wet]
         spin = rates[1][wet] + h * inverse_moment * (applied[1] + torque)[wet]
-        (pull, turn), matrix = self.drag(submerged[wet], (velocity, spin))
+        pull, turn = self.drag(part, (velocity, spin), kappa)
+        area, sx, sy, second = (kappa[:, :, None] * part).sum(axis=1).T
+        zero = np.zeros(len(wet))
+        matrix = np.stack((area, zero, -sy, zero, area, sx, -sy, sx, second), axis=1).reshape(-1, 3, 3)
         # (1 + h D M⁻¹) L = drag, for the mean load L; a body that cannot turn has an inverse moment of 0.
         inverse = np.column_stack((inverse_mass, inverse_mass, inverse_moment))
         mean = np.linalg.solve(np.eye(3) + h * matrix * inverse[:, None, :], np.column_stack((pull, turn))[:, :, None])
