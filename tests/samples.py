@@ -1,4 +1,4 @@
-"""Sample scenes: sixteen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: seventeen shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -17,6 +17,7 @@ SAMPLE_SCENES = (
     "billiards/9-ball",
     "games/conveyor",
     "games/curling",
+    "games/harbour",
     "games/landing",
     "games/moving_platforms",
     "games/rube_goldberg",

@@ -1,6 +1,10 @@
 """Liquids on every engine: what floats, how deep and which side up, how it bobs, sinks and drifts."""
 
+import json
 import math
+import os
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -11,13 +15,17 @@ from hypothesis import strategies as st
 from shapely.geometry import MultiPoint, Polygon
 
 import sandbox
-from sandbox.action import Move, Spawn
+from sandbox.action import Force, Move, SetParameter, Spawn
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.forces.liquid import Liquids
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.registry import start as start_plain
 from sandbox.engines.switching import SwitchableSimulation, switch_engine
+from sandbox.measure.analytic.solve import closed_form
+from sandbox.measure.metrics.invariants import conserves_energy
+from sandbox.measure.preflight.speed_bound import unknown_speeds
+from sandbox.measure.preflight.stiffness import liquid_warnings
 from sandbox.scene.compile.demands import Demand
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
@@ -375,3 +383,96 @@ def test_pymunk_refuses_settings_that_need_free_or_resting_bodies(settings: Docu
     scene = scene_of(ball=[disc()])
     with pytest.raises(Refusal, match="zones"):
         start_plain(scene, "pymunk", scene.solver.replace(**settings))
+
+
+# Interplay and forecasts
+
+
+@every_engine
+def test_another_gravity_of_the_world_changes_the_buoyancy(engine: str) -> None:
+    simulation = start_plain(scene_of(box=[box(0.05)]), engine)
+    simulation.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -2.0 * G]))
+    advance(simulation, 100)
+    # it still displaces its own weight; 32-bit numbers of box2d
+    assert simulation.frame().velocity[0].tolist() == pytest.approx([0.0, 0.0], abs=1e-5)
+
+
+@every_engine
+def test_air_and_liquid_together_slow_a_body_to_their_common_terminal_velocity(engine: str) -> None:
+    k, air, density = 4000.0, 0.5, 2000.0
+    tables = {"world": {"linear_drag": air}, "ball": [disc(-20.0, density=density)]}
+    result = run(scene_of({"linear_drag": k}, duration=8.0, **tables), engine)
+    terminal = (density - RHO) * G / (k + density * air)
+    # with both, pymunk and box2d have an error of the order h·(k/ρ)
+    assert result.velocity[-1, 0].tolist() == pytest.approx([0.0, -terminal], rel=2.0 * DT, abs=1e-6)
+
+
+@every_engine
+def test_force_of_an_action_pushes_a_body_to_where_the_drag_balances_it(engine: str) -> None:
+    k = 1000.0
+    area = math.pi * 0.2**2
+    scene = scene_of({"linear_drag": k}, ball=[disc(-20.0, density=RHO)], duration=12.0)
+    result = sandbox.run(
+        scene, engine, audit=False, actions=[Force(time=0.0, body="disc", force=(k * area * 0.5, 0.0))]
+    )
+    assert result.velocity[-1, 0].tolist() == pytest.approx([0.5, 0.0], abs=2e-5)  # 0.5·e^(−12) = 3e-6, and 32 bits
+
+
+@every_engine
+def test_boat_of_several_parts_floats_by_its_mass_and_keeps_its_keel_down(engine: str) -> None:
+    hull = {"points": [[-1.0, 0.4], [-1.0, -0.4], [1.0, -0.4], [1.0, 0.4]], "density": 200.0}
+    keel = {"position": [0.0, -0.6], "size": [1.0, 0.4], "density": 2000.0}
+    boat = {"name": "boat", "position": [0.0, 0.5], "angle": 2.0, "polygon": [hull], "box": [keel]}
+    scene = scene_of({"linear_drag": 1500.0}, body=[boat], duration=15.0, dt=5e-3)
+    result = run(scene, engine)
+    mass, x, y = 1.6 * 200.0 + 0.4 * 2000.0, *result.position[-1, 0]
+    below = y + (0.4 * 2000.0 * 0.6) / mass  # centre of the hull
+    displaced = 0.4 + 2.0 * (0.4 - below)
+    assert displaced * RHO == pytest.approx(mass, rel=1e-3)  # the rest of the bobbing
+    assert math.cos(result.angle[-1, 0]) == pytest.approx(1.0, abs=1e-4)  # likewise
+    assert abs(x) < 5.0
+
+
+def test_check_warns_of_a_drag_that_makes_reference_diverge_and_of_no_weaker_one() -> None:
+    def scene(k: float) -> Scene:
+        ball = disc(-10.0, density=RHO, velocity=[1.0, 0.0])
+        return scene_of({"linear_drag": k}, ball=[ball], dt=0.1, duration=10.0)
+
+    for part, diverges in ((0.95, False), (1.05, True)):
+        k = part * 2.0 * RHO / 0.1  # κ A h/m is 2 at part 1
+        warned = any(each.kind == "liquid" for each in liquid_warnings(scene(k), scene(k).solver))
+        result = sandbox.run(scene(k), "reference", audit=False)
+        grows = bool(np.hypot(*result.velocity[-1, 0]) > 1.0)
+        assert (warned, grows) == (diverges, diverges)
+
+
+def test_speeds_in_liquids_have_no_bound_and_their_motion_no_closed_form() -> None:
+    scene = scene_of(ball=[disc(-10.0)], duration=0.2)
+    assert "liquids" in unknown_speeds(scene)
+    assert not conserves_energy(scene)
+    assert closed_form(run(scene, "reference"), scene, 0) is None
+
+
+def test_compiled_and_plain_kernels_give_the_same_area_to_the_bit() -> None:
+    document = {"capsule": [{"position": [0, 0], "length": 1.2, "radius": 0.3}], "zone": [{"points": POOL}]}
+    document["zone"][0]["liquid"] = {"density": 1.0}
+    code = (
+        "import json, sys, numpy as np\n"
+        "from sandbox.engines.forces.liquid import Liquids\n"
+        "from sandbox.scene.files.load import from_document\n"
+        "scene = from_document(json.loads(sys.argv[1]))\n"
+        "poses = [[0.1 * k, 0.2 * np.sin(k), k] for k in range(20)]\n"
+        "for pose in poses:\n"
+        "    one = np.ones(1, bool), np.array([pose], float)\n"
+        "    print(Liquids(scene).submerged(scene.bodies, np.zeros(1, np.int64), *one).tobytes().hex())\n"
+    )
+    outputs = [
+        subprocess.run(
+            [sys.executable, "-c", code, json.dumps(document)],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
+            capture_output=True,
+            check=True,
+        ).stdout
+        for disabled in ("0", "1")
+    ]
+    assert outputs[0] == outputs[1]
