@@ -169,6 +169,7 @@ class Liquids:
         torque = (submerged[:, :, 1] * lift[:, 1] - submerged[:, :, 2] * lift[:, 0]).sum(axis=1)
         return force, torque
 
+    @np.errstate(over="ignore", invalid="ignore")  # in a diverged state, which is detected next
     def resistance(self, submerged: FloatArray, rates: Rates) -> FloatArray:
         """Return κ of N bodies in L liquids, (N, L) N·s/m³, at some rates."""
         velocity, spin = rates
@@ -178,6 +179,7 @@ class Liquids:
         kappa: FloatArray = self._linear + self._quadratic * np.sqrt(wx * wx + wy * wy)
         return kappa
 
+    @np.errstate(over="ignore", invalid="ignore")  # likewise
     def drag(self, submerged: FloatArray, rates: Rates, kappa: FloatArray) -> Loads:
         """Return the drag on N bodies at some rates, by the resistance κ (N, L)."""
         velocity, turn = rates[0], rates[1][:, None]
@@ -186,6 +188,7 @@ class Liquids:
         force = -np.column_stack(((area * ux - sy * turn).sum(axis=1), (area * uy + sx * turn).sum(axis=1)))
         return force, -(sx * uy - sy * ux + second * turn).sum(axis=1)
 
+    @np.errstate(over="ignore", invalid="ignore")  # likewise
     def step_loads(
         self,
         submerged: FloatArray,
