@@ -83,6 +83,9 @@ if TYPE_CHECKING:
     from sandbox.engines.segment import (
         Checkpoint as Checkpoint,
     )
+    from sandbox.engines.sensors import (
+        OpenVisit as OpenVisit,
+    )
     from sandbox.engines.switching import (
         SwitchableSimulation as SwitchableSimulation,
         start as start,
@@ -368,6 +371,7 @@ _NAMES = {
     "sandbox.engines.reference.integrators": "INTEGRATORS add_integrator",
     "sandbox.engines.registry": "ENGINES UnknownEngineError",
     "sandbox.engines.segment": "Checkpoint",
+    "sandbox.engines.sensors": "OpenVisit",
     "sandbox.engines.switching": "SwitchableSimulation start",
     "sandbox.frame_table": "FrameTable",
     "sandbox.games.contract": "Policy",

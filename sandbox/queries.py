@@ -240,7 +240,7 @@ class SceneQueries:
         low = np.minimum(origin, origin + way) + own.min(axis=0) - radius
         high = np.maximum(origin, origin + way) + own.max(axis=0) + radius
         near = [
-            Hull(each.owner, minkowski_difference(each.corners, own), each.radius)
+            ObjectHull(each.owner, minkowski_difference(each.corners, own), each.radius)
             for each in self._hulls
             if (each.corners.min(axis=0) - each.radius <= high).all()
             and (each.corners.max(axis=0) + each.radius >= low).all()
@@ -435,7 +435,7 @@ def _nearest(features: _Features, point: FloatArray) -> tuple[int, float, tuple[
     return int(features.owner[which]), float(distance[which]), (x, y)
 
 
-class Hull(NamedTuple):
+class ObjectHull(NamedTuple):
     """Convex hull of corners, widened by a radius."""
 
     owner: int
@@ -446,7 +446,7 @@ class Hull(NamedTuple):
     """m"""
 
 
-class HalfPlane(NamedTuple):
+class ObjectHalfPlane(NamedTuple):
     """A half-plane."""
 
     owner: int
@@ -456,14 +456,14 @@ class HalfPlane(NamedTuple):
     normal: FloatArray
     """(2,) unit normal"""
 
-    def raised(self, height: float) -> "HalfPlane":
+    def raised(self, height: float) -> "ObjectHalfPlane":
         """Return the half-plane whose surface is higher, m."""
         return self._replace(point=self.point + height * self.normal)
 
 
 def _seen_shapes(
     setup: Setup, frame: Frame | None, ignore: frozenset[str], categories: frozenset[str]
-) -> tuple[list[Hull], list[HalfPlane]]:
+) -> tuple[list[ObjectHull], list[ObjectHalfPlane]]:
     """Return the hulls and half-planes of all objects that are seen.
 
     Raises:
@@ -475,14 +475,14 @@ def _seen_shapes(
     normals = np.asarray([each.normal for each in scene.planes], np.float64).reshape(-1, 2)
     normals /= np.hypot(*normals.T)[:, None]
     planes = [
-        HalfPlane(-1 - k, np.asarray(plane.point, np.float64), normals[k])
+        ObjectHalfPlane(-1 - k, np.asarray(plane.point, np.float64), normals[k])
         for k, plane in enumerate(scene.planes)
         if is_seen[-1 - k]
     ]
     return hulls, planes
 
 
-def _features_of(hulls: Sequence[Hull], planes: Sequence[HalfPlane], bodies: int) -> _Features:
+def _features_of(hulls: Sequence[ObjectHull], planes: Sequence[ObjectHalfPlane], bodies: int) -> _Features:
     """Return the features of objects.
 
     Args:
@@ -546,7 +546,7 @@ def visible_objects(
     }
 
 
-def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[Hull]:
+def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[ObjectHull]:
     """Yield the hulls of the bodies that are present, where a frame has them, or else the setup."""
     bodies = setup.bodies
     state = bodies if frame is None else frame
@@ -556,16 +556,16 @@ def _body_hulls(setup: Setup, frame: Frame | None) -> Iterator[Hull]:
     x, y = rotate(shapes.corner[:, 0], shapes.corner[:, 1], np.cos(angle[owner]), np.sin(angle[owner]))
     corners = position[owner] + np.column_stack((x, y))
     for k in np.flatnonzero(present[shapes.body]).tolist():
-        yield Hull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
+        yield ObjectHull(int(shapes.body[k]), corners[shapes.first[k] : shapes.first[k + 1]], float(shapes.radius[k]))
 
 
-def static_hulls(scene: Scene) -> Iterator[Hull]:
+def static_hulls(scene: Scene) -> Iterator[ObjectHull]:
     """Yield the hulls of walls, a segment each, and of posts."""
     for k, thing in enumerate(scene.fixed):
         if isinstance(thing, Post):
-            yield Hull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
+            yield ObjectHull(-1 - k, np.asarray([thing.position], np.float64), thing.radius)
         elif isinstance(thing, Wall):
             line = np.asarray([*thing.points, thing.points[0]] if thing.closed else thing.points, np.float64)
             for segment in np.stack((line[:-1], line[1:]), axis=1):
                 if (segment[0] != segment[1]).any():
-                    yield Hull(-1 - k, segment, 0.5 * thing.thickness)
+                    yield ObjectHull(-1 - k, segment, 0.5 * thing.thickness)

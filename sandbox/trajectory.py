@@ -420,6 +420,24 @@ class Trajectory(HtmlRepr):
             keys.append("layer")
         return replace(self, **{key: getattr(self, key)[frames] for key in keys})
 
+    def of_first(self, count: int) -> Self:
+        """Return the run of its first bodies, without those that were added later and without their contacts.
+
+        Args:
+            count: number of bodies.
+        """
+        if count >= len(self.names):
+            return self
+        keys = ["position", "velocity", "angle", "angular_velocity"]
+        keys += [key for key in ("spin", "layer") if len(getattr(self, key))]
+        columns = {key: getattr(self, key)[:, :count] for key in keys}
+        kept, missed = (self.contact_pair < count).all(axis=1), (self.missed_pair < count).all(axis=1)
+        contact_keys = ["contact_time", "contact_pair", "contact_point", "contact_normal", "contact_impulse"]
+        contact_keys += ["contact_end"] if len(self.contact_end) else []
+        columns |= {key: getattr(self, key)[kept] for key in contact_keys}
+        columns |= {key: getattr(self, key)[missed] for key in ("missed_time", "missed_pair")}
+        return replace(self, names=self.names[:count], retired_time=self.retired_time[:count], **columns)
+
     def save(self, path: str | Path) -> Path:
         """Write the arrays to a compressed `.npz` file.
 

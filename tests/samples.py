@@ -1,4 +1,4 @@
-"""Sample scenes: seventeen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: twenty shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -17,17 +17,20 @@ SAMPLE_SCENES = (
     "billiards/9-ball",
     "games/conveyor",
     "games/curling",
+    "games/demolition",
     "games/harbour",
     "games/landing",
     "games/moving_platforms",
     "games/rube_goldberg",
     "games/table_tennis",
     "joints/atwood",
+    "joints/buggy",
     "joints/cloth",
     "joints/slider_crank",
     "particles/sparks",
     "pinball/full",
     "tutorial/balloon_and_feather",
+    "tutorial/sensors",
 )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import ActionError, Force, Pull, Throttle
+from sandbox.action import Action, ActionError, Force, Pull, Throttle
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
@@ -42,6 +42,8 @@ class Checkpoint:
     """as `Simulation.plane_reach`"""
     sensor_visits: Mapping[tuple[int, int], OpenVisit] | None
     """visits of sensors that last, by the pairs of their contacts; None if they are not tracked"""
+    events: tuple[Action, ...]
+    """events of the scene that have not happened yet"""
 
     @property
     def scene(self) -> Scene:
@@ -108,8 +110,7 @@ class Segment:
         if self.session_setup is None:
             return own_setup
         return replace(
-            self.session_setup,
-            scene=own_setup.scene,
+            self.session_setup.with_scene(own_setup.scene),  # also values of motors that were set
             bodies=replace(self.session_setup.bodies, elements=own_setup.bodies.elements),
         )
 

@@ -20,7 +20,7 @@ from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import kernel
 from sandbox.engines.contract import Exhaustion
-from sandbox.queries import Hull, static_hulls, visible_objects
+from sandbox.queries import ObjectHull, static_hulls, visible_objects
 from sandbox.resource_limits import CONTACTS
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
@@ -336,7 +336,7 @@ def _compile(scene: Scene, bodies: Bodies, sensor: Sensor) -> _CompiledSensor:
 
 
 def _static_arrays(scene: Scene) -> _StaticHulls:
-    hulls: list[Hull] = list(static_hulls(scene))
+    hulls: list[ObjectHull] = list(static_hulls(scene))
     corner = np.concatenate((np.empty((0, 2)), *(each.corners for each in hulls)))
     radius = np.asarray([each.radius for each in hulls], np.float64)
     middle = np.asarray([each.corners.mean(axis=0) for each in hulls], np.float64).reshape(-1, 2)

@@ -9,33 +9,24 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, Self, Unpack
-
-import numpy as np
 
 from sandbox.action import (
     Action,
     ActionError,
     Explosion,
-    Force,
-    Impulse,
     Join,
     Launch,
     Pull,
-    Remove,
     SetParameter,
     Spawn,
     Switch,
     Throttle,
     Unjoin,
     Value,
-    check_speed,
-    in_order,
 )
-from sandbox.arrays import BoolArray
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
 from sandbox.engines.common.base import step_and_record
 from sandbox.engines.common.energy_balance import LedgerHandover
@@ -46,108 +37,29 @@ from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
 from sandbox.engines.sensors import SensorTracker, join_rows, number_of_sensor
+from sandbox.engines.session_actions import (
+    EVENT_ROUNDING,
+    EventQueue,
+    PersistentActions,
+    added_joint,
+    events_from,
+    explosion_impulses,
+    intact_joint_names,
+    launch_state,
+    removed_joint,
+)
 from sandbox.frame_table import FrameTable
 from sandbox.queries import RayHit, SceneQueries
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.drives import is_driven
-from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
-from sandbox.scene.compile.joints import compile_added_joint
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, Point
-from sandbox.scene.description.fixed import AWAY, PlaneReach
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import COMMON, Settings, SettingsChanges
 from sandbox.scene.errors import SettingsError
 from sandbox.scene.files.load import as_scene
-from sandbox.scene.validate.references import check_joints, generators
+from sandbox.schedule import ROUNDING
 from sandbox.trajectory import Contacts, Frame, SensorVisit
-
-
-class PersistentActions:
-    """Actions that keep acting: constant forces by the name of the body, throttles by the name of the thrust."""
-
-    def __init__(
-        self, forces: Mapping[str, Force] | None = None, throttles: Mapping[str, Throttle] | None = None
-    ) -> None:
-        self._forces, self._throttles = dict(forces or {}), dict(throttles or {})
-
-    def record(self, action: Action) -> None:
-        """Record an action that was applied."""
-        if isinstance(action, Force):
-            self._forces[action.body] = action
-        elif isinstance(action, Throttle):
-            self._throttles[action.thrust] = action
-        elif isinstance(action, Remove):
-            self._forces.pop(action.body, None)
-
-    def remove_forces(self, removed: Iterable[str]) -> None:
-        """Remove the forces on bodies that have left the scene."""
-        for name in removed:
-            self._forces.pop(name, None)
-
-    @property
-    def forces(self) -> dict[str, Force]:
-        """Constant force on each body."""
-        return dict(self._forces)
-
-    @property
-    def throttles(self) -> dict[str, Throttle]:
-        """Throttle of each thrust."""
-        return dict(self._throttles)
-
-    def actions(self) -> list[Force | Throttle]:
-        """Return the actions that reproduce the forces and throttles in another simulation."""
-        return [*self._forces.values(), *self._throttles.values()]
-
-
-def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:
-    """Return the state after a launch of a generator, all bodies, and which of them were launched, (N,).
-
-    Bodies of the generator that were gone return; lifetimes start again.
-
-    Raises:
-        ActionError: there is no such generator, or there is no space for its bodies.
-    """
-    found = next(((index, source) for name, index, source in generators(scene) if name == action.generator), None)
-    if found is None:
-        raise ActionError(f"no generator is named {action.generator!r}")
-    index, generator = found
-    try:
-        layout = layout_of(generator, action.seed, index, scene.world.gravity)
-    except GeneratorError as error:
-        raise ActionError(str(error)) from None
-    first = _first_body(scene, generator)
-    is_launched = np.zeros(len(bodies), np.bool_)
-    is_launched[first : first + len(layout)] = True
-    columns = {}
-    for key in ("position", "velocity", "angle", "angular_velocity"):
-        columns[key] = getattr(frame, key).copy()
-        columns[key][is_launched] = getattr(layout, key)
-    if layout.lifetime is not None:
-        born, lifetime = bodies.born.copy(), bodies.lifetime.copy()
-        born[is_launched], lifetime[is_launched] = frame.time, layout.lifetime
-        bodies = replace(bodies, born=born, lifetime=lifetime)
-    roll = frame.roll
-    if roll is not None:  # bodies of a generator start without roll
-        roll = np.where(is_launched[:, None], 0.0, roll)
-    layer, visits = frame.layer, frame.visits
-    if layer is not None:
-        layer = np.where(is_launched, scene.layers.index(generator.layer), layer)
-    if visits is not None:
-        visits = np.where(is_launched[:, None], AWAY, visits)
-    launched_frame = Frame(
-        frame.time, present=frame.present | is_launched, roll=roll, layer=layer, visits=visits, **columns
-    )
-    passing = frame.passing
-    if passing is not None:
-        passing = passing[~is_launched[passing[:, 0]]]
-    return replace(launched_frame, drives=frame.drives, passing=passing), bodies, is_launched
-
-
-def _first_body(scene: Scene, generator: BodySource) -> int:
-    """Return the index of a generator's first body."""
-    sources = scene.body_sources
-    return sum(count_of(each) for each in sources[: next(k for k, each in enumerate(sources) if each is generator)])
 
 
 def start(
@@ -185,30 +97,6 @@ def start(
     return SwitchableSimulation(setup, engine, settings)
 
 
-EVENT_ROUNDING = 1e-6
-"""Fraction of a step by which a time may be beyond a step by rounding"""
-
-
-class _EventQueue:
-    """Events of a scene that have not happened yet."""
-
-    def __init__(self, events: Iterable[Action], time: float) -> None:
-        """Take the events that are at a time, s, or later."""
-        self._events = [event for event in in_order(tuple(events)) if event.time >= time]
-        self.next = self._time_of_first()
-        """time of the next event, s; inf without any"""
-
-    def _time_of_first(self) -> float:
-        return self._events[0].time if self._events else math.inf
-
-    def due(self, time: float) -> list[Action]:
-        """Return the events up to a time, s, and remove them."""
-        due = [event for event in self._events if event.time <= time]
-        self._events = self._events[len(due) :]
-        self.next = self._time_of_first()
-        return due
-
-
 class SwitchableSimulation:
     """Running scene whose engine and settings can be changed during the run. It is a `Simulation`.
 
@@ -227,7 +115,7 @@ class SwitchableSimulation:
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._joined: dict[int, float] = {}
-        self._events = _EventQueue(setup.scene.events, setup.time)
+        self._events = EventQueue(events_from(setup))
         self._work: Counter[str] = Counter()
         self._pulls = MouseJoints()
         self._persistent = PersistentActions()
@@ -300,6 +188,7 @@ class SwitchableSimulation:
             setup=self.setup,
             plane_reach=self.plane_reach,
             sensor_visits=self._sensors.open_visits,
+            events=self._events.pending,
         )
 
     @classmethod
@@ -333,7 +222,7 @@ class SwitchableSimulation:
         simulation._segment.origin, simulation._segment.steps = point.origin, point.steps
         simulation._retired, simulation._broken, simulation._work = dict(point.retired), dict(point.broken), Counter()
         simulation._joined = dict(point.joined)
-        simulation._events = _EventQueue(point.scene.events, point.frame.time)
+        simulation._events = EventQueue(point.events)
         simulation._earlier_contacts, simulation._observer, simulation._ledger, simulation._pulls = (
             None,
             None,
@@ -421,7 +310,7 @@ class SwitchableSimulation:
             Divergence: the state is not finite, or exceeds the bounds.
             Exhaustion: the step needs more memory or work than its limit.
         """
-        self._make_step(1.0, self._segment.simulation.step)
+        self._make_step(1.0, lambda: self._segment.simulation.step())
 
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
@@ -531,70 +420,48 @@ class SwitchableSimulation:
         self._segment.add_body(self.bodies.joined_by(named.single, name))
 
     def _apply_events(self) -> None:
-        """Apply the events of the scene that are due; those of bodies that have left are passed over.
+        """Apply the events of the scene that are due; those of bodies and joints that have left are passed over.
 
         Raises:
             Exhaustion: one cannot be applied.
         """
-        if self._events.next > self.time:
+        now = self.time + ROUNDING * self.settings.dt  # as for actions
+        if self._events.next > now:
             return
-        for event in self._events.due(self.time):
-            body = getattr(event, "body", None)
-            if body in self.bodies.names and not self.frame().present[self.bodies.names.index(body)]:
+        for event in self._events.due(now):
+            if self._is_past(event):
                 continue
             try:
                 self.apply(event)
             except ActionError as error:
                 raise Exhaustion(f"the event {event.kind!r} of {event.time:g} s cannot be applied: {error}") from None
 
+    def _is_past(self, event: Action) -> bool:
+        """Return whether a body of an event, or the joint that it removes, has left."""
+        if isinstance(event, Unjoin):
+            return event.joint in self.setup.joints.names and event.joint not in intact_joint_names(
+                self.setup, self.broken
+            )
+        bodies = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
+        names, present = self.bodies.names, self.frame().present
+        return any(name in names and not present[names.index(name)] for name in bodies)
+
     def _explode(self, action: Explosion) -> None:
-        """Apply the impulses of an explosion."""
-        frame, bodies = self.frame(), self.bodies
-        away = frame.position - np.asarray(action.position)
-        distance = np.hypot(*away.T)
-        moves = frame.present & ~bodies.immovable & ~is_driven(self.scene, bodies)
-        hit = np.flatnonzero(moves & (distance < action.radius) & (distance > 0.0))
-        impulse = action.impulse * (1.0 / distance[hit] - 1.0 / action.radius)[:, None] * away[hit]
-        for index, velocity in zip(hit.tolist(), frame.velocity[hit] + impulse / bodies.mass[hit, None], strict=True):
-            check_speed(math.hypot(*velocity), f"the explosion at {bodies.names[index]!r}")
-        for index, (x, y) in zip(hit.tolist(), impulse.tolist(), strict=True):
-            self._segment.simulation.apply(Impulse(time=action.time, body=bodies.names[index], impulse=(x, y)))
+        for impulse in explosion_impulses(action, self.scene, self.bodies, self.frame()):
+            self._segment.simulation.apply(impulse)
 
     def _join(self, action: Join) -> None:
-        setup, frame = self.setup, self.frame()
-        state = ("position", "velocity", "angle", "angular_velocity")
-        bodies = replace(self.bodies, **{key: getattr(frame, key) for key in state})
-        faults = list(check_joints([action.joint], setup.scene, bodies.some(np.flatnonzero(frame.present))))
-        if faults:
-            listed = (f"{'.'.join(map(str, location[2:]))}: {message}" for location, message in faults)
-            raise ActionError(f"joint: {'; '.join(listed)}")
-        taken = self._intact_joint_names()
-        free = (f"joined-{k}" for k in count(1))
-        name = action.joint.name or next(each for each in free if each not in taken)
-        if name in taken:
-            raise ActionError(f"a joint is already named {name!r}")
-        rows = compile_added_joint(action.joint, name, bodies, len(setup.joints))
-        joined = replace(setup, bodies=self.bodies, joints=setup.joints.joined(rows))  # with spawned bodies
-        self._hand_over(self.engine, self.wanted, self.bodies, frame, dict(self.retired), self.plane_reach, joined)
+        frame = self.frame()
+        rows = added_joint(action, self.setup, self.bodies, frame, self.broken)
+        setup = replace(self.setup, bodies=self.bodies, joints=self.setup.joints.joined(rows))  # with spawned bodies
+        self._hand_over(self.engine, self.wanted, self.bodies, frame, dict(self.retired), self.plane_reach, setup)
         self._joined |= dict.fromkeys(rows.number.tolist(), self.time)
 
     def _unjoin(self, action: Unjoin) -> None:
-        joints, broken = self.setup.joints, dict(self.broken)
-        found = [k for k, name in enumerate(joints.names) if name == action.joint and k not in broken]
-        if not found:
-            known = ", ".join(map(repr, sorted(self._intact_joint_names())[:MAX_NAMED])) or "none"
-            raise ActionError(f"no joint is named {action.joint!r}; joints: {known}")
-        removed = dict.fromkeys(joints.whole(np.asarray(found)).tolist(), self.time)
+        rows = removed_joint(action, self.setup, self.broken)
+        broken = {**self.broken, **dict.fromkeys(rows, self.time)}
         plane_reach, retired = self.plane_reach, dict(self.retired)
-        self._hand_over(
-            self.engine, self.wanted, self.bodies, self.frame(), retired, plane_reach, broken={**broken, **removed}
-        )
-
-    def _intact_joint_names(self) -> set[str]:
-        """Return the names of the joints that are there."""
-        joints, broken = self.setup.joints, self.broken
-        first = joints.part_of == joints.number
-        return {joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
+        self._hand_over(self.engine, self.wanted, self.bodies, self.frame(), retired, plane_reach, broken=broken)
 
     def _switch(self, action: Switch) -> None:
         try:

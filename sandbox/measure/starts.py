@@ -37,7 +37,7 @@ from sandbox.measure.metrics.perturbation import (
 from sandbox.measure.seeds import is_random, with_seed
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
-from sandbox.scene.compile.joint_arrays import WORLD
+from sandbox.scene.compile.joint_arrays import WORLD, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.geometry.vectors import rotate
@@ -190,7 +190,8 @@ class Starts:
     ) -> Bodies:
         """Return the bodies with those that touch or are joined moved, so that they still touch and are joined.
 
-        A group that hangs at one point of the world is rotated about it; one that hangs at several is not moved.
+        A group that hangs at one point of the world is rotated about it; one that hangs at several, or whose angle a
+        weld or a gear holds, is not moved.
         """
         own, amount = base.setup.bodies, self.distance * math.sqrt(random.uniform())
         reverse = bool(random.integers(2))
@@ -200,7 +201,7 @@ class Starts:
         for label, points in base.anchors.items():
             members = np.flatnonzero(base.group == label)
             position[members], angle[members] = own.position[members], own.angle[members]
-            if len(points) == 1:
+            if len(points) == 1 and label not in base.angle_held:
                 (point,) = points
                 by = np.full(len(members), rotation[label])
                 position[members] = point + _rotated(own.position[members] - point, by)
@@ -221,6 +222,8 @@ class _Unperturbed:
     """for each body, the lowest index of the bodies that joints connect it with, (N,)"""
     anchors: dict[int, set[tuple[float, float]]]
     """points of the world at which each group hangs, by the label of the group"""
+    angle_held: frozenset[int]
+    """labels of the groups whose angle the world holds"""
     overlaps: dict[IndexPair, float]
     """depth of each overlap, m"""
 
@@ -234,7 +237,8 @@ class _Unperturbed:
             free[[number for number in pair if number >= 0]] = False
         for ends in (setup.joints.a, setup.joints.b):
             free[ends[ends != WORLD]] = False
-        return cls(setup, touching, free, group, _anchors(setup, group), _overlaps(setup, setup.bodies))
+        anchors, angle_held = _anchors(setup, group), _angle_held(setup, group)
+        return cls(setup, touching, free, group, anchors, angle_held, _overlaps(setup, setup.bodies))
 
 
 def check_spread(spread: float) -> None:
@@ -304,6 +308,14 @@ def _anchors(setup: Setup, group: IntArray) -> dict[int, set[tuple[float, float]
             if number != WORLD and not still[number] and (other == WORLD or still[other]):
                 found.setdefault(int(group[number]), set()).add((float(point[0]), float(point[1])))
     return found
+
+
+def _angle_held(setup: Setup, group: IntArray) -> frozenset[int]:
+    """Return the labels of the groups with a joint that holds an angle to the world, or to a body that cannot move."""
+    bodies, gears = setup.bodies, setup.joints.of(JointKind.GEAR)
+    still = np.append(bodies.fixed | is_driven(setup.scene, bodies), True)  # the world, −1, selects the last row
+    held = (gears.b[still[gears.a]].tolist(), gears.a[still[gears.b]].tolist())
+    return frozenset(int(group[body]) for side in held for body in side if body != WORLD)
 
 
 def _overlaps(setup: Setup, bodies: Bodies) -> dict[IndexPair, float]:

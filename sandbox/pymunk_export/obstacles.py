@@ -115,6 +115,8 @@ def _objects(setup: Setup) -> Iterator[Obstacle]:
     if bodies.one_way:
         names = _listed([bodies.names[index] for index in bodies.one_way])
         yield Obstacle("", f"one-way bodies need callbacks with a memory: {names}")
+    if scene.events:
+        yield Obstacle("event", "events need a clock and actions: apply them between two calls of step() in the game")
     if np.isfinite(setup.bodies.lifetime).any():
         yield Obstacle("emitter", "bodies with a lifetime are removed by a clock")
     breakable = [joints.names[k] or f"number {k + 1}" for k in np.flatnonzero(np.isfinite(joints.strength)).tolist()]

@@ -233,6 +233,25 @@ def test_the_account_of_energy_balances(engine: str, collides: str, more: dict[s
         assert account[cause] < 0.0
 
 
+METHODS: list[dict[str, Any]] = [
+    {"response": "penalty"}, {"detection": "bisect"}, {"detection": "swept"}, {"detection": "shrink"},
+    {"impact": "dissipative"}, {"integrator": "velocity_verlet"}, {"integrator": "rk4"},
+]  # fmt: skip
+
+
+@pytest.mark.fail_slow(60)  # 400 steps with an account, and as many without
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: next(iter(method.values())))
+@pytest.mark.parametrize("key", ["gravity_scale", "linear_damping", "angular_damping", "max_speed"])
+def test_the_account_balances_with_every_method_of_reference(method: dict[str, Any], key: str) -> None:
+    floor = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": 0.5, "friction": 0.4}
+    own = {key: 1.5, "restitution": 0.5}
+    things = ball(y=0.6, velocity=[1.0, 0.0], angular_velocity=3.0, **own), ball("b", x=0.1, y=1.0, **own)
+    scene = scene_of(*things, plane=[floor], solver={"dt": 0.002, **method})
+    account = closed_account(scene, 400, engine="reference", closes=1e-12)
+    causes = {"linear_damping": Cause.DRAG, "angular_damping": Cause.DRAG, "max_speed": Cause.SPEED_LIMITS}
+    assert account[causes.get(key, Cause.RESTITUTION)] < 0.0
+
+
 @pytest.mark.parametrize("engine", ["pymunk", "box2d"])
 def test_bodies_with_scaled_gravity_fall_asleep_and_wake(engine: str) -> None:
     """On pymunk a body that is asleep has no contacts in the log; a new one that falls onto it wakes it."""

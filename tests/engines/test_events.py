@@ -10,6 +10,7 @@ import sandbox
 from sandbox.action import Explosion, Impulse, Switch
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.registry import ENGINES
+from sandbox.measure.preflight import run_preflight
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, from_document, loads
 from tests.scene.faults import faults_of
@@ -131,6 +132,10 @@ def test_scene_with_events_is_written_and_read_again() -> None:
         ('kind="throttle"\nthrust="t"\nlevel=1', "event[0].thrust", "none"),
         ('kind="unjoin"\njoint="j"', "event[0].joint", "none"),
         ('kind="join"\njoint={kind="rod", between=["a","q"]}', "event[0].joint.between[1]", "'a'"),
+        ('kind="join"\njoint={kind="prismatic", between=["a"], axis=[0,0], travel=[0,1]}', "event[0].joint.axis", "no"),
+        ('kind="join"\njoint={kind="weld", between=["a","a"]}', "event[0].joint.between", "twice"),
+        ('kind="spawn"\nball={position=[3,0], radius=1, layer="x"}', "event[0]", "'ground'"),
+        ('kind="spawn"\nball={position=[3,0], radius=1, kinematic=true, path={angles=[0,1]}}', "event[0]", "path"),
         ('kind="spawn"\nball={name="a", position=[0,0], radius=1}', "event[0]", "already named"),
         ('kind="switch"', "event[0].kind", "explosion"),
     ],
@@ -151,3 +156,94 @@ def test_events_of_python_are_actions() -> None:
     world = sandbox.World(duration=0.2)
     scene = sandbox.Scene(world=world, balls=[ball], events=[Impulse(time=0.1, body="a", impulse=(1.0, 0.0))])
     assert sandbox.run(scene).velocity[-1, 0, 0] == 1.0
+
+
+@every_engine
+def test_events_from_a_later_setup_happen_at_their_times(engine: str) -> None:
+    """Times of a simulation that starts from a setup count from 0, those of events from the start of the scene."""
+    simulation = sandbox.start(scene_of(impulse(0.1, 2.0), impulse(0.35, 2.0)), engine)
+    for _ in range(20):
+        simulation.step()
+    later = sandbox.start(simulation.checkpoint().present_setup(), engine)
+    for _ in range(30):
+        simulation.step()
+        later.step()
+    assert simulation.frame().velocity[0, 0] == later.frame().velocity[0, 0] == pytest.approx(2.0, abs=1e-6)  # 32 bits
+    assert later.frame().position[0, 0] == pytest.approx(simulation.frame().position[0, 0], abs=1e-6)
+
+
+def test_event_between_two_steps_happens_after_a_checkpoint_before_the_second() -> None:
+    simulation = sandbox.start(scene_of(impulse(0.205, 2.0)))
+    for _ in range(21):
+        simulation.step()
+    resumed = type(simulation).resumed(simulation.checkpoint())
+    simulation.step()
+    resumed.step()
+    assert simulation.frame().velocity[0, 0] == resumed.frame().velocity[0, 0] == 1.0
+
+
+def test_events_happen_in_the_steps_of_actions_at_their_times() -> None:
+    """23 steps of 1/60 s end before 23/60 s, by rounding."""
+    dt = 1.0 / 60.0
+    assert 23 * dt < 23 / 60
+    by_event = sandbox.run(scene_of(impulse(23 / 60, 2.0)), dt=dt)
+    by_action = sandbox.run(scene_of(), dt=dt, actions=[Impulse(time=23 / 60, body="a", impulse=(2.0, 0.0))])
+    assert by_event.position.tolist() == by_action.position.tolist()
+
+
+@pytest.mark.parametrize(
+    ("engine", "account"),
+    [("pymunk", False), ("pymunk", True), ("box2d", False), ("reference", False), ("reference", True)],
+)
+def test_event_that_changes_the_joints_before_a_single_step(engine: str, account: bool) -> None:
+    """Runs with an energy account, and those by hand, make single steps."""
+    rope = {"name": "rope", "kind": "slide", "between": ["a"], "anchors": [[0, 0], [0, 1]], "most": 1.0}
+    scene = scene_of(
+        {"kind": "unjoin", "time": 0.3, "joint": "rope"}, joint=[rope], world={"gravity": [0.0, -10.0]}, duration=0.5
+    )
+    run = sandbox.run(scene, engine, account=account)
+    assert run.status == "ok"
+    assert run.velocity[-1, 0, 1] == pytest.approx(-10.0 * 0.2, abs=0.02)  # the rope yields at up to a few mm/s
+    simulation = sandbox.start(scene, engine)
+    for _ in range(50):
+        simulation.step()
+    assert simulation.state_hash() == run.info["state_hash"]
+
+
+def test_check_and_comparison_of_a_scene_whose_events_add_bodies() -> None:
+    """The added ball passes a wall between two steps, which `check` reports; it is not compared."""
+    fast = {"name": "late", "position": [-3.0, 2.0], "velocity": [400.0, 0.0], "radius": 0.1}
+    crate = {"name": "crate", "position": [0.0, -3.0], "size": [1.0, 1.0]}  # `exact`, whose truth is trusted, has none
+    scene = scene_of(
+        {"kind": "spawn", "time": 0.2, "ball": fast},
+        impulse(0.5, 2.0),
+        box=[crate],
+        wall=[{"name": "wall", "points": [[1.0, 1.0], [1.0, 3.0]], "thickness": 0.01}],
+    )
+    found = run_preflight(scene, engine="pymunk", starts=3)
+    assert [each.details["ball"] for each in found.warnings if each.kind == "tunnelling"] == ["late"]
+    comparison = sandbox.compare(scene, engines=["pymunk", "reference"])
+    assert max(row.score.max_position for row in comparison.rows) < 1e-6
+    # The impulse changes momentum and energy, which is no breach of their conservation.
+    assert "trusted until" not in str(comparison.truth)
+    ends = sandbox.ensemble(scene, 3, vary={"ball.*.velocity": 1e-12}, engine="pymunk", keep="frames")
+    assert ends.names == ("a", "crate")
+    assert ends.position[:, 0, 0] == pytest.approx([0.5] * 3, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
+def test_joints_of_bodies_and_joints_that_have_left_are_passed_over(engine: str) -> None:
+    rope = {"name": "rope", "kind": "slide", "between": ["a"], "anchors": [[0, 0], [0, 1]], "most": 1.0}
+    weak = {**rope, "name": "weak", "strength": 1e-3}
+    scene = scene_of(
+        impulse(0.0, -4.0),  # breaks the weak one
+        {"kind": "unjoin", "time": 0.7, "joint": "weak"},
+        {"kind": "remove", "time": 0.8, "body": "a"},
+        {"kind": "join", "time": 0.9, "joint": {"kind": "weld", "between": ["a"]}},
+        {"kind": "unjoin", "time": 0.95, "joint": "rope"},
+        joint=[weak, rope],
+        world={"gravity": [0.0, -10.0]},
+    )
+    run = sandbox.run(scene, engine)
+    assert (run.status, run.info["reason"]) == ("ok", None)
+    assert run.broken_time[0] < 0.7

@@ -151,3 +151,26 @@ def test_removed_body_cannot_be_joined() -> None:
     simulation.apply(Remove(time=0.0, body="a"))
     with pytest.raises(ActionError, match="no body is named 'a'"):
         simulation.apply(rod())
+
+
+@every_engine
+def test_motor_set_after_one_change_of_joints_keeps_its_rate_after_another(engine: str) -> None:
+    """Each change begins a new segment, from the joints with the values that they have."""
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, 0.0]},
+            "solver": {"dt": 0.01},
+            "ball": [{"name": "wheel", "position": [0, 0], "radius": 0.5}, {"position": [5, 0], "radius": 0.5}],
+            "joint": [
+                {"kind": "pivot", "between": ["wheel"], "at": [0, 0]},
+                {"name": "motor", "kind": "motor", "between": ["wheel"], "rate": 1.0},
+                {"name": "link", "kind": "rod", "between": ["wheel", "ball-2"]},
+            ],
+        }
+    )
+    simulation = sandbox.start(scene, engine)
+    simulation.apply(Switch(time=0.0, settings={"dt": 0.005}))
+    simulation.apply(SetParameter(time=0.0, path="joint.motor.rate", value=3.0))
+    simulation.apply(Unjoin(time=0.0, joint="link"))
+    advance(simulation, 0.1)
+    assert simulation.frame().angular_velocity[0] == pytest.approx(3.0, abs=1e-3)  # soft joints of box2d

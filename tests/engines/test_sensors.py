@@ -18,6 +18,7 @@ from sandbox.engines.contract import Exhaustion
 from sandbox.engines.registry import ENGINES, able
 from sandbox.engines.sensors import SceneSensors
 from sandbox.engines.switching import SwitchableSimulation
+from sandbox.measure.metrics.contacts import collisions, contact_episodes, first_collision
 from sandbox.measure.preflight import warnings
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
@@ -581,3 +582,16 @@ def test_run_with_more_visits_than_can_be_recorded_fails(monkeypatch: pytest.Mon
     scene = from_document({"world": {"duration": 0.1}, "ball": balls, "sensor": [sensor]})
     with pytest.raises(Exhaustion, match="4 contacts"):
         sandbox.start(scene).contacts()
+
+
+def test_visits_are_no_collisions() -> None:
+    """The ball falls through the gate, which is a visit, and onto the ground once."""
+    scene = scene_of(FALL + '[[plane]]\nname = "ground"\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n')
+    run = sandbox.run(scene, "reference")
+    assert len(run.sensor_visits) == 1
+    assert len(run.contact_time) == 2
+    assert collisions(run) == 1
+    assert first_collision(run) == pytest.approx(
+        math.sqrt(0.9), abs=0.015
+    )  # 4.5 m of fall; a step, and half of one of the integrator
+    assert list(contact_episodes(run, scene, 0.01, 1e-3, 1.2)) == [(0, -1)]

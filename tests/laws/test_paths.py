@@ -174,12 +174,11 @@ def test_door_pushes_a_ball_away(engine: str) -> None:
     assert speed == pytest.approx(2.0 * omega * r, rel=0.01)  # it is hit up to v h early, at another angle
 
 
-@every_engine
-@pytest.mark.parametrize("sleeping", [False, True])
+@pytest.mark.parametrize(
+    ("engine", "sleeping"), [*((each, False) for each in WITH_PATHS), *((each, True) for each in ("pymunk", "box2d"))]
+)
 def test_platform_takes_along_a_stack_that_has_come_to_rest_on_it(engine: str, sleeping: bool) -> None:
     """Bodies that could sleep during a long pause wake when the platform starts."""
-    if sleeping and engine == "reference":
-        pytest.skip("reference has no sleep")
     path = {"points": [[0, 0], [2, 0]], "period": 4.0, "repeat": "once", "easing": "smooth", "start": 3.0}
     stack = [passenger(), passenger(name="upper", position=[0.0, 0.25])]
     scene = scene_of(platform(path), *stack, duration=8.0, solver={"sleeping": True} if sleeping else {})

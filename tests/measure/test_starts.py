@@ -202,3 +202,18 @@ def test_negative_number_raises() -> None:
 def test_invalid_spread_raises(spread: float) -> None:
     with pytest.raises(ValueError, match=r"spread: must be from 0 to 0\.5"):
         Starts(load("bounce"), spread)
+
+
+@pytest.mark.parametrize("between", ['["a"]', '["post", "a"]'])
+@pytest.mark.parametrize(
+    "kind", ['kind = "weld"', 'kind = "prismatic"\naxis = [1.0, 0.0]\ntravel = [0.0, 1.0]', "hinge"]
+)
+def test_hanging_body_is_turned_in_other_starts_unless_a_joint_holds_its_angle(kind: str, between: str) -> None:
+    text = 'kind = "pivot"\nat = [0.0, 0.0]' if kind == "hinge" else f"{kind}\nat = [0.0, 0.0]"
+    scene = loads(
+        '[[box]]\nname = "a"\nposition = [0.6, 0.0]\nsize = [1.0, 0.2]\n'
+        '[[ball]]\nname = "post"\nposition = [0.0, 0.0]\nradius = 0.05\nfixed = true\n'
+        f"[[joint]]\nbetween = {between}\n{text}\n"
+    )
+    turned = [bool(Starts(scene).start(number).bodies.angle.any()) for number in range(1, 6)]
+    assert turned == [kind == "hinge"] * 5

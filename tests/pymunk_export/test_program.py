@@ -606,3 +606,10 @@ def test_keys_of_bodies_that_need_the_engine_are_refused_by_name(key: str) -> No
     ball = {"position": [0.0, 0.5], "radius": 0.5, key: 0.1}
     (found,) = obstacles(from_document(BASE | {"ball": [ball]}))
     assert key in found.message
+
+
+def test_events_are_refused() -> None:
+    ball = {"name": "a", "position": [0.0, 0.5], "radius": 0.5}
+    event = {"kind": "impulse", "time": 5.0, "body": "a", "impulse": [1.0, 0.0]}
+    (found,) = obstacles(from_document(BASE | {"ball": [ball], "event": [event]}))
+    assert found.path == "event"

@@ -120,7 +120,7 @@ def test_play_may_refer_to_existing_bodies_and_generators(play: dict[str, Any]) 
         ({"game": "chess"}, "play.game", "'landing'"),
         ({"zzz": 1}, "play.zzz", "unknown key"),
         ({"part": [{"name": "a.b", "role": "lamp"}]}, 'play.part."a.b".role', "one of 'ball', 'bumper'"),
-        ({"part": [{"name": "zzz", "role": "ball"}]}, "play.part.zzz.name", "zone is named 'zzz'"),
+        ({"part": [{"name": "zzz", "role": "ball"}]}, "play.part.zzz.name", "sensor is named 'zzz'"),
         ({"part": 2 * [{"name": "a.b", "role": "ball"}]}, 'play.part."a.b".name', "already has a part"),
         ({"marking": [{"colour": "#000000"}]}, "play.marking[0]", "`points`"),
         ({"ground": "sand"}, "play.ground", "'playfield'"),

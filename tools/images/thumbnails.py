@@ -54,6 +54,7 @@ MOMENTS = {
     "benchmark/double_pendulum": Moment(4.0, trail=3.0),
     "benchmark/elastic_ball": Moment(0.8, strobe=5),
     "benchmark/far_pyramid": Moment(1.0),
+    "benchmark/figure_eight": Moment(6.9, trail=6.4),
     "benchmark/friction_ramp": Moment(2.0, strobe=4),
     "benchmark/gas": Moment(4.0),
     "benchmark/heavy_on_light": Moment(2.0),

@@ -13,14 +13,14 @@ from pymunk._chipmunk_cffi import lib
 
 from sandbox.scene.compile.contacts import ContactMatrix
 
-BodyPair = tuple[int, int]
+_Pair = tuple[int, int]
 """ids of two bodies, ascending"""
 
 
 class RollingShapes(NamedTuple):
     """Two shapes at whose contact rolling resistance acts."""
 
-    bodies: BodyPair
+    bodies: _Pair
     reach: float
     """c·r, m"""
 
@@ -33,9 +33,9 @@ class SpaceRolling:
         self._coefficients: dict[tuple[int, int], float] = {}
         self._radius: dict[int, float] = {}
         self._known: dict[tuple[pymunk.Shape, pymunk.Shape], RollingShapes | None] = {}
-        self._bodies: dict[BodyPair, tuple[pymunk.Body, pymunk.Body]] = {}
-        self._impulses: dict[BodyPair, float] = {}
-        self._motors: dict[BodyPair, pymunk.SimpleMotor] = {}
+        self._bodies: dict[_Pair, tuple[pymunk.Body, pymunk.Body]] = {}
+        self._impulses: dict[_Pair, float] = {}
+        self._motors: dict[_Pair, pymunk.SimpleMotor] = {}
         self.resisted: set[int] = set()
         """ids of the bodies on which a motor acted in the last substep"""
 

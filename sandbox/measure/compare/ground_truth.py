@@ -74,7 +74,9 @@ METHODS: tuple[dict[str, object], ...] = (
 """Second methods after those of `preferred_settings`: other integrators and other detections of impacts."""
 CHOICES = ("integrator", "detection", "joints", "half_kick")
 """Settings by which two methods of one engine differ."""
-SOURCES = frozenset({Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KINEMATIC, Demand.KICKS, Demand.ZONES})
+SOURCES = frozenset(
+    {Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KINEMATIC, Demand.KICKS, Demand.ZONES, Demand.EVENTS}
+)
 """Demands that can add energy to a scene, besides wind and emitted bodies."""
 
 
@@ -447,7 +449,7 @@ def _predictable_until(scene: Scene, engine: str, settings: Settings, found: Tra
         for reverse in (False, True):
             other = perturb(scene, seed=seed, reverse=reverse)
             if other is not None:
-                again = run(other, engine, audit=False, **settings.model_dump())
+                again = run(other, engine, audit=False, **settings.model_dump()).of_first(len(scene.bodies))
                 until = min(until, agreement_time(found, again, scene, tolerance))
     return until
 

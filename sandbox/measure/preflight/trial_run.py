@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandbox.action import Spawn, in_order
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES
@@ -20,6 +21,7 @@ from sandbox.measure.preflight.initial_contacts import initial_contacts
 from sandbox.measure.preflight.stacks import MIN_MASS_RATIO
 from sandbox.measure.run.run_warnings import MAX_ENERGY_GAIN
 from sandbox.measure.run.runner import run
+from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.filters import filter_table
@@ -73,7 +75,7 @@ def _stack_of(setup: Setup) -> StackedBodies | None:
 
 
 class Unseen(NamedTuple):
-    """Bodies whose passages the audit does not see, (N,) each."""
+    """Bodies of the scene whose passages the audit does not see, (N,) each."""
 
     through_bodies: BoolArray
     through_static: BoolArray
@@ -97,6 +99,15 @@ class TrialRun:
         return str(self.run.info["engine"])
 
     @cached_property
+    def bodies(self) -> Bodies:
+        """Bodies of the run: those of the scene, and those that its events added."""
+        bodies, names = self.scene.bodies, self.run.names.tolist()
+        spawned = (event.single for event in in_order(self.scene.events) if isinstance(event, Spawn))
+        for single, name in zip(spawned, names[len(bodies) :], strict=False):  # the run may have ended before the last
+            bodies = bodies.joined_by(single, name)
+        return bodies
+
+    @cached_property
     def top_speeds(self) -> tuple[float, float]:
         """Largest speed of any body in the first and in the second half of the run, m/s."""
         speed = np.hypot(self.run.velocity[..., 0], self.run.velocity[..., 1])
@@ -111,7 +122,7 @@ class TrialRun:
         through other bodies, but not between frames in which they turn too far; and not through static objects, which
         matters if rotation moves the ends farther in a step than half the width.
         """
-        bodies, run = self.scene.bodies, self.run
+        bodies, run = self.scene.bodies, self.run.of_first(len(self.scene.bodies))
         without = (bodies.core <= 0.0) & ~bodies.fixed
         turn = np.abs(np.diff(run.angle, axis=0)).max(axis=0, initial=0.0)
         is_sparse = run.info["settings"]["record_every"] > 1
@@ -134,7 +145,7 @@ class TrialRun:
 
     def _missed_contacts(self) -> Iterator[Diagnostic]:
         """Yield the contacts that the audit found missed, with the closing speed of each body."""
-        run, bodies = self.run, self.scene.bodies
+        run, bodies = self.run, self.bodies
         reported: set[tuple[int, int]] = set()
         for time, (a, b) in zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True):
             if (a, b) in reported:
@@ -165,7 +176,7 @@ class TrialRun:
 
     def _penetrations(self) -> Iterator[Diagnostic]:
         """Yield each ball whose centre was behind the surface of a plane, at its deepest."""
-        run, bodies = self.run, self.scene.bodies
+        run, bodies = self.run, self.bodies
         able = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.immovable
         filters = filter_table(self.scene, bodies)
         for index, (thing, name) in enumerate(zip(self.scene.planes, self.scene.fixed_names, strict=False)):
@@ -174,7 +185,8 @@ class TrialRun:
                 continue
             flat = run.position[:, discs].reshape(-1, 2)
             depth = -height_above(thing, flat).reshape(len(run.time), len(discs))
-            depth = np.where(depth[0] > 0.0, 0.0, depth)  # initial overlaps are another diagnostic
+            # Initial overlaps are another diagnostic, and bodies that are added later have no position before.
+            depth = np.where((depth[0] > 0.0) | np.isnan(depth), 0.0, depth)
             for k in np.flatnonzero(depth.max(axis=0) > 0.0).tolist():
                 frame = int(depth[:, k].argmax())
                 body, deepest = bodies.names[discs[k]], float(depth[frame, k])

@@ -89,7 +89,8 @@ def bounded_run(
 ) -> tuple[Trajectory, float]:
     """Run a scene, but stop once its counted cost exceeds a limit.
 
-    Without a deadline, whether the run is stopped depends on the counters alone.
+    Without a deadline, whether the run is stopped depends on the counters alone. Bodies that events of the scene add
+    are left out of the result.
 
     Args:
         start: scene or setup to run.
@@ -116,7 +117,8 @@ def bounded_run(
             raise RunTimeoutError("the time limit was reached")
 
     found = run(setup, engine, audit=audit, on_work=check, **settings.model_dump())
-    return found, counted_cost(setup, engine, resolved, found.info["steps"], found.info["work"])
+    cost = counted_cost(setup, engine, resolved, found.info["steps"], found.info["work"])
+    return found.of_first(len(setup.bodies)), cost
 
 
 def counted_cost(start: Scene | Setup, engine: str, settings: Settings, steps: int, work: Mapping[str, int]) -> float:

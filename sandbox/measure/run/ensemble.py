@@ -53,7 +53,10 @@ MAX_RUNS = 10_000_000
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """M runs of a scene with N bodies from varied starts. States of runs that were refused or failed are nan."""
+    """M runs of a scene with N bodies from varied starts. States of runs that were refused or failed are nan.
+
+    Bodies that events of the scene add are left out.
+    """
 
     names: tuple[str, ...]
     """(N,) names of the bodies"""
@@ -333,7 +336,7 @@ class _Runs:
                     return
                 columns = {name: getattr(self._starts, name)[m] for name in FIELDS}
                 varied = replace(self._setup, bodies=replace(self._setup.bodies, **columns))
-                found = run(varied, self._engine, audit=False, **settings.model_dump())
+                found = run(varied, self._engine, audit=False, **settings.model_dump()).of_first(len(varied.bodies))
                 self._status[m] = found.status
                 if keep != "end":
                     self._trajectories[m] = found

@@ -303,6 +303,7 @@ _ELSEWHERE = {
     "trigger": _SENSOR,
     "area": _SENSOR,
     **dict.fromkeys(("buoyancy", "buoyancycontroller", "water", "fluid", "fluiddensity", "liquid"), _LIQUID),
+    "elevation": "a cue is level; state `velocity` and `spin`, [x, y, z] in rad/s, that the ball has after the stroke",
     **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
     **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),
 }

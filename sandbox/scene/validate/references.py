@@ -42,6 +42,9 @@ SMALLEST_CLICK = 1e-6
 """rad, smallest magnitude of the angle between two clicks of a ratchet; the engine divides by it."""
 
 
+ONE_BODY_TWICE = "names one body twice; name two bodies, or one to attach it to the world"
+
+
 def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
     """Return the faults of joints, thrusts, attractions and drives, and of the bodies of sensors."""
     return [
@@ -58,10 +61,16 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from check_joints(scene.joints, scene, bodies)
 
 
-def check_events(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
-    """Yield the faults of events: names that nothing has, and values that cannot change during a run."""
+def check_events(scene: Scene, bodies: Bodies, are_others_valid: bool) -> Iterator[LocatedMessage]:
+    """Yield the faults of events: names that nothing has, and values that cannot change during a run.
+
+    Args:
+        scene: the scene.
+        bodies: of the scene.
+        are_others_valid: whether the rest of the scene is valid, so that its joints are known.
+    """
     spawned = {event.single.name for event in scene.events if isinstance(event, Spawn) and event.single.name}
-    yield from _check_spawned_names(scene, bodies)
+    yield from _check_spawned(scene, bodies)
     known = {
         "body": {*bodies.names, *spawned},
         "thing": set(scene.fixed_names),
@@ -70,29 +79,39 @@ def check_events(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
         "generator": {name for name, _, _ in generators(scene)},
     }
     joins = [event.joint for event in scene.events if isinstance(event, Join)]
-    joints = {*scene.joint_arrays.names, *(joint.name for joint in joins if joint.name)}
+    own = scene.joint_arrays.names if are_others_valid else ()
+    joints = {*own, *(joint.name for joint in joins if joint.name)}
     for k, event in enumerate(scene.events):
         for key, names in known.items():
             name = getattr(event, key, None)
             if name is not None and name not in names:
                 yield ("event", k, key), f"no {key} is named {name!r}; {_listed(names)}"
-        if isinstance(event, Unjoin) and event.joint not in joints:
+        if are_others_valid and isinstance(event, Unjoin) and event.joint not in joints:
             yield ("event", k, "joint"), f"no joint is named {event.joint!r}; {_listed(joints)}"
         if isinstance(event, Join):
             for side, name in enumerate(event.joint.between):
                 if name not in known["body"]:
                     yield ("event", k, "joint", "between", side), f"no body is named {name!r}; {_listed(known['body'])}"
+            if len(set(event.joint.between)) < len(event.joint.between):
+                yield ("event", k, "joint", "between"), ONE_BODY_TWICE
+            for key, message in _check_joint(event.joint):
+                yield ("event", k, "joint", key), message
         if isinstance(event, SetParameter) and not is_settable(event.path):
             yield ("event", k, "path"), f"{event.path!r} cannot be changed during a run; these can: {SETTABLE}"
 
 
-def _check_spawned_names(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+def _check_spawned(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     seen = {*bodies.names, *scene.fixed_names}
     for k, event in enumerate(scene.events):
         if isinstance(event, Spawn) and event.single.name:
             if event.single.name in seen:
                 yield ("event", k), f"a body or fixed object is already named {event.single.name!r}"
             seen.add(event.single.name)
+        if isinstance(event, Spawn):
+            if event.single.layer not in scene.layers:
+                yield ("event", k), f"no layer is named {event.single.layer!r}; {_listed(scene.layers)}"
+            if event.single.path is not None or event.single.one_way is not None:
+                yield ("event", k), "a body with a path, or a one-way body, cannot be added during a run"
 
 
 def _listed(names: Collection[str]) -> str:
@@ -113,7 +132,7 @@ def check_joints(joints: Sequence[Joint], scene: SceneDescription, bodies: Bodie
             if name not in index:
                 yield ("joint", k, "between", side), f"no body is named {name!r}; {_known(bodies)}"
         if len(set(joint.between)) < len(joint.between):
-            yield ("joint", k, "between"), "names one body twice; name two bodies, or one to attach it to the world"
+            yield ("joint", k, "between"), ONE_BODY_TWICE
         elif all(name in index and bodies.fixed[index[name]] for name in joint.between):
             yield ("joint", k, "between"), "all its bodies are fixed; at least one must be able to move"
         elif all(name in index and is_driven[index[name]] for name in joint.between):

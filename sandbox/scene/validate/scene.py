@@ -86,10 +86,10 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_surface(scene, bodies)
     if scene.joints or scene.thrusts or scene.attractions or scene.drives or scene.sensors:
         found += check_attachments(scene, bodies)
-    if scene.events:
-        found += check_events(scene, bodies)
     if scene.ropes:
         found += check_rope_ties(scene, bodies)
+    if scene.events:
+        found += check_events(scene, bodies, are_others_valid=not found)
     return found if materials else [*found, *_check_surface_count(scene, bodies)]
 
 

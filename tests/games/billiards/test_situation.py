@@ -84,6 +84,12 @@ def test_contacts_before_the_stroke_are_left_out() -> None:
     assert shot_events(POOL, contacts((2.0, 0, -1)), 2.5) == ()
 
 
+def test_visits_of_sensors_are_no_events() -> None:
+    """Their indices follow those of the pockets."""
+    rows = contacts((3.0, 0, 1), (3.1, 0, -1 - len(FIXED)), (3.2, 1, -2 - len(FIXED)))
+    assert [each.kind for each in shot_events(POOL, rows, 2.5)] == ["ball"]
+
+
 def test_initial_contacts_count_only_after_separation() -> None:
     touching = frozenset({(0, 1), (2, -1)})
     rows = contacts((0.0, 0, 1), (1e-4, 2, -1), (0.0, 0, 3), (0.3, 0, 2), (0.7, 2, -1), (0.8, 0, 1))
