@@ -269,6 +269,7 @@ if TYPE_CHECKING:
         Scatter as Scatter,
     )
     from sandbox.scene.description.fixed import (
+        Liquid as Liquid,
         Plane as Plane,
         Post as Post,
         Sensor as Sensor,
@@ -418,7 +419,7 @@ _NAMES = {
     "sandbox.scene.description.base": "BodyPath BodySource BodySpec",
     "sandbox.scene.description.bodies": "BallPart Box BoxPart Capsule CapsulePart Compound Polygon PolygonPart",
     "sandbox.scene.description.discs": "Ball Emitter Grid Scatter",
-    "sandbox.scene.description.fixed": "Plane Post Sensor Wall Zone",
+    "sandbox.scene.description.fixed": "Liquid Plane Post Sensor Wall Zone",
     "sandbox.scene.description.forces": "Attraction PlungerDrive StrokeDrive Thrust TorqueDrive",
     "sandbox.scene.description.generators": "Cloth Ragdoll Rope RopeAttachment Stack",
     "sandbox.scene.description.joints": (

@@ -1,4 +1,4 @@
-"""Sample scenes: nineteen shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: twenty shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -18,6 +18,7 @@ SAMPLE_SCENES = (
     "games/conveyor",
     "games/curling",
     "games/demolition",
+    "games/harbour",
     "games/landing",
     "games/moving_platforms",
     "games/rube_goldberg",

@@ -27,6 +27,8 @@ class Cause(StrEnum):
     """torques that resist rolling"""
     DRAG = "drag"
     """air drag, where wind may add energy, and `world.damping`"""
+    LIQUID = "liquid"
+    """buoyancy, and the drag of liquids, which may add energy in a current"""
     DAMPING = "damping"
     """dampers of springs"""
     JOINTS = "joints"

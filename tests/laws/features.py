@@ -108,6 +108,14 @@ FEATURES: dict[str, Document] = {
         ]
     },
     "holding zone": {"zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True, "gravity": [1.0, 1.0]}]},
+    "liquid": {
+        "zone": [
+            {
+                "points": [[-4.0, 0.0], [4.0, 0.0], [4.0, 3.0], [-4.0, 3.0]],
+                "liquid": {"density": 2.0, "linear_drag": 1.0, "quadratic_drag": 0.5, "current": [0.5, 0.0]},
+            }
+        ]
+    },
     "layers": {
         "zone": [{"position": [0, 2.9], "radius": 1.0, "to_layer": "ramp"}],
         "wall": [{**_WALL, "layers": ["ramp"]}],

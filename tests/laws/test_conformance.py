@@ -448,6 +448,15 @@ PROOFS: dict[Demand, Proof] = {
         ),
         velocity(2.0, -2.0),
     ),
+    # a disc that displaces half its mass falls at half of gravity
+    Demand.BUOYANCY: Proof(
+        scene(
+            world=GRAVITY,
+            ball=[ball()],
+            zone=[{"points": [[-9, -9], [9, -9], [9, 9], [-9, 9]], "liquid": {"density": 0.5 / (math.pi * 0.25**2)}}],
+        ),
+        velocity(0.0, -5.0),
+    ),
     # its right side reaches the sensor at x = 0.75, and its left side leaves it at x = 1.75
     Demand.SENSORS: Proof(
         scene(ball=[ball(vx=2.0)], sensor=[{"points": [[1.0, -1.0], [1.5, -1.0], [1.5, 1.0], [1.0, 1.0]]}]),

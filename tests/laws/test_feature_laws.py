@@ -48,7 +48,7 @@ STEPS = 30
 
 SAMPLE = (
     "attractions", "thrusts", "wall", "kicking wall", "drifting wall", "one-way wall", "groups", "kinematic body",
-    "path", "one-way body",
+    "path", "one-way body", "liquid",
     "holding zone", "sensors", "layers", "bounds", "damping", "pockets", "pucks", "emitter", "rope", "torque drive",
     "plunger drive", "pivot between two", "pulley between two", "friction of the ground", "weak spring",
 )  # fmt: skip

@@ -51,6 +51,7 @@ JOINTED: dict[Demand, dict[str, Any]] = {
 }
 
 PATH = {"points": [[0, 0], [1, 0]], "speed": 1}
+POOL = {"points": [[0, 0], [9, 0], [0, 9]], "liquid": {"density": 1}}
 CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.TRANSLATION, True, {"ball": [BALL, BALL, ROCK]}, "2 bodies move"),
     (Demand.TRANSLATION, True, {"ball": [BALL]}, "1 body moves"),
@@ -164,6 +165,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.LAYERS, False, {"ball": [BALL], "plane": [PLANE]}, "all bodies are in one layer"),
     (Demand.EVENTS, True, {"ball": [NAMED], "event": [{"kind": "remove", "time": 1, "body": "a"}]}, "1"),
     (Demand.ZONES, True, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "1"),
+    (Demand.BUOYANCY, True, {"ball": [BALL], "zone": [POOL]}, "1 zone has a liquid"),
+    (Demand.BUOYANCY, False, {"ball": [BALL], "zone": [{"position": [9, 9], "radius": 1}]}, "no zone has a liquid"),
     (Demand.SENSORS, True, {"ball": [BALL], "sensor": [{"position": [9, 9], "radius": 1}]}, "1"),
 ]
 

@@ -88,6 +88,8 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
     ("text", "remedy"),
     [
         (f"{BALL}bullet = true", "sandbox check"),
+        (f"{BALL}buoyancy = 2.0", "`liquid`"),
+        ("[[water]]\ndensity = 1000", "`liquid`"),
         (f"{BALL}isSensor = true", r"\[\[sensor\]\]"),
         (f"{BALL}gravityScale = 0.5", "did you mean 'gravity_scale'"),
         (f"{BALL}elevation = 0.5", "`spin`"),

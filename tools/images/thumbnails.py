@@ -91,6 +91,7 @@ MOMENTS = {
     "games/conveyor": Moment(3.0),
     "games/curling": Moment(60.0, player="random"),
     "games/demolition": Moment(2.6),
+    "games/harbour": Moment(1.2, box=((-8.6, -4.4), (10.4, 4.4))),
     "games/landing": Moment(4.8, trail=4.8),
     "games/moving_platforms": Moment(1.75, trail=1.7),
     "games/rube_goldberg": Moment(6.0),

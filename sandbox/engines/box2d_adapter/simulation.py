@@ -119,7 +119,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _apply_forces(self, time: float, length: float) -> None:
         """Apply the forces of a step of Box2D that starts at a time, s, and takes a length, s.
 
-        They are constant forces, attraction, thrusts and springs, and the air.
+        They are constant forces, attraction, thrusts, springs, liquids and the air.
         """
         store, air = self._store, self._air
         force, torque = store.force.copy(), store.torque.copy()
@@ -135,6 +135,10 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             torque += np.where(moving, store.bodies.moment * acceleration[:, 2], 0.0)
         if self._joints.has_springs:
             self._joints.add_spring_forces(force, torque)
+        if self._field.liquids is not None:
+            weight = np.where(moving[:, None], mass[:, None] * store.world_gravity, 0.0)
+            by_liquids = self._field.liquid_loads((force + weight, torque), length)
+            force, torque = force + by_liquids[0], torque + by_liquids[1]
         if self._has_air_forces:
             world_gravity, applied = store.world_gravity, force / mass[:, None]
             state = store.velocity, store.angular_velocity

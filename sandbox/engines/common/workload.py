@@ -14,7 +14,7 @@ DETECTION_COST = 10
 
 
 def overload(setup: Setup, settings: Settings) -> list[str]:
-    """Return why a step would take too long: because of its iterations, or of its attractions."""
+    """Return why a step would take too long: because of its iterations, attractions or liquids."""
     scene, bodies = setup.scene, setup.bodies
     can_collide = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
     is_moving = can_collide & ~bodies.fixed
@@ -34,4 +34,8 @@ def overload(setup: Setup, settings: Settings) -> list[str]:
         f"{len(scene.attractions):,} attractions of {len(bodies):,} bodies need this many pairs per step:",
         len(scene.attractions) * len(bodies) * settings.substeps,
     )
-    return [reason for reason in (solver_refusal, attraction_refusal) if reason is not None]
+    liquid_refusal = PAIRS.refusal(
+        f"{len(scene.liquids):,} liquids and {len(bodies):,} bodies need this many pairs per step:",
+        len(scene.liquids) * len(bodies) * settings.substeps,
+    )
+    return [reason for reason in (solver_refusal, attraction_refusal, liquid_refusal) if reason is not None]

@@ -1,4 +1,4 @@
-"""The field of a running scene: accelerations by its attractions and thrusts, for engines that evaluate forces."""
+"""The field of a running scene: attractions, thrusts and liquids, for engines that evaluate forces."""
 
 import math
 
@@ -9,6 +9,7 @@ from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.geometry import length_and_direction, rotate
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.forces.attraction import pull
+from sandbox.engines.forces.liquid import Liquids, Loads
 from sandbox.engines.forces.thrust import ThrustColumns, load
 from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.geometry.shapes import geometry_of
@@ -107,7 +108,7 @@ def add_thrusts(
 
 
 class ForceField:
-    """Attractions and thrusts of a running scene."""
+    """Attractions, thrusts and liquids of a running scene. A call evaluates the attractions and thrusts."""
 
     def __init__(self, store: BodyStore) -> None:
         self._store, self._began = store, store.setup.time
@@ -135,6 +136,9 @@ class ForceField:
             begin=np.asarray([t.begin for t in thrusts], np.float64),
             end=np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64),
         )
+
+        self.liquids = Liquids(scene) if scene.liquids else None
+        """liquids of zones; None without any"""
 
     @property
     def empty(self) -> bool:
@@ -166,6 +170,41 @@ class ForceField:
     def thrusting(self) -> bool:
         """Whether there are thrusts."""
         return len(self.thrusts.body) > 0
+
+    def by_liquids(self, time: float, x: FloatArray) -> FloatArray:
+        """Return the accelerations (N, D) by liquids in a state (2, N, D), m/s² and rad/s²."""
+        del time
+        store, liquids = self._store, self.liquids
+        assert liquids is not None
+        turns = x.shape[2] == 3
+        pose = x[0] if turns else np.column_stack((x[0], store.angle))
+        submerged = self._submerged(pose)
+        force, torque = liquids.buoyancy(submerged, store.scene.world.gravity)
+        if liquids.has_drag:
+            rates = x[1, :, :2], x[1, :, 2] if turns else np.zeros(len(pose))
+            pull, turn = liquids.drag(submerged, rates, liquids.resistance(submerged, rates))
+            force, torque = force + pull, torque + turn
+        linear = force * store.inverse_mass[:, None]
+        return np.column_stack((linear, torque * store.inverse_moment)) if turns else linear
+
+    def liquid_loads(self, applied: Loads, h: float) -> Loads:
+        """Return the mean forces, N, and torques, N·m, of liquids on all bodies in a step of h, s, from the present.
+
+        Args:
+            applied: other forces, with the weight, and torques.
+            h: step, s.
+        """
+        store, liquids = self._store, self.liquids
+        assert liquids is not None
+        submerged = self._submerged(np.column_stack((store.position, store.angle)))
+        rates, inertia = (store.velocity, store.angular_velocity), (store.inverse_mass[:, None], store.inverse_moment)
+        return liquids.step_loads(submerged, rates, applied, inertia, store.scene.world.gravity, h)
+
+    def _submerged(self, pose: FloatArray) -> FloatArray:
+        """Return the submerged moments (N, L, 4) of bodies at poses (N, 3); liquids act on those that forces move."""
+        assert self.liquids is not None
+        store = self._store
+        return self.liquids.submerged(store.bodies, store.layer, store.inverse_mass > 0.0, pose)
 
     def by_thrusts(self, time: float, x: FloatArray) -> FloatArray:
         """Return the accelerations (N, D) by thrusts alone, m/s² and rad/s²."""

@@ -152,10 +152,10 @@ class PymunkBodies(BodyStore):
     def _needs_space(self) -> BoolArray:
         """(N,) bodies that only the space can move: kinematic ones, those with thrusts, drives or speed limits.
 
-        All bodies if they attract each other or can fall asleep.
+        All bodies if they attract each other, can fall asleep or there is a liquid.
         """
         space_bodies, scene = self.space_bodies, self.scene
-        if space_bodies.field.between_bodies or self._settings.sleeping:
+        if space_bodies.field.between_bodies or self._settings.sleeping or scene.liquids:
             return np.ones(len(self.bodies), dtype=np.bool_)
         if not (scene.thrusts or scene.drives):
             return self.bodies.kinematic | self.bodies.limited

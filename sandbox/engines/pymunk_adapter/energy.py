@@ -5,6 +5,7 @@ work of the drive on a kinematic body follows from its change of momentum, minus
 is kinematic by itself counts as driven too: the drive keeps up its velocity and carries its weight.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,10 @@ class AppliedImpulses(NamedTuple):
     """(N, 2) by air, including its change of other forces, and by damping"""
     angular_drag: FloatArray
     """(N,) by damping, N·m·s"""
+    liquid: FloatArray
+    """(N, 2) by liquids"""
+    angular_liquid: FloatArray
+    """(N,) by liquids, N·m·s"""
 
 
 def applied_impulses(
@@ -72,15 +77,17 @@ def applied_impulses(
         excess = bodies.mass[:, None] * (gravity - np.asarray(world.gravity))
         excess[store.particles.indices] = 0.0
         constant -= excess
-    attraction, (thrust, thrust_torque) = _attraction(store), _thrusts(store)
+    attraction, (thrust, thrust_torque) = _attraction(store), _loads(store, store.space_bodies.thrusts.loads)
+    liquid, liquid_torque = _loads(store, store.space_bodies.liquid_loads)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
     air = store.space_bodies.air
     if air.acts_by_force:
-        applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
+        force = constant + thrust + liquid + (0.0 if springs is None else springs)
+        applied = force / bodies.mass[:, None] + attraction
         mean = mean_acceleration(air, ALL, gravity, before.velocity, before.spin, applied, store.h)
         drag = mass * (mean - gravity - applied) * h
     if air.damps_bodies:
-        turning = (torque + thrust_torque) / bodies.moment
+        turning = (torque + thrust_torque + liquid_torque) / bodies.moment
         mean_turning = mean_angular_acceleration(air, ALL, before.spin, turning, store.h)
         is_damped = included & (air.angular_damping > 0.0)
         angular_drag = np.where(is_damped, bodies.moment * (mean_turning - turning) * h, 0.0)
@@ -91,7 +98,8 @@ def applied_impulses(
     driven = np.where(included[:, None], constant + thrust, 0.0)
     angular = np.where(included, torque + thrust_torque, 0.0)
     weight = mass * (gravity + attraction) * h
-    return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag)
+    by_liquid = np.where(included[:, None], liquid, 0.0) * h, np.where(included, liquid_torque, 0.0) * h
+    return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag, *by_liquid)
 
 
 def _constant_forces(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
@@ -115,10 +123,10 @@ def _attraction(store: PymunkBodies) -> FloatArray:
     return attraction
 
 
-def _thrusts(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
-    """Return the thrusts (N, 2), N, and their torques (N,), N·m, in the last substep."""
+def _loads(store: PymunkBodies, loads: Mapping[int, tuple[float, float, float]]) -> tuple[FloatArray, FloatArray]:
+    """Return loads of bodies, by their indices, as forces (N, 2), N, and torques (N,), N·m."""
     force, torque = np.zeros_like(store.position), np.zeros(len(store.position))
-    for index, (x, y, turning) in store.space_bodies.thrusts.loads.items():
+    for index, (x, y, turning) in loads.items():
         force[index], torque[index] = (x, y), turning
     return force, torque
 
@@ -322,6 +330,8 @@ class PymunkEnergyLedger:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
         account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1]) + applied.angular_drag @ spin[:-1]))
         account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
+        by_liquids = np.sum(applied.liquid * velocity[:-1]) + applied.angular_liquid @ spin[:-1]
+        account.add(Cause.LIQUID, float(by_liquids))
         account.add(Cause.SPEED_LIMITS, by_limits.work(velocity, spin))
         account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
         normal_work, tangential_work, kick_work, surface_work = points.work(velocity, spin)
@@ -441,7 +451,9 @@ class PymunkEnergyLedger:
         p = self._store
         mass, moment = np.where(included, p.bodies.mass, 0.0), np.where(included, p.bodies.moment, 0.0)
         linear = mass[:, None] * (now.velocity - before.velocity) - applied.weight - applied.driven - applied.drag
+        linear -= applied.liquid
         angular = moment * (now.spin - before.spin) - applied.angular - applied.angular_drag
+        angular -= applied.angular_liquid
         rigid = p.space_bodies.joints.by_kind.rigid
         return ImpulseSums(np.vstack((linear, np.zeros((1, 2)))), np.append(angular, 0.0), np.union1d(rigid.a, rigid.b))
 

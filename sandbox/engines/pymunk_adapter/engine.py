@@ -43,6 +43,7 @@ OWN = frozenset(
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
+        Demand.BUOYANCY,
         Demand.LAYERS,
         Demand.CATEGORIES,
         Demand.GROUPS,

@@ -27,8 +27,8 @@ def combination_faults(scene: Scene, settings: Settings, wanted: frozenset[Deman
         found += [f"half_kick does not support {demand}" for demand in air]
     if half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
         found.append("half_kick supports gravity only, and the scene has other forces")
-    if half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
-        found.append("half_kick does not support zones with their own gravity")
+    if half_kick and any(zone.moves_bodies for zone in scene.zones):
+        found.append("half_kick does not support zones with gravity or a liquid of their own")
     if half_kick:
         of_bodies = sorted(wanted & {Demand.GRAVITY_SCALE, Demand.SPEED_LIMITS})
         found += [f"half_kick does not support {demand}" for demand in of_bodies]

@@ -1,7 +1,7 @@
 """Bodies in the pymunk space: their creation, steps and state."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.forces.air import Air, mean_fraction, rates
+from sandbox.engines.forces.liquid import Liquids, Loads
 from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader, StateCheck, state_check
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
@@ -84,6 +85,12 @@ class SpaceBodies:
         self.contact_reader = ContactReader(self._space, self._reader, self._surface_setter.pair_callbacks)
         """reads the contacts of the space"""
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
+        self.liquids = Liquids(scene) if scene.liquids else None
+        """liquids of zones; None without any"""
+        self.liquid_loads: dict[int, tuple[float, float, float]] = {}
+        """force (x, y), N, and torque, N·m, of liquids on each body in the last substep, by body index"""
+        self._bodies = setup.bodies
+        self._floating: set[int] = set()  # bodies on which liquids act
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._paths = SpacePaths(setup.time, settings.h)
@@ -121,7 +128,7 @@ class SpaceBodies:
             skip_numbers(self._space, to_skip - self._skipped_numbers)
             self._skipped_numbers = to_skip
         self._static_shapes.create(self._scene, self._setup.plane_reach, bodies, self._surface_of_fixed)
-        self._moments = bodies.moment
+        self._bodies, self._moments = bodies, bodies.moment
         self._polygons = self._polygons or not bodies.round.all()
         order = np.asarray(shuffled(len(indices)))
         states = np.column_stack((position, angle, velocity, angular_velocity, bodies.mass[indices], moment))
@@ -267,6 +274,7 @@ class SpaceBodies:
         elif index in bodies.paths:
             self._paths.join(index, bodies.paths[index], body)
         elif not (fixed or kinematic):
+            self._floating.add(index)
             if self.field.attracts:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
@@ -333,6 +341,8 @@ class SpaceBodies:
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
             self.thrusts.leave(index)
+            self.liquid_loads.pop(index, None)
+            self._floating.discard(index)
             self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
@@ -437,17 +447,65 @@ class SpaceBodies:
                 self.limit_changes.append((index, change * x, change * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
-        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts and the air."""
+        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts, liquids and the air."""
         if self._paths:
             self._paths.before(time)
+        if self.liquids is not None:
+            self._apply_liquids(time, self.liquids)
+            return
         if self.air.acts_by_force:
             self.thrusts.update_loads(time, self._h)
-            self._apply_air(*self._read())
+            self._apply_air(*self._read(), self.thrusts.loads)
             return
         if self.constant_forces:
             self.constant_forces.apply(self._body)
         if self.thrusts:
             self.thrusts.apply(time, self._h, self.constant_forces.total)
+
+    def _apply_liquids(self, time: float, liquids: Liquids) -> None:
+        """Set the forces of a substep that starts at a time, s, in a scene with liquids.
+
+        pymunk moves positions by the old velocities first: the liquids act on the poses that this leads to.
+        """
+        self.thrusts.update_loads(time, self._h)
+        indices, state = self._read()
+        bodies, gravity, h = self._bodies, self._scene.world.gravity, self._h
+        states, acts = np.zeros((len(bodies), 6)), np.zeros(len(bodies), np.bool_)
+        states[indices], floating = state, sorted(self._floating - self._resting.keys())
+        acts[floating] = True
+        submerged = liquids.submerged(bodies, self.layer, acts, states[:, 0:3] + h * states[:, 3:6])
+        force, torque = self._constant_loads()
+        force += bodies.mass[:, None] * np.asarray(gravity)
+        inertia = 1.0 / bodies.mass[:, None], 1.0 / bodies.moment
+        liquid_loads = liquids.step_loads(
+            submerged, (states[:, 3:5], states[:, 5]), (force, torque), inertia, gravity, h
+        )
+        loads = np.column_stack(liquid_loads)[floating].tolist()
+        self.liquid_loads = {n: (x, y, turn) for n, (x, y, turn) in zip(floating, loads, strict=True)}
+        both = dict(self.thrusts.loads)
+        for n, (x, y, turn) in self.liquid_loads.items():
+            fx, fy, torque_of_thrust = both.get(n, (0.0, 0.0, 0.0))
+            both[n] = fx + x, fy + y, torque_of_thrust + turn
+        if self.air.acts_by_force:
+            self._apply_air(*self._read(), both)
+            return
+        for n, (constant, constant_torque) in self.constant_forces.items():
+            fx, fy, turn = both.get(n, (0.0, 0.0, 0.0))
+            both[n] = fx + float(constant[0]), fy + float(constant[1]), turn + constant_torque
+        for n, (x, y, turn) in both.items():
+            record = self._members[n].body._body
+            lib.cpBodySetForce(record, (x, y))
+            lib.cpBodySetTorque(record, turn)
+
+    def _constant_loads(self) -> Loads:
+        """Return constant forces (N, 2), N, and torques (N,), N·m, with those of thrusts, on all bodies."""
+        force, torque = np.zeros((len(self._bodies), 2)), np.zeros(len(self._bodies))
+        for n, (constant, turn) in self.constant_forces.items():
+            force[n], torque[n] = constant, turn
+        for n, (x, y, turn) in self.thrusts.loads.items():
+            force[n] += (x, y)
+            torque[n] += turn
+        return force, torque
 
     @property
     def can_batch(self) -> bool:
@@ -543,9 +601,15 @@ class SpaceBodies:
         """Enter the contacts of a batch into a log, as `ContactReader.read_batch`."""
         return self.contact_reader.read_batch(lists, log, times, self._polygons)
 
-    def _apply_air(self, indices: IntArray, state: FloatArray) -> None:
-        """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene whose air acts."""
-        springs, loads = self._springs(indices, state), self.thrusts.loads
+    def _apply_air(self, indices: IntArray, state: FloatArray, loads: Mapping[int, tuple[float, float, float]]) -> None:
+        """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene whose air acts.
+
+        Args:
+            indices: (R,) the bodies.
+            state: (R, 6).
+            loads: force (x, y), N, and torque, N·m, of thrusts and liquids, by body index.
+        """
+        springs = self._springs(indices, state)
         self.constant_forces.apply_with_air(
             self._body, loads, self._reader, (indices, state), springs, self.air, self._scene.world.gravity, self._h
         )

@@ -9,7 +9,7 @@ which is ½μ(1 − e²)u² for an impact, μ m g s for sliding, and 0 for a res
 kinetic energy, J·(kick)/2, reverses a change by the integrator; it is attributed to the integrator, as are positions
 that follow velocities. Joints solved by positions are treated in the same way, by their change of velocity; position
 changes beyond that count as position correction. An impact within a step is entered with the velocities just before and
-after it. Attraction, drag, damping and drives are entered with their work along the actual path of each body.
+after it. Attraction, drag, liquids, damping and drives are entered with their work along the actual path of each body.
 """
 
 import math
@@ -70,7 +70,9 @@ class StepEnergyLedger:
         self._no_spin: FloatArray = np.zeros(len(moving))
         u = self._forces
         has_constant_forces = store.force.any() or store.torque.any() or self._zone_weight.any()
-        has_varying_forces = u.damped or self._field.thrusting or self._penalty is not None
+        has_varying_forces = (
+            u.damped or self._field.thrusting or self._field.liquids is not None or self._penalty is not None
+        )
         self._has_work = bool(has_constant_forces or has_varying_forces)
         self._compliant = self._joints is not None and self._joints.method == "xpbd"
 
@@ -156,9 +158,11 @@ class StepEnergyLedger:
         start, free, placed = motion.start, motion.free, motion.placed
         shift = 0.0 if motion.shift is None else motion.shift
         work = self._work(record.time, start, np.stack((after[0] - shift, end)), h)
-        for cause in (Cause.DRAG, Cause.DAMPING, Cause.DRIVES):
+        for cause in (Cause.DRAG, Cause.LIQUID, Cause.DAMPING, Cause.DRIVES):
             self.account.add(cause, work[cause])
-        forces = work[Cause.DRAG] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
+        forces = (
+            work[Cause.DRAG] + work[Cause.LIQUID] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
+        )
 
         joint_change = placed[1] - free[1]  # by joints that are solved by positions
         displaced = bool(joint_change.any())
@@ -202,7 +206,7 @@ class StepEnergyLedger:
         return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
 
     def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
-        """Return the work, J, of drag, damping and drives along the path of a step, a parabola between its ends."""
+        """Return the work, J, of drag, liquids, damping and drives along the path of a step, a parabola."""
         work = dict.fromkeys(Cause, 0.0)
         if h <= 0.0 or not self._has_work:
             return work
@@ -228,6 +232,8 @@ class StepEnergyLedger:
             yield Cause.DRIVES, float(store.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
         if self._zone_weight.any():  # gravity of zones in excess of the world's
             yield Cause.DRIVES, float((self._zone_weight * rate[:, :2]).sum())
+        if self._field.liquids is not None:
+            yield Cause.LIQUID, self._product(self._field.by_liquids(time, x), rate)
         if self._field.thrusting:
             yield Cause.DRIVES, self._product(self._field.by_thrusts(time, x), rate)
         if self._penalty is not None:

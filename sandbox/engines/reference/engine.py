@@ -123,6 +123,7 @@ class ReferenceEngine:
         Demand.ROLLING,
         Demand.ATTRACTION,
         Demand.THRUST,
+        Demand.BUOYANCY,
         Demand.LAYERS,
         Demand.CATEGORIES,
         Demand.GROUPS,
@@ -213,7 +214,7 @@ class ReferenceEngine:
         choices: dict[str, object] = {**DEFAULT_METHODS, "slop": slop_of(setup), "bias": BIAS, "persistence": 1}
         if len(setup.joints):
             choices["joints"] = "impulses"
-        if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
+        if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION, Demand.BUOYANCY}:
             choices["integrator"] = "semi_implicit_euler"  # with explicit Euler, oscillations gain energy
         choices["integrator"] = JOINT_INTEGRATORS.get(settings.joints or "impulses", choices["integrator"])
         if settings.response == "penalty":

@@ -1,4 +1,4 @@
-"""External forces: gravity, air, attraction, thrust and springs, as inputs of the integrators."""
+"""External forces: gravity, air, attraction, thrust, liquids and springs, as inputs of the integrators."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
 
     Args:
         store: the bodies, and the constant forces on them.
-        field: attractions and thrusts.
+        field: attractions, thrusts and liquids.
         joints: solver of the joints, if there are any.
         coordinates: D of a state: 2, or 3 if a body turns.
     """
@@ -30,6 +30,8 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     if coordinates == 3:
         constant[:, 2] = store.torque * store.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
+    if field.liquids is not None:
+        forces.append(field.by_liquids)
     springs = store.setup.joints.of(JointKind.SPRING, JointKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(joints.forces_at)
@@ -38,5 +40,5 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         Air.of(store.scene.world, store.bodies, store.present),
         moving.astype(np.float64),
         forces=tuple(forces),
-        damped_forces=bool(springs.figures[:, 2].any()),
+        damped_forces=bool(springs.figures[:, 2].any()) or (field.liquids is not None and field.liquids.has_drag),
     )

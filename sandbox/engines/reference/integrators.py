@@ -45,7 +45,7 @@ class Inputs(NamedTuple):
     contacts: Callable[[State], FloatArray] | None = None
     """penalty contacts: acceleration (N, D) in a state"""
     forces: tuple[Callable[[float, State], FloatArray], ...] = ()
-    """springs, attraction and thrusts: acceleration (N, D) of each as a function of time and state"""
+    """springs, attraction, thrusts and liquids: acceleration (N, D) of each as a function of time and state"""
     damped_forces: bool = False
     """whether one of these forces depends on velocity"""
 

@@ -172,7 +172,7 @@ def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm
     acted = trajectory.info.get("actions") or scene.events
     if acted or trajectory.names.tolist() != list(bodies.names) or bodies.fixed[number]:
         return None
-    if any(zone.holds or zone.gravity is not None for zone in scene.zones) or _moves_its_own_way(bodies, number):
+    if any(zone.moves_bodies for zone in scene.zones) or _moves_its_own_way(bodies, number):
         return None
     form = _solved(trajectory, scene, number)
     if Demand.ROLLING not in demands(scene):

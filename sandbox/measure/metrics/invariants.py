@@ -68,11 +68,11 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, lift, damping, limit of speed, friction, damper, thrust, drive, event, motor or kinematic body, no
-    joint that gives way or that jerks a body when it becomes taut, and elastic contacts.
+    It has no drag, lift, damping, limit of speed, friction, damper, thrust, drive, liquid, event, motor or kinematic
+    body, no joint that gives way or that jerks a body when it becomes taut, and elastic contacts.
     """
     acts = scene.thrusts or scene.drives or scene.events
-    if demands(scene) & (AIR | {Demand.SPEED_LIMITS}) or acts:
+    if demands(scene) & (AIR | {Demand.SPEED_LIMITS, Demand.BUOYANCY}) or acts:
         return False
     if scene.bodies.kinematic.any():
         return False
@@ -153,7 +153,7 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
         return None
     if scene.thrusts or scene.drives or _acts_on_static(scene):
         return None
-    if any(zone.holds or zone.gravity is not None for zone in scene.zones) or bodies.kinematic.any():
+    if any(zone.moves_bodies for zone in scene.zones) or bodies.kinematic.any():
         return None
     mass = np.where(bodies.fixed, 0.0, bodies.mass)
     explained = (mass @ bodies.gravity_scale) * np.asarray(world.gravity) * run.time[-1]

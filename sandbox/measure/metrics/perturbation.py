@@ -62,7 +62,7 @@ def perturb(
     setup = Setup.of(start)
     scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
     immovable = bodies.fixed | is_driven(scene, bodies)
-    able = ~immovable & (~matrix.free | bool(scene.attractions))
+    able = ~immovable & (~matrix.free | bool(scene.attractions or scene.liquids))
     if not able.any():
         return None
     touching = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * amount)) if touching is None else touching

@@ -14,7 +14,13 @@ from sandbox.measure.preflight.joint_chains import chain_warnings, joint_start_w
 from sandbox.measure.preflight.predictability import event_warnings
 from sandbox.measure.preflight.speed_bound import SpeedBounds
 from sandbox.measure.preflight.stacks import stack_warnings
-from sandbox.measure.preflight.stiffness import damper_warnings, lift_warnings, orbit_warnings, spring_warnings
+from sandbox.measure.preflight.stiffness import (
+    damper_warnings,
+    lift_warnings,
+    liquid_warnings,
+    orbit_warnings,
+    spring_warnings,
+)
 from sandbox.measure.preflight.tunnelling import (
     ANOTHER,
     ANOTHER_BODY,
@@ -297,6 +303,7 @@ CHECKS: dict[str, Check] = {
     "springs": Check(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Check(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
     "lift": Check(lambda s: lift_warnings(s.scene, s.settings), frozenset({"reference"})),
+    "liquids": Check(lambda s: liquid_warnings(s.scene, s.settings), frozenset({"reference"})),
     "orbits": Check(lambda s: orbit_warnings(s.scene, s.settings, s.matrix)),
     "chains": Check(lambda s: chain_warnings(s.scene, s.settings), ITERATED),
     "stretch": Check(lambda s: stretch_warnings(s.scene, s.settings), ITERATED),

@@ -34,7 +34,7 @@ from sandbox.measure.metrics.perturbation import PERTURBATION
 from sandbox.measure.preflight.diagnostic import Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.speed_bound import top_speeds
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.demands import AIR, FLOOR, OWN_MOTION, demands
+from sandbox.scene.compile.demands import AIR, FLOOR, OWN_MOTION, Demand, demands
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.geometry.neighbours import near_pairs
 
@@ -181,7 +181,7 @@ def lyapunov_time(scene: Scene) -> float | None:
         or scene.attractions
     ):
         return None
-    if any(world.gravity) or demands(scene) & (AIR | OWN_MOTION) or bodies.kinematic.any():
+    if any(world.gravity) or demands(scene) & (AIR | OWN_MOTION | {Demand.BUOYANCY}) or bodies.kinematic.any():
         return None
     area = _area(scene)
     if area is None:

@@ -109,6 +109,8 @@ class SpeedBounds:
             found.append("moving surfaces")
         if len(scene.joint_arrays.of(*MOTORS)):
             found.append("motors")
+        if scene.liquids:
+            found.append("liquids")
         if scene.events:
             found.append("events")
         if any(thrust.key is not None for thrust in scene.thrusts):

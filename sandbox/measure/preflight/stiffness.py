@@ -1,4 +1,4 @@
-"""Stability limits of the substep: springs, rotary springs, lift and close orbits.
+"""Stability limits of the substep: springs, rotary springs, lift, drag of liquids and close orbits.
 
 The orbit of each body about each centre alone is considered (Kepler's, without softening), at its closest distance:
 there the attraction a rotates the velocity v by a·h/v in a substep. If a body flies straight through a softened centre,
@@ -21,6 +21,7 @@ from sandbox.scene.compile.joint_arrays import JointArrays, JointKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.shapes import area_of
 
 MAX_DENSE = 400
 """Largest number of rows of a matrix that is solved directly."""
@@ -207,6 +208,35 @@ def lift_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         f"dt <= {floor_3_digits(safe * settings.substeps)} s keeps it within {100.0 * MAX_SPEED_CHANGE:g} %"
     )
     yield Diagnostic("lift", message, {"body": name, "turn": fastest * settings.h})
+
+
+def liquid_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for the body and liquid whose drag makes the reference engine diverge, if there is one.
+
+    It evaluates the drag as a force: v becomes v·(1 − κ A h/m), as with dampers. The area is that of the whole body,
+    and κ that at its start velocity through the liquid. pymunk and box2d take the drag implicitly, without a limit.
+    """
+    bodies, worst, found = scene.bodies, 0.0, None
+    if not scene.liquids:
+        return
+    area = np.asarray([area_of(element) for element in bodies.elements])[bodies.element]
+    limit = DAMPER_LIMITS.get(settings.integrator or "", DAMPER_LIMIT)
+    for zone in scene.liquids:
+        assert zone.liquid is not None
+        speed = np.hypot(*(bodies.velocity - np.asarray(zone.liquid.current)).T)
+        kappa = zone.liquid.linear_drag + zone.liquid.quadratic_drag * speed
+        slowed = np.where(bodies.immovable, 0.0, kappa * area / bodies.mass * settings.h)
+        if len(slowed) and float(slowed.max()) > worst:
+            worst, found = float(slowed.max()), bodies.names[int(slowed.argmax())]
+    if found is None or worst < limit * (1.0 - ROUNDING):
+        return
+    safe = settings.dt * limit / worst
+    message = (
+        f"the drag of the liquid on {found!r} is too strong for the step on reference: κ·A·h/m = {worst:.3g} is "
+        f"unstable (limit {limit:.3g})"
+    )
+    details: Details = {"body": found, "damping_h": worst, "limit": limit, "safe_dt": safe}
+    yield Diagnostic("liquid", message, details, f"use dt <= {floor_3_digits(safe)} s or the engine pymunk")
 
 
 class SpringMode(NamedTuple):

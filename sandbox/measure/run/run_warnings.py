@@ -82,7 +82,7 @@ def _may_gain(run: Trajectory, scene: Scene) -> bool:
 
 
 def _remedy(info: Mapping[str, Any], scene: Scene) -> str:
-    oscillates = len(scene.joint_arrays) > 0 or bool(scene.attractions)
+    oscillates = len(scene.joint_arrays) > 0 or bool(scene.attractions or scene.liquids)
     if info["engine"] == "reference" and info["settings"]["integrator"] == "explicit_euler" and oscillates:
         return "; explicit Euler gains energy in every oscillation: use solver.integrator = 'semi_implicit_euler'"
     return "; use a smaller dt or more substeps"

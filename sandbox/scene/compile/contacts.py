@@ -228,7 +228,7 @@ class ContactMatrix:
     """(N,) can enter a zone; driven bodies are not detected"""
     turnable: BoolArray
     """(N,) can change its spin: by friction or rolling resistance; for other shapes than balls by any contact; by
-    joints, thrusts, drives or damping of its own"""
+    joints, thrusts, drives, damping of its own or a liquid"""
     mutual: bool
     """whether two bodies can touch"""
     ball_ball: bool
@@ -384,6 +384,7 @@ def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
             | _thrust_turned(scene, bodies)
             | is_driven(scene, bodies, turning=True)
             | (bodies.angular_damping > 0.0)
+            | bool(scene.liquids)
         )
         & ~bodies.fixed
         & (bodies.moment < UNTURNABLE),

@@ -67,6 +67,7 @@ class Demand(StrEnum):
     JOINT_BIAS = "bias of joints"
     ATTRACTION = "attraction"
     THRUST = "thrust"
+    BUOYANCY = "buoyancy"
     DRIVES = "drives"
     BOUNDS = "bounds"
     LIFETIMES = "lifetimes"
@@ -251,6 +252,12 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     one_way = len(bodies.one_way)
     yield Demand.ONE_WAY_BODIES, one_way > 0, _count(one_way, "one-way body", "one-way bodies", "none")
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
+    liquids = len(scene.liquids)
+    yield (
+        Demand.BUOYANCY,
+        liquids > 0,
+        _count(liquids, "zone has a liquid", "zones have a liquid", "no zone has a liquid"),
+    )
     yield Demand.SENSORS, bool(scene.sensors), f"{len(scene.sensors):,}" if scene.sensors else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
     limited = int(np.isfinite(bodies.lifetime).sum())

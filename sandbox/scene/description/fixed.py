@@ -24,6 +24,7 @@ from sandbox.scene.description.base import (
     PointField,
     Radius,
     Vector,
+    VelocityField,
     default,
 )
 from sandbox.scene.description.world import Kick
@@ -55,6 +56,27 @@ SensorCategories = Annotated[tuple[Name, ...], Field(min_length=1, max_length=32
 """Collision categories, by name, at least one."""
 
 
+Coefficient = Annotated[float, Field(ge=0, le=1e9)]
+
+
+class Liquid(Part):
+    """The liquid of a zone: buoyancy and drag on the submerged part of each body in the layers of the zone.
+
+    It acts on bodies with `collides = "none"` too, and not on static, kinematic, driven and held ones. Its weight per
+    area is that in the zone's `gravity`, or without one in the world's; `gravity_scale` of a body does not change it.
+    The area of a body is that of its parts: where these overlap, it counts twice, as in its mass.
+    """
+
+    density: Annotated[float, Field(gt=0, le=1e9)]
+    """kg/m²; a body floats if its own density, mass divided by area, is smaller"""
+    linear_drag: Coefficient = 0.0
+    """force of the drag per submerged area and speed, N·s/m³"""
+    quadratic_drag: Coefficient = 0.0
+    """force of the drag per submerged area and square of the speed, N·s²/m⁴"""
+    current: VelocityField = default((0.0, 0.0))
+    """velocity of the liquid, m/s"""
+
+
 class Zone(Part):
     """An area that detects bodies: circle (`position`, `radius`), polygon (`points`), strip (`points`, `thickness`)."""
 
@@ -76,8 +98,15 @@ class Zone(Part):
     """A body that enters is held at the centre, one at a time, until an action moves it, as in a kicker."""
     gravity: Accepts[tuple[Acceleration, Acceleration] | None, Sequence[float] | None] = default(None)
     """gravity for bodies inside the zone and in its layers, m/s²; where zones overlap, the last one applies"""
+    liquid: Liquid | None = None
+    """liquid that fills a polygon"""
     colour: Colour | None = None
     """colour in the window, `#rrggbb`"""
+
+    @property
+    def moves_bodies(self) -> bool:
+        """Whether it changes how bodies move: it holds them, has a gravity of its own, or a liquid."""
+        return self.holds or self.gravity is not None or self.liquid is not None
 
 
 class Sensor(Part):

@@ -122,6 +122,11 @@ class SceneDescription(_Header):
         return self.planes + self.walls + self.posts
 
     @cached_property
+    def liquids(self) -> tuple[Zone, ...]:
+        """Zones with a liquid."""
+        return tuple(zone for zone in self.zones if zone.liquid is not None)
+
+    @cached_property
     def layers(self) -> tuple[str, ...]:
         """Names of the collision layers in the order of their indices; the first is `ground`."""
         named: dict[str, None] = {GROUND: None}

@@ -294,6 +294,7 @@ _FAST = (
 )
 _SENSOR = "a [[sensor]] detects the shapes that overlap it; its key `body` names the body that it moves with"
 _PATH = "a body with kinematic = true moves along a `path`, such as { points = [[0, 0], [4, 0]], period = 4.0 }"
+_LIQUID = "a [[zone]] with `points` can have a `liquid`, such as { density = 1000.0, linear_drag = 500.0 }"
 _ELSEWHERE = {
     "bullet": _FAST,
     "ccd": _FAST,
@@ -301,6 +302,7 @@ _ELSEWHERE = {
     "sensor": _SENSOR,
     "trigger": _SENSOR,
     "area": _SENSOR,
+    **dict.fromkeys(("buoyancy", "buoyancycontroller", "water", "fluid", "fluiddensity", "liquid"), _LIQUID),
     "elevation": "a cue is level; state `velocity` and `spin`, [x, y, z] in rad/s, that the ball has after the stroke",
     **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
     **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),

@@ -88,6 +88,11 @@ def geometry_of(element: BodySource) -> ElementGeometry:
     return _solid_geometry(element)
 
 
+def area_of(element: BodySource) -> float:
+    """Return the area of an element, m², as the sum over its pieces; of a generator, that of one of its bodies."""
+    return math.fsum(_moments(piece).area for piece in geometry_of(element).pieces)
+
+
 UNTURNABLE = 1e42
 """kg·m², moment of inertia of bodies with `fixed_rotation`: no torque in range turns them by a measurable angle"""
 

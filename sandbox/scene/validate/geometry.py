@@ -210,6 +210,8 @@ def check_zones(scene: Scene) -> Iterator[LocatedMessage]:
     for k, zone in enumerate(scene.zones):
         wrong = list(_check_area(("zone", k), zone))
         yield from wrong
+        if zone.liquid is not None and (zone.points is None or zone.thickness is not None):
+            yield ("zone", k, "liquid"), "needs a polygon: `points` without `thickness`, and no `position` and `radius`"
         if not wrong and zone.holds and not contains(zone, middle_of(zone)):
             x, y = middle_of(zone)
             yield ("zone", k, "holds"), f"its centre, ({x:g}, {y:g}) m, is outside the zone, so it cannot hold a body"

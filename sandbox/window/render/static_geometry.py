@@ -13,6 +13,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
+from sandbox.scene.geometry.polygon import anticlockwise
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.render.circles import draw_disc
@@ -28,6 +29,7 @@ from sandbox.window.render.lines import (
 )
 from sandbox.window.render.palette import (
     BACKGROUND,
+    BLUE,
     FAINT,
     GREEN,
     NEUTRAL,
@@ -363,6 +365,12 @@ def _draw_circle(
 
 ZONE_FILL_OPACITY, ZONE_LINE_OPACITY = 0.13, 0.55
 """opacity of the area and of the outline"""
+LIQUID_FILL_OPACITY = 0.3
+"""opacity of the area of a liquid"""
+SURFACE_WIDTH = 3.0
+"""px, width of the surface of a liquid"""
+STEEPEST_SURFACE = 0.5
+"""cosine of the angle between the normal of a side of a liquid and the direction up, from which it is a surface"""
 ZONE_LINE_WIDTH = 1.5
 """px, width of the outline"""
 
@@ -370,7 +378,20 @@ ZONE_LINE_WIDTH = 1.5
 def draw_zones(canvas: Canvas, scene: Scene) -> None:
     """Draw the visible zones of a scene."""
     for zone in scene.zones:
-        draw_area(canvas, zone, colour_of_zone(zone), ZONE_FILL_OPACITY, ZONE_LINE_OPACITY)
+        fill = ZONE_FILL_OPACITY if zone.liquid is None else LIQUID_FILL_OPACITY
+        draw_area(canvas, zone, colour_of_zone(zone), fill, ZONE_LINE_OPACITY)
+        if zone.liquid is not None and zone.points is not None:
+            _draw_surface(canvas, zone.points, zone.gravity or scene.world.gravity, colour_of_zone(zone))
+
+
+def _draw_surface(canvas: Canvas, points: tuple[Point, ...], gravity: Point, colour: RgbColour) -> None:
+    """Draw a line along the sides of a liquid that face up."""
+    pull, corners = math.hypot(*gravity), anticlockwise(points)
+    for (ax, ay), (bx, by) in pairwise((*corners, corners[0])):
+        rise = (ax - bx) * gravity[1] - (ay - by) * gravity[0]  # along the outward normal, (by − ay, ax − bx)
+        if pull and -rise >= STEEPEST_SURFACE * pull * math.hypot(bx - ax, by - ay):
+            (x0, y0), (x1, y1) = canvas.camera.to_screen(np.array([[ax, ay], [bx, by]])).tolist()
+            draw_line(canvas.surface, (x0, y0), (x1, y1), colour, SURFACE_WIDTH * canvas.ui_scale, canvas.antialias)
 
 
 def draw_area(canvas: Canvas, area: Zone | Sensor, colour: RgbColour, fill: float, line: float) -> None:
@@ -390,6 +411,8 @@ def colour_of_zone(zone: Zone) -> RgbColour:
         return ORANGE
     if zone.to_layer is not None:
         return GREEN
+    if zone.liquid is not None:
+        return BLUE
     return FAINT if zone.gravity is None else SKY
 
 

@@ -30,6 +30,7 @@ material = "steel"
         toml("zone", name="round", position=[-5.0, 3.0], radius=0.4, gravity=[1.0, 1.0]),
         toml("zone", points=[[-9, 5], [-8, 5], [-8, 6]], to_layer="ramp"),
         toml("zone", points=[[-9, 7], [-8, 7], [-8, 8]], thickness=0.3, layers=["ramp"]),
+        toml("zone", name="pool", points=[[-9, -4], [-8, -4], [-8, -3], [-9, -3]], liquid={"density": 2.0}),
         toml("sensor", name="gate", points=[[-9, 9], [-8, 9], [-8.3, 9.5], [-8, 10]], colour="#ff0000"),
         toml("sensor", name="feet", body="ship", points=[[-0.4, -0.6], [0.4, -0.6]], thickness=0.2),
         toml("sensor", body="g-2", position=[0.5, 0.0], radius=0.3),
