@@ -247,3 +247,14 @@ def test_joints_of_bodies_and_joints_that_have_left_are_passed_over(engine: str)
     run = sandbox.run(scene, engine)
     assert (run.status, run.info["reason"]) == ("ok", None)
     assert run.broken_time[0] < 0.7
+
+
+def test_energy_at_the_end_of_a_run_is_that_of_the_present_gravity() -> None:
+    """At rest 1 m above 0 with 2 kg, gravity falls from 10 to 5 m/s²: 10 J less are stored."""
+    shelf = {"points": [[-1.0, 0.9], [1.0, 0.9]]}
+    event = {"kind": "set", "time": 0.5, "path": "world.gravity", "value": [0.0, -5.0]}
+    ball = {"name": "a", "position": [0.0, 1.0], "radius": 0.1, "mass": 2.0}
+    world = {"gravity": [0.0, -10.0], "duration": 1.0}
+    run = sandbox.run(from_document({"world": world, "ball": [ball], "wall": [shelf], "event": [event]}), "reference")
+    assert run.info["energy_start"] == pytest.approx(20.0, rel=1e-9)
+    assert run.info["energy_end"] == pytest.approx(10.0, abs=0.02)  # slop of the contact

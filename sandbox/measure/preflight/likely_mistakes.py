@@ -1,4 +1,7 @@
-"""Notes on values that are valid but probably not meant: pixels, gravity upwards, degrees, multiplied restitution."""
+"""Notes on values that are valid but probably not meant.
+
+They are pixels, gravity upwards, degrees, restitution that is multiplied, and events after the end.
+"""
 
 import json
 import math
@@ -33,6 +36,17 @@ def likely_mistakes(scene: Scene) -> Iterator[Diagnostic]:
     yield from pixels or _gravity_upwards(scene)
     yield from _degrees(scene)
     yield from _multiplied_restitution(scene)
+    yield from _late_events(scene)
+
+
+def _late_events(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a note if events are at the end of a run without a window, or later."""
+    end = scene.world.duration
+    late = [event for event in scene.events if event.time >= end]
+    if late:
+        many = f"{format_plural(len(late), 'event')}, the first at {min(event.time for event in late):g} s,"
+        message = f"{many} would be after the last step of a run, which ends at {end:g} s (world.duration)"
+        yield Diagnostic("late_events", message, {"events": len(late)})
 
 
 def _pixels(scene: Scene) -> Iterator[Diagnostic]:

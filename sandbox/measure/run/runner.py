@@ -206,7 +206,9 @@ def _recorded_run(
     )
     trajectory = trajectory if audit is None else audit.with_slender_passages(trajectory)
     total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
-    if simulation.joined:
+    if (
+        simulation.joined or simulation.scene.world != setup.scene.world
+    ):  # actions have added springs, or changed gravity
         total[-1] = total_energy(simulation)
     info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
     worst = joint_error(trajectory, setup)

@@ -42,6 +42,13 @@ def test_gravity_upwards_has_a_note(text: str, kinds: list[str]) -> None:
     assert [each.kind for each in found(text)] == kinds
 
 
+@pytest.mark.parametrize(("time", "kinds"), [(3.0, ["late_events"]), (2.99, [])])
+def test_event_after_the_end_of_a_run_has_a_note(time: float, kinds: list[str]) -> None:
+    event = f"[[event]]\ntime = {time}\nkind = 'remove'\nbody = 'ball-1'\n"
+    text = ball(-9.81, FLOOR + event).replace("[world]", "[world]\nduration = 3.0")
+    assert [each.kind for each in found(text)] == kinds
+
+
 @pytest.mark.parametrize(("angle", "radians"), [("45", "0.7854"), ("-90", "-1.571"), ("6.2832", None), ("0.8", None)])
 def test_angle_beyond_a_turn_is_given_in_radians(angle: str, radians: str | None) -> None:
     box = f"[[box]]\nname = 'b'\nposition = [0, 5]\nsize = [1, 1]\nangle = {angle}\n"
