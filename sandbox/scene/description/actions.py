@@ -167,8 +167,8 @@ class SetParameter(Timed):
 
     Parameters that can change are `world.gravity`, `world.wind`, `world.linear_drag`, `world.quadratic_drag`,
     `world.damping`, `surface.sliding_friction`, `surface.curl`, and every `restitution`, `friction`, `surface_speed`
-    and `surface_velocity`, and `rate`, `max_torque` and `max_force` of the scene's motors, also of those of its prismatic
-    joints and wheels.
+    and `surface_velocity`, and `rate`, `max_torque` and `max_force` of the motors of the scene, also of those of its
+    prismatic joints and wheels.
     """
 
     kind: Literal["set"] = default_kind("set")
