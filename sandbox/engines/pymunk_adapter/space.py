@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pymunk
@@ -13,7 +13,6 @@ from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.forces.air import Air, mean_fraction, rates
-from sandbox.engines.forces.liquid import Liquids, Loads
 from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader, StateCheck, state_check
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
@@ -40,6 +39,18 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.forces.liquid import Liquids, Loads
+
+
+def _liquids_of(scene: Scene) -> "Liquids | None":
+    """Return the liquids of a scene; they are compiled, so that they are imported only where there are some."""
+    if not scene.liquids:
+        return None
+    from sandbox.engines.forces.liquid import Liquids
+
+    return Liquids(scene)
 
 
 class SpaceBody(NamedTuple):
@@ -85,7 +96,7 @@ class SpaceBodies:
         self.contact_reader = ContactReader(self._space, self._reader, self._surface_setter.pair_callbacks)
         """reads the contacts of the space"""
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
-        self.liquids = Liquids(scene) if scene.liquids else None
+        self.liquids = _liquids_of(scene)
         """liquids of zones; None without any"""
         self.liquid_loads: dict[int, tuple[float, float, float]] = {}
         """force (x, y), N, and torque, N·m, of liquids on each body in the last substep, by body index"""
@@ -462,7 +473,7 @@ class SpaceBodies:
         if self.thrusts:
             self.thrusts.apply(time, self._h, self.constant_forces.total)
 
-    def _apply_liquids(self, time: float, liquids: Liquids) -> None:
+    def _apply_liquids(self, time: float, liquids: "Liquids") -> None:
         """Set the forces of a substep that starts at a time, s, in a scene with liquids.
 
         pymunk moves positions by the old velocities first: the liquids act on the poses that this leads to.
@@ -497,7 +508,7 @@ class SpaceBodies:
             lib.cpBodySetForce(record, (x, y))
             lib.cpBodySetTorque(record, turn)
 
-    def _constant_loads(self) -> Loads:
+    def _constant_loads(self) -> "Loads":
         """Return constant forces (N, 2), N, and torques (N,), N·m, with those of thrusts, on all bodies."""
         force, torque = np.zeros((len(self._bodies), 2)), np.zeros(len(self._bodies))
         for n, (constant, turn) in self.constant_forces.items():
