@@ -35,11 +35,8 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.fixed import AWAY
-from sandbox.scene.validate.references import check_joints, generators
+from sandbox.scene.validate.references import check_joints, generators, listed_names
 from sandbox.trajectory import Frame
-
-MAX_NAMED = 10
-"""Names that a message lists"""
 
 
 class PersistentActions:
@@ -180,8 +177,7 @@ def removed_joint(action: Unjoin, setup: Setup, broken: Mapping[int, float]) -> 
     """
     found = [k for k, name in enumerate(setup.joints.names) if name == action.joint and k not in broken]
     if not found:
-        known = ", ".join(map(repr, sorted(_intact_joint_names(setup, broken))[:MAX_NAMED])) or "none"
-        raise ActionError(f"no joint is named {action.joint!r}; joints: {known}")
+        raise ActionError(f"no joint is named {action.joint!r}; {listed_names(_intact_joint_names(setup, broken))}")
     return [int(row) for row in setup.joints.whole(np.asarray(found))]
 
 
@@ -189,10 +185,6 @@ def _intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
     """Return the names of the joints that are there."""
     first = setup.joints.part_of == setup.joints.number
     return {setup.joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
-
-
-EVENT_ROUNDING = 1e-6
-"""Fraction of a step by which a time may be beyond a step by rounding"""
 
 
 class EventQueue:

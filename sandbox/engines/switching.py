@@ -38,7 +38,6 @@ from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
 from sandbox.engines.sensors import SensorTracker, join_rows, number_of_sensor
 from sandbox.engines.session_actions import (
-    EVENT_ROUNDING,
     EventQueue,
     PersistentActions,
     added_joint,
@@ -326,7 +325,7 @@ class SwitchableSimulation:
         self._apply_events()
         segment, before = self._segment, frames.steps
         if math.isfinite(self._events.next):
-            steps = max(min(steps, math.ceil((self._events.next - self.time) / self.settings.dt - EVENT_ROUNDING)), 1)
+            steps = max(min(steps, math.ceil((self._events.next - self.time) / self.settings.dt - ROUNDING)), 1)
         # Mouse joints act in each step, sensors detect after each, and frames of a later segment have other indices.
         if self._pulls.any or self._sensors.is_started or segment.before is not None:
             step_and_record(self, 1 if until_event else steps, frames)

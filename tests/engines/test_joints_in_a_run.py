@@ -124,7 +124,7 @@ def test_run_with_joint_actions_is_repeated_by_its_recording(engine: str) -> Non
         (Join(time=0.0, joint=Rod(between=("q",))), "no body is named 'q'"),
         (Join(time=0.0, joint=Rod(between=("a",), anchors=((0.0, 0.0), (1.0, 0.0)))), "no direction"),
         (Join(time=0.0, joint=Rod(name="j", between=("a",))), "already named 'j'"),
-        (Unjoin(time=0.0, joint="q"), "no joint is named 'q'; joints: 'j'"),
+        (Unjoin(time=0.0, joint="q"), "no joint is named 'q'; known names: 'j'"),
         (SetParameter(time=0.0, path="joint.q.rate", value=1.0), "q"),
     ],
     ids=str,

@@ -386,7 +386,7 @@ def test_shapes_that_only_touch_do_not_overlap() -> None:
         ("position = [0.0, 0.0]\nradius = 1.0\npoints = [[0,0],[1,0],[0,1]]", "sensor[0].position", "circle"),
         ("points = [[0.0, 0.0], [1.0, 0.0]]", "sensor[0].points", "three points"),
         ("points = [[0,0],[1,1],[1,0],[0,1]]", "sensor[0].points", "cross"),
-        ('body = "nobody"\nposition = [0.0, 0.0]\nradius = 1.0', "sensor[0].body", "'nobody'"),
+        ('body = "absent"\nposition = [0.0, 0.0]\nradius = 1.0', "sensor[0].body", "'absent'"),
         ('position = [0.0, 0.0]\nradius = 1.0\ndetects = ["heros"]', "sensor[0].detects[0]", "'heros'"),
         ('position = [0.0, 0.0]\nradius = 1.0\nname = "hero"', "sensor.hero.name", "unique"),
     ],

@@ -420,7 +420,7 @@ PROOFS: dict[Demand, Proof] = {
         ),
         both(position(0.325 - 3.0 * 0.675, 0.0), position(0.4, 0.0, body=1)),
     ),
-    # the same with a paddle on a path, at rest for 0.2 s: it hits the ball at 0.425 s and goes on to its end, for 0.6 s
+    # the same with a paddle on a path, which moves from 0.2 to 0.8 s: it hits the ball at 0.425 s
     Demand.PATHS: Proof(
         scene(
             ball=[ball(vx=1.0, restitution=1.0)],

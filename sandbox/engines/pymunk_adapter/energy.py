@@ -78,7 +78,8 @@ def applied_impulses(
         excess[store.particles.indices] = 0.0
         constant -= excess
     attraction, (thrust, thrust_torque) = _attraction(store), _loads(store, store.space_bodies.thrusts.loads)
-    liquid, liquid_torque = _loads(store, store.space_bodies.liquid_loads)
+    liquids = store.space_bodies.liquids
+    liquid, liquid_torque = _loads(store, {} if liquids is None else liquids.loads)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
     air = store.space_bodies.air
     if air.acts_by_force:

@@ -1,4 +1,4 @@
-"""Air, damping, attraction, thrust and constant forces on bodies.
+"""Air, damping, attraction, thrust, liquids and constant forces on bodies.
 
 `AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
 position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
@@ -20,8 +20,9 @@ velocity update.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
 import pymunk
@@ -32,10 +33,15 @@ from sandbox.engines.forces.air import Air, mean_acceleration, mean_angular_acce
 from sandbox.engines.forces.attraction import pull
 from sandbox.engines.forces.thrust import load
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.geometry.shapes import geometry_of
+
+if TYPE_CHECKING:
+    from sandbox.engines.forces.liquid import Liquids
 
 
 class AttractionField:
@@ -258,6 +264,82 @@ def scale_gravity(body: pymunk.Body, scale: float) -> None:
         pymunk.Body.update_velocity(body, (scale * gravity[0], scale * gravity[1]), damping, dt)
 
     body.velocity_func = update_velocity
+
+
+BodyLoads: TypeAlias = Mapping[int, tuple[float, float, float]]
+"""Force (x, y), N, and torque, N·m, on some bodies, by their index"""
+
+
+def sum_of_loads(*each: BodyLoads) -> dict[int, tuple[float, float, float]]:
+    """Return the sums of loads."""
+    total: dict[int, tuple[float, float, float]] = {}
+    for loads in each:
+        for n, (x, y, turn) in loads.items():
+            own_x, own_y, own_turn = total.get(n, (0.0, 0.0, 0.0))
+            total[n] = own_x + x, own_y + y, own_turn + turn
+    return total
+
+
+class SpaceLiquids:
+    """Forces of the liquids of zones on the bodies in the space."""
+
+    def __init__(self, liquids: "Liquids", h: float) -> None:
+        self._liquids, self._h = liquids, h
+        self._floating: set[int] = set()
+        self.loads: dict[int, tuple[float, float, float]] = {}
+        """force (x, y), N, and torque, N·m, on each body in the last substep, by its index"""
+
+    @classmethod
+    def of(cls, scene: Scene, h: float) -> Self | None:
+        """Return the liquids of a scene, with substeps of h, s; None without any."""
+        if not scene.liquids:
+            return None
+        from sandbox.engines.forces.liquid import Liquids  # compiled: only where it is needed
+
+        return cls(Liquids(scene), h)
+
+    def join(self, index: int) -> None:
+        """Include a body."""
+        self._floating.add(index)
+
+    def leave(self, index: int) -> None:
+        """Forget a body that leaves the space."""
+        self._floating.discard(index)
+        self.loads.pop(index, None)
+
+    def update(
+        self,
+        bodies: Bodies,
+        layer: IntArray,
+        state: tuple[IntArray, FloatArray],
+        resting: AbstractSet[int],
+        gravity: Point,
+        others: BodyLoads,
+    ) -> None:
+        """Update `loads` to those of the next substep.
+
+        pymunk moves positions by the old velocities first: the liquids act on the poses that this leads to.
+
+        Args:
+            bodies: all N bodies.
+            layer: (N,) present layer of each.
+            state: indices (R,) of the bodies in the space, and (R, 6) their poses and velocities.
+            resting: bodies that zones hold.
+            gravity: of the world, m/s².
+            others: the other loads on bodies.
+        """
+        (indices, values), count, h = state, len(bodies), self._h
+        states, acts = np.zeros((count, 6)), np.zeros(count, np.bool_)
+        states[indices], floating = values, sorted(self._floating - resting)
+        acts[floating] = True
+        submerged = self._liquids.submerged(bodies, layer, acts, states[:, 0:3] + h * states[:, 3:6])
+        force, torque = np.zeros((count, 2)), np.zeros(count)
+        for n, (x, y, turn) in others.items():
+            force[n], torque[n] = (x, y), turn
+        force += bodies.mass[:, None] * np.asarray(gravity)
+        inertia, rates = (1.0 / bodies.mass[:, None], 1.0 / bodies.moment), (states[:, 3:5], states[:, 5])
+        loads = np.column_stack(self._liquids.step_loads(submerged, rates, (force, torque), inertia, gravity, h))
+        self.loads = {n: (x, y, turn) for n, (x, y, turn) in zip(floating, loads[floating].tolist(), strict=True)}
 
 
 class ConstantForces:

@@ -1,8 +1,8 @@
 """Bodies in the pymunk space: their creation, steps and state."""
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pymunk
@@ -28,7 +28,15 @@ from sandbox.engines.pymunk_adapter.colliders import (
 from sandbox.engines.pymunk_adapter.contact_names import numbers_to_skip
 from sandbox.engines.pymunk_adapter.contacts import ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives, SpacePaths
-from sandbox.engines.pymunk_adapter.forces import AttractionField, ConstantForces, Thrusts, scale_gravity
+from sandbox.engines.pymunk_adapter.forces import (
+    AttractionField,
+    BodyLoads,
+    ConstantForces,
+    SpaceLiquids,
+    Thrusts,
+    scale_gravity,
+    sum_of_loads,
+)
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.engines.pymunk_adapter.rolling import SpaceRolling
@@ -39,18 +47,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
-
-if TYPE_CHECKING:
-    from sandbox.engines.forces.liquid import Liquids, Loads
-
-
-def _liquids_of(scene: Scene) -> "Liquids | None":
-    """Return the liquids of a scene; they are compiled, so that they are imported only where there are some."""
-    if not scene.liquids:
-        return None
-    from sandbox.engines.forces.liquid import Liquids
-
-    return Liquids(scene)
 
 
 class SpaceBody(NamedTuple):
@@ -96,12 +92,9 @@ class SpaceBodies:
         self.contact_reader = ContactReader(self._space, self._reader, self._surface_setter.pair_callbacks)
         """reads the contacts of the space"""
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
-        self.liquids = _liquids_of(scene)
+        self.liquids = SpaceLiquids.of(scene, settings.h)
         """liquids of zones; None without any"""
-        self.liquid_loads: dict[int, tuple[float, float, float]] = {}
-        """force (x, y), N, and torque, N·m, of liquids on each body in the last substep, by body index"""
         self._bodies = setup.bodies
-        self._floating: set[int] = set()  # bodies on which liquids act
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
         self._paths = SpacePaths(setup.time, settings.h)
@@ -285,7 +278,8 @@ class SpaceBodies:
         elif index in bodies.paths:
             self._paths.join(index, bodies.paths[index], body)
         elif not (fixed or kinematic):
-            self._floating.add(index)
+            if self.liquids is not None:
+                self.liquids.join(index)
             if self.field.attracts:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
@@ -352,8 +346,8 @@ class SpaceBodies:
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
             self.thrusts.leave(index)
-            self.liquid_loads.pop(index, None)
-            self._floating.discard(index)
+            if self.liquids is not None:
+                self.liquids.leave(index)
             self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
@@ -473,50 +467,21 @@ class SpaceBodies:
         if self.thrusts:
             self.thrusts.apply(time, self._h, self.constant_forces.total)
 
-    def _apply_liquids(self, time: float, liquids: "Liquids") -> None:
-        """Set the forces of a substep that starts at a time, s, in a scene with liquids.
-
-        pymunk moves positions by the old velocities first: the liquids act on the poses that this leads to.
-        """
+    def _apply_liquids(self, time: float, liquids: SpaceLiquids) -> None:
+        """Set the forces of a substep that starts at a time, s, in a scene with liquids."""
         self.thrusts.update_loads(time, self._h)
-        indices, state = self._read()
-        bodies, gravity, h = self._bodies, self._scene.world.gravity, self._h
-        states, acts = np.zeros((len(bodies), 6)), np.zeros(len(bodies), np.bool_)
-        states[indices], floating = state, sorted(self._floating - self._resting.keys())
-        acts[floating] = True
-        submerged = liquids.submerged(bodies, self.layer, acts, states[:, 0:3] + h * states[:, 3:6])
-        force, torque = self._constant_loads()
-        force += bodies.mass[:, None] * np.asarray(gravity)
-        inertia = 1.0 / bodies.mass[:, None], 1.0 / bodies.moment
-        liquid_loads = liquids.step_loads(
-            submerged, (states[:, 3:5], states[:, 5]), (force, torque), inertia, gravity, h
-        )
-        loads = np.column_stack(liquid_loads)[floating].tolist()
-        self.liquid_loads = {n: (x, y, turn) for n, (x, y, turn) in zip(floating, loads, strict=True)}
-        both = dict(self.thrusts.loads)
-        for n, (x, y, turn) in self.liquid_loads.items():
-            fx, fy, torque_of_thrust = both.get(n, (0.0, 0.0, 0.0))
-            both[n] = fx + x, fy + y, torque_of_thrust + turn
+        thrusts = self.thrusts.loads
+        constant = {n: (float(x), float(y), turn) for n, ((x, y), turn) in self.constant_forces.items()}
+        others = sum_of_loads(constant, thrusts)
+        liquids.update(self._bodies, self.layer, self._read(), self._resting.keys(), self._scene.world.gravity, others)
+        loads = sum_of_loads(thrusts, liquids.loads)
         if self.air.acts_by_force:
-            self._apply_air(*self._read(), both)
+            self._apply_air(*self._read(), loads)
             return
-        for n, (constant, constant_torque) in self.constant_forces.items():
-            fx, fy, turn = both.get(n, (0.0, 0.0, 0.0))
-            both[n] = fx + float(constant[0]), fy + float(constant[1]), turn + constant_torque
-        for n, (x, y, turn) in both.items():
+        for n, (x, y, turn) in sum_of_loads(loads, constant).items():
             record = self._members[n].body._body
             lib.cpBodySetForce(record, (x, y))
             lib.cpBodySetTorque(record, turn)
-
-    def _constant_loads(self) -> "Loads":
-        """Return constant forces (N, 2), N, and torques (N,), N·m, with those of thrusts, on all bodies."""
-        force, torque = np.zeros((len(self._bodies), 2)), np.zeros(len(self._bodies))
-        for n, (constant, turn) in self.constant_forces.items():
-            force[n], torque[n] = constant, turn
-        for n, (x, y, turn) in self.thrusts.loads.items():
-            force[n] += (x, y)
-            torque[n] += turn
-        return force, torque
 
     @property
     def can_batch(self) -> bool:
@@ -612,7 +577,7 @@ class SpaceBodies:
         """Enter the contacts of a batch into a log, as `ContactReader.read_batch`."""
         return self.contact_reader.read_batch(lists, log, times, self._polygons)
 
-    def _apply_air(self, indices: IntArray, state: FloatArray, loads: Mapping[int, tuple[float, float, float]]) -> None:
+    def _apply_air(self, indices: IntArray, state: FloatArray, loads: BodyLoads) -> None:
         """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene whose air acts.
 
         Args:

@@ -197,7 +197,8 @@ class JointArrays:
     @property
     def is_compound(self) -> BoolArray:
         """(J,) whether each row belongs to a joint of several rows."""
-        return np.asarray(np.isin(self.part_of, self.part_of[self.part_of != self.number]))
+        is_part = self.part_of != self.number
+        return np.asarray(np.isin(self.part_of, self.part_of[is_part])) if is_part.any() else is_part
 
     def whole(self, rows: IntArray) -> IntArray:
         """Return the rows of the joints that some rows belong to, in ascending order: a joint breaks as a whole."""

@@ -303,7 +303,7 @@ class Switch(Timed):
     are then kept"""
 
 
-Action = Annotated[
+Event = Annotated[
     Impulse
     | Explosion
     | Force
@@ -311,18 +311,19 @@ Action = Annotated[
     | Spawn
     | Remove
     | SetParameter
-    | Pull
     | Launch
     | Throttle
-    | Reshape
     | Drive
     | Toggle
+    | Reshape
     | Join
-    | Unjoin
-    | Strike
-    | Switch,
+    | Unjoin,
     Field(discriminator="kind"),
 ]
+"""Actions that a scene can make itself"""
+
+
+Action = Annotated[Event | Pull | Strike | Switch, Field(discriminator="kind")]
 
 
 _SETTABLE = (
@@ -350,23 +351,3 @@ def is_settable(path: str) -> bool:
     key = path.rpartition(".")[2]
     is_of_motor = path.startswith(("joint.", "joint[")) and key in _SETTABLE_OF_MOTORS
     return path in _SETTABLE or key in _SETTABLE_OF_SURFACES or is_of_motor
-
-
-Event = Annotated[
-    Impulse
-    | Explosion
-    | Force
-    | Move
-    | Spawn
-    | Remove
-    | SetParameter
-    | Launch
-    | Throttle
-    | Drive
-    | Toggle
-    | Reshape
-    | Join
-    | Unjoin,
-    Field(discriminator="kind"),
-]
-"""Actions that a scene can make itself"""

@@ -85,13 +85,16 @@ def check_events(scene: Scene, bodies: Bodies, are_others_valid: bool) -> Iterat
         for key, names in known.items():
             name = getattr(event, key, None)
             if name is not None and name not in names:
-                yield ("event", k, key), f"no {key} is named {name!r}; {_listed(names)}"
+                yield ("event", k, key), f"no {key} is named {name!r}; {listed_names(names)}"
         if are_others_valid and isinstance(event, Unjoin) and event.joint not in joints:
-            yield ("event", k, "joint"), f"no joint is named {event.joint!r}; {_listed(joints)}"
+            yield ("event", k, "joint"), f"no joint is named {event.joint!r}; {listed_names(joints)}"
         if isinstance(event, Join):
             for side, name in enumerate(event.joint.between):
                 if name not in known["body"]:
-                    yield ("event", k, "joint", "between", side), f"no body is named {name!r}; {_listed(known['body'])}"
+                    yield (
+                        ("event", k, "joint", "between", side),
+                        f"no body is named {name!r}; {listed_names(known['body'])}",
+                    )
             if len(set(event.joint.between)) < len(event.joint.between):
                 yield ("event", k, "joint", "between"), ONE_BODY_TWICE
             for key, message in _check_joint(event.joint):
@@ -109,13 +112,13 @@ def _check_spawned(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
             seen.add(event.single.name)
         if isinstance(event, Spawn):
             if event.single.layer not in scene.layers:
-                yield ("event", k), f"no layer is named {event.single.layer!r}; {_listed(scene.layers)}"
+                yield ("event", k), f"no layer is named {event.single.layer!r}; {listed_names(scene.layers)}"
             if event.single.path is not None or event.single.one_way is not None:
                 yield ("event", k), "a body with a path, or a one-way body, cannot be added during a run"
 
 
-def _listed(names: Collection[str]) -> str:
-    """Return known names as text."""
+def listed_names(names: Collection[str]) -> str:
+    """Return known names as text for a message."""
     shown = ", ".join(map(repr, sorted(names)[:MAX_NAMED]))
     return f"known names: {shown}{', …' if len(names) > MAX_NAMED else ''}" if shown else "there is none"
 

@@ -7,6 +7,7 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.geometry.vectors import rotate
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.annotations import (
     draw_boxes,
@@ -17,16 +18,26 @@ from sandbox.window.render.annotations import (
     draw_pull,
     draw_verdicts,
 )
-from sandbox.window.render.circles import CircleRenderer
+from sandbox.window.render.circles import CircleRenderer, draw_disc
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.joints import draw_hinges, draw_joint_symbols, draw_joints, draw_stops, joint_segments
-from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_dashes, draw_line
 from sandbox.window.render.moving_surfaces import draw_moving_surfaces
-from sandbox.window.render.one_way_bodies import draw_one_way_bodies
-from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, ColourArray, RgbColour, mix_colours
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    FAINT,
+    INK,
+    ORANGE,
+    SKY,
+    SURFACE,
+    YELLOW,
+    ColourArray,
+    RgbColour,
+    mix_colours,
+)
 from sandbox.window.render.particles import ParticleRenderer, packed_pixels
-from sandbox.window.render.paths import draw_paths
 from sandbox.window.render.polygons import PolygonRenderer
+from sandbox.window.render.static_geometry import draw_passing_arrows
 from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
 
 FLAME_OUTLINE = ((0.0, -0.13), (0.12, -0.19), (0.3, -0.17), (0.6, -0.09), (1.0, 0.0))
@@ -169,7 +180,7 @@ class OverlayRenderer:
             draw_hinges(view, self._discs)
         if "shapes" in overlays:
             draw_moving_surfaces(view)
-            draw_one_way_bodies(view)
+            _draw_one_way_bodies(view)
         if view.snapshot.ghost is not None:
             self._draw_ghost(view)
         if "bounds" in overlays:
@@ -179,7 +190,7 @@ class OverlayRenderer:
         if drives and "joints" in overlays:
             draw_stops(view)
         if "joints" in overlays:
-            draw_paths(view, view.snapshot.bodies)
+            _draw_paths(view)
         if "centres" in overlays:
             draw_centres(view)
         if view.snapshot.overlapping is not None:
@@ -230,3 +241,33 @@ class OverlayRenderer:
             draw_line(
                 view.surface, (ax, ay), (bx, by), mix_colours(FAINT, INK, 0.3), 1.0 * view.ui_scale, view.antialias
             )
+
+
+def _draw_paths(view: DrawContext) -> None:
+    """Draw the course of the centre of each body that has a path: a dotted line with a disc at each point."""
+    surface, unit, colour = view.surface, view.ui_scale, mix_colours(SKY, BACKGROUND, 0.25)
+    for motion in view.snapshot.bodies.paths.values():
+        course = view.pixels(motion.course())
+        draw_dashes(surface, pairwise(course), colour, 2.5 * unit, view.antialias)
+        for pixel in view.pixels(motion.stops()):
+            draw_disc(surface, pixel, 3.0 * unit, colour)
+
+
+def _draw_one_way_bodies(view: DrawContext) -> None:
+    """Draw small arrows on the side from which one-way bodies are solid, in the direction in which others pass them."""
+    frame, bodies = view.snapshot.frame, view.snapshot.bodies
+    shown = {*view.shown.tolist()} if bodies.one_way else set()
+    for index, (x, y) in bodies.one_way.items():
+        if index not in shown:
+            continue
+        begin, end = np.searchsorted(bodies.shapes.body, (index, index + 1)).tolist()
+        corner = bodies.shapes.corner[bodies.shapes.first[begin] : bodies.shapes.first[end]]
+        radius = np.repeat(bodies.shapes.radius[begin:end], bodies.shapes.corners[begin:end])
+        top, along = float((corner @ (x, y) + radius).max()), corner @ (y, -x)
+        angle, position = float(frame.angle[index]), frame.position[index].tolist()
+        ends = []
+        for side in (float((along - radius).min()), float((along + radius).max())):
+            dx, dy = rotate(side * y + top * x, -side * x + top * y, math.cos(angle), math.sin(angle))
+            ends.append((position[0] + dx, position[1] + dy))
+        a, b = view.pixels(ends)
+        draw_passing_arrows(view, a, b, 0.0, mix_colours(SURFACE, INK, 0.6))
