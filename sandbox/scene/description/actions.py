@@ -1,7 +1,7 @@
 """Actions: timed changes of a running scene, made by a player, a script or the scene, and applied between steps."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -303,7 +303,7 @@ class Switch(Timed):
     are then kept"""
 
 
-Event = Annotated[
+_AnyEvent: TypeAlias = (
     Impulse
     | Explosion
     | Force
@@ -317,13 +317,12 @@ Event = Annotated[
     | Toggle
     | Reshape
     | Join
-    | Unjoin,
-    Field(discriminator="kind"),
-]
+    | Unjoin
+)
+Event = Annotated[_AnyEvent, Field(discriminator="kind")]
 """Actions that a scene can make itself"""
 
-
-Action = Annotated[Event | Pull | Strike | Switch, Field(discriminator="kind")]
+Action = Annotated[_AnyEvent | Pull | Strike | Switch, Field(discriminator="kind")]
 
 
 _SETTABLE = (
