@@ -19,8 +19,9 @@ except ImportError:
 from sandbox.game_names import game_specs
 from sandbox.gym.game_env import STATES, SandboxEnv
 from sandbox.gym.game_vector_env import CompiledOnlyError, SandboxVectorEnv, make_vector_env
+from sandbox.gym.lunar_lander import LunarLander
 
-__all__ = ["GAMES", "STATES", "CompiledOnlyError", "SandboxEnv", "SandboxVectorEnv", "make_vector_env"]
+__all__ = ["GAMES", "STATES", "CompiledOnlyError", "LunarLander", "SandboxEnv", "SandboxVectorEnv", "make_vector_env"]
 
 GAMES = {each.name: (each.scene, each.frame_skip) for spec in game_specs() for each in spec.environments}
 """Shipped scene and number of steps per action, by the name in the environment id."""
@@ -34,3 +35,12 @@ for _spec in game_specs():
             kwargs=_options if _each.duration is None else _options | {"duration": _each.duration},
             vector_entry_point="sandbox.gym:make_vector_env" if _spec.vector_rules is not None else None,
         )
+
+for _name, _arguments in {"LunarLander": {}, "LunarLanderContinuous": {"continuous": True}}.items():
+    gymnasium.register(
+        f"sandbox/{_name}-v3",
+        entry_point="sandbox.gym:LunarLander",
+        kwargs=_arguments,
+        max_episode_steps=1000,
+        reward_threshold=200.0,
+    )

@@ -458,7 +458,7 @@ class OffscreenRenderer:
         self._renderer, self._inset = Renderer(), InsetRenderer()
 
     def picture(
-        self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules, throttles: Mapping[str, Throttle]
+        self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules | None, throttles: Mapping[str, Throttle]
     ) -> npt.NDArray[np.uint8]:
         """Return a frame of a game as the window shows it, without text: (height, width, 3).
 
@@ -466,7 +466,7 @@ class OffscreenRenderer:
             scene: in its current form.
             bodies: including spawned ones.
             frame: state of the bodies.
-            rules: of the game, the source of lit lamps and of the view state (guns, blasts).
+            rules: of the game, the source of lit lamps and of the view state (guns, blasts); None without a game.
             throttles: current settings, by thruster name.
         """
         camera = Camera.fitting(view_bounds(scene), self._surface.get_size())

@@ -1,0 +1,144 @@
+"""Base of the environments that repeat Gymnasium's Box2D environments on a scene and an engine of the sandbox."""
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+
+from sandbox.action import Action, Throttle
+from sandbox.engines.contract import Refusal
+from sandbox.engines.registry import able, engine_named
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import load
+from sandbox.trajectory import Contacts
+
+Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
+
+SIZE = 600, 400
+"""px, size of a rendered picture"""
+
+
+class ClassicEnv(gymnasium.Env[Observation, Any]):
+    """Environment whose episodes are scenes with actions, so that any engine can replay them.
+
+    A step of the environment is one step dt of the scene. The engine must be one that moves bodies by their velocities
+    first, and then changes these by gravity, contacts and joints, as pymunk and `reference` do. Box2D 2.3 does the same
+    in the other order, so that the states after its step are these: the positions after a step of the engine, and the
+    velocities and contacts before it.
+
+    Pickles and copies, also those of a running episode, repeat the episode from its start, and continue it alike.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
+    ENGINES: ClassVar[tuple[str, ...]] = ("pymunk", "reference")
+    """engines that move bodies first"""
+
+    def __init__(self, scene: str, engine: str, render_mode: str | None) -> None:
+        """Create an environment of a shipped scene; `reset` begins an episode.
+
+        Raises:
+            Refusal: the engine does not support the scene.
+            ValueError: the engine or the render mode does not exist, or the engine does not move bodies first.
+        """
+        self._base = load(scene)
+        missing = engine_named(engine).missing(self._base, self._base.solver)
+        if missing:
+            raise Refusal(engine, missing, able(self._base))
+        if engine not in self.ENGINES:
+            raise ValueError(f"{engine} changes velocities before it moves bodies; use {' or '.join(self.ENGINES)}")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
+        self.engine, self.render_mode = engine, render_mode
+        self._scene: Scene | None = None
+        self._simulation: SwitchableSimulation | None = None
+        self._actions: list[Action] = []
+        self._steps = 0
+        self._canvas: Any = None
+
+    def _begin(self, scene: Scene) -> SwitchableSimulation:
+        """Start the simulation of an episode, and return it."""
+        self._release()
+        self._scene, self._actions, self._steps = scene, [], 0
+        self._simulation = simulation = start(scene, self.engine)
+        simulation.contacts()  # contacts are recorded from now on
+        return simulation
+
+    def _advance(self, actions: list[Action]) -> Contacts:
+        """Apply actions, whose times must be that of this step, advance by one step, and return the contacts."""
+        simulation = self._running
+        for action in actions:
+            simulation.apply(action)
+        self._actions += actions
+        self._steps += 1
+        simulation.step()
+        return simulation.contacts()
+
+    @property
+    def _running(self) -> SwitchableSimulation:
+        """The simulation of the episode.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+        """
+        if self._simulation is None:
+            raise gymnasium.error.ResetNeeded("call reset before step, render or recording")
+        return self._simulation
+
+    def recording(self) -> Recording:
+        """Return the episode so far as a recording, for `sandbox replay`."""
+        simulation = self._running
+        return Recording(
+            scene=simulation.scene,
+            engine=self.engine,
+            settings=simulation.scene.solver,
+            actions=tuple(self._actions),
+            duration=simulation.time,
+            state_hash=simulation.state_hash(),
+        )
+
+    def render(self) -> Any:
+        """Return a picture, (height, width, 3) from 0 to 255; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        simulation = self._running
+        if self._canvas is None:
+            from sandbox.window.render.renderer import OffscreenRenderer  # pygame is needed only to render
+
+            self._canvas = OffscreenRenderer(SIZE)
+        scene, throttles = self._drawn()
+        return self._canvas.picture(scene, simulation.bodies, simulation.frame(), None, throttles)
+
+    def _drawn(self) -> tuple[Scene, Mapping[str, Throttle]]:
+        """Return the scene as it is drawn now, and the throttles of its thrusts."""
+        return self._running.scene, {}
+
+    def close(self) -> None:
+        """Release the engine and the canvas."""
+        self._release()
+        self._canvas = None
+
+    def _release(self) -> None:
+        if self._simulation is not None:
+            self._simulation.close()
+        self._simulation = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without engine and canvas."""
+        return self.__dict__ | {"_simulation": None, "_canvas": None, "_is_running": self._simulation is not None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take over a state, and repeat its episode."""
+        is_running = state.pop("_is_running")
+        self.__dict__.update(state)
+        if is_running:
+            assert self._scene is not None
+            actions, steps, dt = self._actions, self._steps, self._scene.solver.dt
+            self._begin(self._scene)
+            of_step: dict[int, list[Action]] = {}
+            for action in actions:
+                of_step.setdefault(round(action.time / dt), []).append(action)
+            for k in range(steps):
+                self._advance(of_step.get(k, []))
