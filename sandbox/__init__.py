@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from sandbox.action import (
         ActionError as ActionError,
+        Actuate as Actuate,
         Drive as Drive,
         Explosion as Explosion,
         Force as Force,
@@ -357,8 +358,8 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "sandbox.action": (
-        "ActionError Drive Explosion Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn Strike "
-        "Switch Throttle Toggle Unjoin"
+        "ActionError Actuate Drive Explosion Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn "
+        "Strike Switch Throttle Toggle Unjoin"
     ),
     "sandbox.batch.query": "QuantityStatistics RunGroup StoredRuns open_store",
     "sandbox.batch.store": "Store",

@@ -13,6 +13,7 @@ from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.scene.description.actions import SETTABLE as SETTABLE
 from sandbox.scene.description.actions import SPAWNED as SPAWNED
 from sandbox.scene.description.actions import Action as Action
+from sandbox.scene.description.actions import Actuate as Actuate
 from sandbox.scene.description.actions import Amount as Amount
 from sandbox.scene.description.actions import Drive as Drive
 from sandbox.scene.description.actions import Explosion as Explosion

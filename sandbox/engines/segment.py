@@ -1,15 +1,16 @@
 """One engine's part of a session, and the state from which it continues."""
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Force, Pull, Throttle
+from sandbox.action import Action, ActionError, Actuate, Force, Pull, Throttle
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.sensors import OpenVisit
+from sandbox.engines.session_actions import PersistentActions
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -35,6 +36,7 @@ class Checkpoint:
     joined: Mapping[int, float]
     forces: Mapping[str, Force]
     throttles: Mapping[str, Throttle]
+    motor_levels: Mapping[str, float]
     pulls: Mapping[str, Pull]
     setup: Setup
     """with all joints, numbered as `broken`"""
@@ -249,7 +251,7 @@ def start_segment(
     wanted: Settings,
     bodies: Bodies,
     frame: Frame,
-    persistent: Iterable[Force | Throttle],
+    persistent: PersistentActions,
     broken: Collection[int] = (),
     plane_reach: PlaneReach | None = None,
 ) -> Segment:
@@ -261,7 +263,7 @@ def start_segment(
         wanted: settings.
         bodies: all bodies, by session index.
         frame: the state.
-        persistent: actions that still act: constant forces, and levels of thrusts.
+        persistent: actions that still act: constant forces, levels of thrusts and motors.
         broken: indices of broken joints.
         plane_reach: of the simulation that is resumed; by default it follows from the positions of the bodies.
 
@@ -270,16 +272,18 @@ def start_segment(
         ActionError: the engine cannot take over a constant force.
     """
     simulation = start_engine(setup_at(setup, bodies, frame, broken, plane_reach), engine, wanted)
-    for action in persistent:
+    for action in persistent.actions(simulation.setup.joints):
         try:
             simulation.apply(action)
         except ActionError as error:
             simulation.close()
-            description = (
-                f"the constant force on {action.body!r}"
-                if isinstance(action, Force)
-                else f"the thrust {action.thrust!r}"
-            )
+            match action:
+                case Force():
+                    description = f"the constant force on {action.body!r}"
+                case Throttle():
+                    description = f"the thrust {action.thrust!r}"
+                case Actuate():
+                    description = f"the motors {', '.join(map(repr, action.levels))}"
             raise ActionError(f"{engine} cannot continue with {description}: {error}") from None
     body_indices = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")

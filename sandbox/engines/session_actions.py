@@ -14,6 +14,7 @@ import numpy as np
 from sandbox.action import (
     Action,
     ActionError,
+    Actuate,
     Explosion,
     Force,
     Impulse,
@@ -40,12 +41,16 @@ from sandbox.trajectory import Frame
 
 
 class PersistentActions:
-    """Actions that keep acting: constant forces by the name of the body, throttles by the name of the thrust."""
+    """Actions that keep acting: forces by the name of the body, throttles by that of the thrust; levels of motors."""
 
     def __init__(
-        self, forces: Mapping[str, Force] | None = None, throttles: Mapping[str, Throttle] | None = None
+        self,
+        forces: Mapping[str, Force] | None = None,
+        throttles: Mapping[str, Throttle] | None = None,
+        motor_levels: Mapping[str, float] | None = None,
     ) -> None:
         self._forces, self._throttles = dict(forces or {}), dict(throttles or {})
+        self._motor_levels = dict(motor_levels or {})
 
     def record(self, action: Action) -> None:
         """Record an action that was applied."""
@@ -53,6 +58,8 @@ class PersistentActions:
             self._forces[action.body] = action
         elif isinstance(action, Throttle):
             self._throttles[action.thrust] = action
+        elif isinstance(action, Actuate):
+            self._motor_levels |= action.levels
         elif isinstance(action, Remove):
             self._forces.pop(action.body, None)
 
@@ -71,9 +78,20 @@ class PersistentActions:
         """Throttle of each thrust."""
         return dict(self._throttles)
 
-    def actions(self) -> list[Force | Throttle]:
-        """Return the actions that reproduce the forces and throttles in another simulation."""
-        return [*self._forces.values(), *self._throttles.values()]
+    @property
+    def motor_levels(self) -> dict[str, float]:
+        """Level of each motor that was set, by the name of its joint."""
+        return dict(self._motor_levels)
+
+    def actions(self, joints: JointArrays) -> list[Force | Throttle | Actuate]:
+        """Return the actions that reproduce forces, throttles and levels of motors in another simulation.
+
+        Args:
+            joints: those that are left; the other motors have broken or were removed.
+        """
+        levels = {name: level for name, level in self._motor_levels.items() if joints.motor_of(name) is not None}
+        motors = [Actuate(time=0.0, levels=levels)] if levels else []
+        return [*self._forces.values(), *self._throttles.values(), *motors]
 
 
 def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:

@@ -183,6 +183,7 @@ class SwitchableSimulation:
             joined=dict(self._joined),
             forces=self._active_actions().forces,
             throttles=self._persistent.throttles,
+            motor_levels=self._persistent.motor_levels,
             pulls=self._pulls.pulls,
             setup=self.setup,
             plane_reach=self.plane_reach,
@@ -206,15 +207,14 @@ class SwitchableSimulation:
         """
         simulation = cls.__new__(cls)
         simulation.engine, simulation.wanted = point.engine, point.wanted
-        simulation._persistent = PersistentActions(point.forces, point.throttles)
-        persistent = simulation._persistent.actions()
+        simulation._persistent = PersistentActions(point.forces, point.throttles, point.motor_levels)
         simulation._segment = start_segment(
             point.setup,
             point.engine,
             point.wanted,
             point.bodies,
             point.frame,
-            persistent,
+            simulation._persistent,
             point.broken,
             point.plane_reach,
         )
@@ -478,7 +478,7 @@ class SwitchableSimulation:
             ActionError: the engine cannot continue from the state. Nothing has changed then.
         """
         try:
-            persistent, setup = self._active_actions().actions(), setup or self.setup
+            persistent, setup = self._active_actions(), setup or self.setup
             broken = dict(self.broken) if broken is None else broken
             segment = start_segment(setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
             if self._ledger.is_on:

@@ -4,18 +4,16 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import gymnasium
-import numpy as np
 
 from sandbox.action import Action, Throttle
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.gym.game_env import Observation
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Contacts
-
-Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
 
 SIZE = 600, 400
 """px, size of a rendered picture"""

@@ -12,8 +12,8 @@ import numpy as np
 from gymnasium import spaces
 
 from sandbox.action import Impulse, Throttle
-from sandbox.gym.classic_env import ClassicEnv, Observation
-from sandbox.gym.game_env import refuse_options
+from sandbox.gym.classic_env import ClassicEnv
+from sandbox.gym.game_env import Observation, refuse_options
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.trajectory import Frame

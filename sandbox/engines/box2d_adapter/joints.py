@@ -29,7 +29,7 @@ class WorldJoints:
     def __init__(self, world: Box2DWorld, store: BodyStore) -> None:
         self._world, self._store = world, store
         self._joints: dict[int, Any] = {}  # by the index of the joint
-        joints = store.setup.joints
+        joints = store.all_joints
         for k in store.intact_joints().tolist():
             kind = JointKind(int(joints.kind[k]))
             if joints.part_of[k] != joints.number[k]:
@@ -126,14 +126,14 @@ class WorldJoints:
 
     def renew(self, replaced: set[int]) -> None:
         """Create the joints of bodies, by their indices, that were replaced and have lost them."""
-        joints = self._store.setup.joints
+        joints = self._store.all_joints
         for k in self._joints:
             if not replaced.isdisjoint((int(joints.a[k]), int(joints.b[k]))):
                 self._joints[k] = self._world.create_joint(self._definition(joints, k))
 
     def update_motors(self, before: JointArrays) -> None:
         """Set the values of motors that differ from those of the joints before an action."""
-        joints = self._store.setup.joints
+        joints = self._store.all_joints
         if joints is before:
             return
         changed = (joints.figures != before.figures).any(axis=1) | (joints.max_force != before.max_force)
@@ -153,7 +153,7 @@ class WorldJoints:
 
     def limit_linear_motors(self, length: float) -> None:
         """Set the speeds of motors along axes so that a step of a length, s, does not pass the end of the travel."""
-        joints = self._store.setup.joints
+        joints = self._store.all_joints
         for motor in np.flatnonzero(joints.kind == JointKind.LINEAR_MOTOR).tolist():
             joint = self._joints.get(int(np.flatnonzero(joints.number == joints.part_of[motor])[0]))
             if joint is not None:
@@ -190,7 +190,7 @@ class WorldJoints:
 
     def overloaded(self) -> IntArray:
         """Return the indices of joints whose force exceeds their strength; of rigid ones, that of the last substep."""
-        joints, found = self._store.setup.joints, []
+        joints, found = self._store.all_joints, []
         for k, joint in self._joints.items():
             if math.isfinite(joints.strength[k]):
                 force = joint.get_constraint_force()

@@ -367,11 +367,13 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             self._check_running()
             store = self._store
             if sets_level(action):
+                joints = store.all_joints
                 apply_action(action, store)
+                self._joints.update_motors(joints)
                 return
             before = BodyState.of(store)
             scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
-            joints = store.setup.joints
+            joints = store.all_joints
             leaving = apply_action(action, store)
             if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
                 self._joints.renew(self._world.update_surfaces())  # first: new shapes need the new values

@@ -5,6 +5,7 @@ simulation as it was.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from sandbox.action import (
     SETTABLE,
     Action,
     ActionError,
+    Actuate,
     Drive,
     Explosion,
     Force,
@@ -41,6 +43,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource, BodySpec, Collides
@@ -138,6 +141,9 @@ class ActionTarget(Protocol):
         Raises:
             ActionError: the engine models no drives.
         """
+
+    def actuate(self, levels: Mapping[int, float]) -> None:
+        """Set the levels of motors, by the rows of the joints."""
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body that has been checked, and return its index.
@@ -306,7 +312,7 @@ def reshape(action: Reshape, target: ActionTarget) -> None:
 
 def sets_level(action: Action) -> bool:
     """Return whether an action sets a level only: the state of the bodies, and what can touch, stay as they are."""
-    return isinstance(action, (Throttle, Drive))
+    return isinstance(action, (Throttle, Drive, Actuate))
 
 
 ENVIRONMENT_FIELDS = {"world", "surface"}
@@ -339,6 +345,8 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
             reshape(action, target)
         case Drive():
             target.drive(index_of_name(names_of(target.scene), action.drive, "drive"), action.level)
+        case Actuate():
+            target.actuate(_motor_levels(action, target.setup.joints))
         case Toggle():
             toggle(action, target)
         case Strike():
@@ -350,6 +358,22 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
         case _:
             raise ActionError(f"{action!r} is not an action")
     return None
+
+
+def _motor_levels(action: Actuate, joints: JointArrays) -> dict[int, float]:
+    """Return the levels of motors by their rows.
+
+    Raises:
+        ActionError: a joint does not exist, or has no motor.
+    """
+    levels = {}
+    for name, level in action.levels.items():
+        row = joints.motor_of(name)
+        if row is None:
+            index_of_name(joints.names, name, "joint")  # raises, if there is no such joint
+            raise ActionError(f"the joint {name!r} has no motor")
+        levels[row] = level
+    return levels
 
 
 def has_same_bodies(scene: Scene, running: Scene) -> bool:

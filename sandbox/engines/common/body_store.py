@@ -53,6 +53,8 @@ class BodyStore:
         """(N, Z) state of each body with regard to each zone"""
         self.held_by_zone: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         """(N,) whether a zone holds the body in place"""
+        self.motor_levels: dict[int, float] = {}
+        """levels of motors that actions have set, by the rows of the joints"""
         self.drives: FloatArray = setup.drives.copy()
         """(D, 3) state of each drive, as in `Frame.drives`"""
         self._all_mounts: dict[str, Mount] = mounts(scene)
@@ -69,8 +71,20 @@ class BodyStore:
 
     def _rebuild(self, setup: Setup, bodies: Bodies, matrix: ContactMatrix) -> None:
         """Use another setup, other bodies or other materials."""
-        self.setup, self.bodies, self.contact_matrix = setup, bodies, matrix
+        self._use(setup)
+        self.bodies, self.contact_matrix = bodies, matrix
         self._derive_solver_arrays()
+
+    def _use(self, setup: Setup) -> None:
+        """Use another setup."""
+        self.setup = setup
+        self.all_joints: JointArrays = setup.joints.actuated(self.motor_levels) if self.motor_levels else setup.joints
+        """the joints of the setup, with motors at their levels"""
+
+    def actuate(self, levels: Mapping[int, float]) -> None:
+        """Set the levels of motors, by the rows of the joints."""
+        self.motor_levels |= levels
+        self._use(self.setup)
 
     def _derive_solver_arrays(self) -> None:
         """Derive the arrays of a solver, which depend on the bodies that are present and on their materials."""
@@ -120,7 +134,7 @@ class BodyStore:
     @property
     def joints(self) -> JointArrays:
         """The joints that are intact and whose bodies are present."""
-        return self.setup.joints.some(self.intact_joints())
+        return self.all_joints.some(self.intact_joints())
 
     def intact_joints(self) -> IntArray:
         """Return the indices of the scene's joints that are intact and whose bodies are present."""
@@ -220,7 +234,7 @@ class BodyStore:
         """
         scene = setup.scene
         if spawned is None and has_same_bodies(scene, self.scene):
-            self.setup = setup
+            self._use(setup)
             return
         spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))

@@ -5,6 +5,7 @@ the same scheme. A body joins the space when something that it can touch appears
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -121,7 +122,7 @@ class PymunkBodies(BodyStore):
         position, velocity, angle, spin = (array[in_space] for array in state)
         self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])
         self._update_scaled_gravity(in_space)
-        self.space_bodies.add_joints(self.setup.joints)
+        self.space_bodies.add_joints(self.all_joints)
 
     def _update_scaled_gravity(self, indices: IntArray) -> None:
         """Update the gravity on those of some bodies in the space that scale it."""
@@ -185,7 +186,7 @@ class PymunkBodies(BodyStore):
             self.space_bodies.rebuild_world(setup.scene, self._air)
         else:
             self.space_bodies.rebuild(setup.scene, self._air, self.contact_matrix)
-        self.space_bodies.joints.update(setup.joints)
+        self.space_bodies.joints.update(self.all_joints)
         if self.scales_by_force:
             self._update_scaled_gravity(np.asarray(self.space_bodies.movable_indices(), np.int64))
 
@@ -301,6 +302,11 @@ class PymunkBodies(BodyStore):
     def drive(self, index: int, level: float) -> None:
         """Set the level of a drive, by its index in the scene."""
         self.space_bodies.drives.set(index, level)
+
+    def actuate(self, levels: Mapping[int, float]) -> None:
+        """Set the levels of motors, by the rows of the joints."""
+        super().actuate(levels)
+        self.space_bodies.joints.update(self.all_joints)
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Check that pymunk can place a body at a position.

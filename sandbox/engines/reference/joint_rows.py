@@ -127,6 +127,8 @@ def prepare(
         i, j = joints.first[k], joints.second[k]
         upper = joints.max_force[k] * h
         rows.bound[k, 0], rows.bound[k, 1] = -upper, upper
+        if upper == 0.0:  # a motor that was switched off: rows without freedom are not solved
+            rows.impulse[k, 0] = rows.impulse[k, 1] = 0.0
         rows.impulse[k, 0] *= kept
         rows.impulse[k, 1] *= kept
         if rows.kind[k] == ANGLE:

@@ -158,7 +158,7 @@ class WorldState:
     def _new_joints(self) -> JointSolver | None:
         """Return a solver of the scene's joints, if it has any."""
         store, settings = self._store, self._settings
-        joints = store.setup.joints
+        joints = store.all_joints
         if not len(joints):
             return None
         assert settings.joints is not None and settings.bias is not None
@@ -194,7 +194,7 @@ class WorldState:
             overlaps = self.pipeline.at_one_way(self.x[0])
             self.one_way.begin(overlaps, self.closing_speed(overlaps, self.x))
         if self.joints is not None:
-            self.joints.joints = store.setup.joints  # motors may have other values
+            self.joints.joints = store.all_joints  # motors may have other values
             self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.intact_joints())
         self.forces = forces_on(store, self.field, self.joints, self.x.shape[2])
 

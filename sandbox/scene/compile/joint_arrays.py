@@ -4,7 +4,8 @@ Most joints are one row. A weld, a prismatic joint and a wheel consist of severa
 joint, the others follow those of all joints, and `part_of` relates them.
 """
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from typing import Any, Self
@@ -50,6 +51,9 @@ class JointKind(IntEnum):
 
 MOTORS = (JointKind.MOTOR, JointKind.LINEAR_MOTOR)
 """Kinds that prescribe a rate, up to a largest force or torque"""
+
+RATE_OF = {JointKind.MOTOR: 0, JointKind.LINEAR_MOTOR: 2}
+"""Column of `figures` with the rate of a motor"""
 
 TURNING = (
     JointKind.GROOVE,
@@ -115,6 +119,21 @@ class JointArrays:
 
     def __len__(self) -> int:
         return len(self.kind)
+
+    def motor_of(self, name: str) -> int | None:
+        """Return the row of the motor of a joint; None if no joint of that name has one."""
+        if name not in self.names:
+            return None
+        rows = self.whole(np.asarray([self.names.index(name)])).tolist()
+        return next((row for row in rows if self.kind[row] in MOTORS), None)
+
+    def actuated(self, levels: Mapping[int, float]) -> Self:
+        """Return the joints with motors at levels, −1 to 1, by their rows: their rates and largest forces."""
+        figures, max_force = self.figures.copy(), self.max_force.copy()
+        for row, level in levels.items():
+            figures[row, RATE_OF[JointKind(int(self.kind[row]))]] *= math.copysign(1.0, level)
+            max_force[row] = max_force[row] * abs(level) if level else 0.0  # an unlimited one is off too
+        return replace(self, figures=figures, max_force=max_force)
 
     @classmethod
     def none(cls) -> Self:

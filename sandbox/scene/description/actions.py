@@ -32,6 +32,9 @@ Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 Level = Annotated[float, Field(ge=0, le=1)]
 """Fraction of a thrust, or level of a drive."""
 
+MotorLevel = Annotated[float, Field(ge=-1, le=1)]
+"""Fraction of the largest torque of a motor; negative: in the opposite direction."""
+
 Value = float | int | bool | str | None
 """Value of a setting."""
 
@@ -243,6 +246,18 @@ class Drive(Timed):
     of a stroke drive"""
 
 
+class Actuate(Timed):
+    """Set the levels of motors, also of those of prismatic joints and wheels.
+
+    At a level a the motor aims at its rate, or at the opposite one if a is negative, with at most |a| times its largest
+    torque or force; at 0 it is off. Motors start at level 1. A motor without a largest torque is off or unlimited.
+    """
+
+    kind: Literal["actuate"] = default_kind("actuate")
+    levels: Annotated[dict[Name, MotorLevel], Field(min_length=1)]
+    """level of each motor that changes, −1 to 1, by the name of its joint"""
+
+
 class Toggle(Timed):
     """Switch collisions with a wall or post on or off, as for a drop target or a diverter.
 
@@ -314,6 +329,7 @@ _AnyEvent: TypeAlias = (
     | Launch
     | Throttle
     | Drive
+    | Actuate
     | Toggle
     | Reshape
     | Join
