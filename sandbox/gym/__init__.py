@@ -17,11 +17,21 @@ except ImportError:
     raise ImportError("sandbox.gym needs gymnasium: pip install -e '.[gym]'") from None
 
 from sandbox.game_names import game_specs
+from sandbox.gym.bipedal_walker import BipedalWalker
 from sandbox.gym.game_env import STATES, SandboxEnv
 from sandbox.gym.game_vector_env import CompiledOnlyError, SandboxVectorEnv, make_vector_env
 from sandbox.gym.lunar_lander import LunarLander
 
-__all__ = ["GAMES", "STATES", "CompiledOnlyError", "LunarLander", "SandboxEnv", "SandboxVectorEnv", "make_vector_env"]
+__all__ = [
+    "GAMES",
+    "STATES",
+    "BipedalWalker",
+    "CompiledOnlyError",
+    "LunarLander",
+    "SandboxEnv",
+    "SandboxVectorEnv",
+    "make_vector_env",
+]
 
 GAMES = {each.name: (each.scene, each.frame_skip) for spec in game_specs() for each in spec.environments}
 """Shipped scene and number of steps per action, by the name in the environment id."""
@@ -36,11 +46,19 @@ for _spec in game_specs():
             vector_entry_point="sandbox.gym:make_vector_env" if _spec.vector_rules is not None else None,
         )
 
-for _name, _arguments in {"LunarLander": {}, "LunarLanderContinuous": {"continuous": True}}.items():
+CLASSICS: dict[str, tuple[str, dict[str, bool], int, float]] = {
+    "LunarLander-v3": ("LunarLander", {}, 1000, 200.0),
+    "LunarLanderContinuous-v3": ("LunarLander", {"continuous": True}, 1000, 200.0),
+    "BipedalWalker-v3": ("BipedalWalker", {}, 1600, 300.0),
+    "BipedalWalkerHardcore-v3": ("BipedalWalker", {"hardcore": True}, 2000, 300.0),
+}
+"""Class, arguments, longest episode in steps, and return of a solution, by the name in the environment id."""
+
+for _name, (_class, _arguments, _steps, _threshold) in CLASSICS.items():
     gymnasium.register(
-        f"sandbox/{_name}-v3",
-        entry_point="sandbox.gym:LunarLander",
-        kwargs=_arguments,
-        max_episode_steps=1000,
-        reward_threshold=200.0,
+        f"sandbox/{_name}",
+        entry_point=f"sandbox.gym:{_class}",
+        kwargs=dict(_arguments),
+        max_episode_steps=_steps,
+        reward_threshold=_threshold,
     )

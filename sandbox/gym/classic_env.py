@@ -1,7 +1,7 @@
 """Base of the environments that repeat Gymnasium's Box2D environments on a scene and an engine of the sandbox."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 
@@ -22,31 +22,24 @@ SIZE = 600, 400
 class ClassicEnv(gymnasium.Env[Observation, Any]):
     """Environment whose episodes are scenes with actions, so that any engine can replay them.
 
-    A step of the environment is one step dt of the scene. The engine must be one that moves bodies by their velocities
-    first, and then changes these by gravity, contacts and joints, as pymunk and `reference` do. Box2D 2.3 does the same
-    in the other order, so that the states after its step are these: the positions after a step of the engine, and the
-    velocities and contacts before it.
+    A step of the environment is one step dt of the scene.
 
     Pickles and copies, also those of a running episode, repeat the episode from its start, and continue it alike.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
-    ENGINES: ClassVar[tuple[str, ...]] = ("pymunk", "reference")
-    """engines that move bodies first"""
 
     def __init__(self, scene: str, engine: str, render_mode: str | None) -> None:
         """Create an environment of a shipped scene; `reset` begins an episode.
 
         Raises:
             Refusal: the engine does not support the scene.
-            ValueError: the engine or the render mode does not exist, or the engine does not move bodies first.
+            ValueError: the engine or the render mode does not exist.
         """
         self._base = load(scene)
         missing = engine_named(engine).missing(self._base, self._base.solver)
         if missing:
             raise Refusal(engine, missing, able(self._base))
-        if engine not in self.ENGINES:
-            raise ValueError(f"{engine} changes velocities before it moves bodies; use {' or '.join(self.ENGINES)}")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
         self.engine, self.render_mode = engine, render_mode

@@ -48,6 +48,11 @@ UNITS = 0.5 * WIDTH, 0.5 * HEIGHT, 2.0 * FRAME_RATE / WIDTH, 2.0 * FRAME_RATE / 
 """m, m, m/s, m/s and rad/s, units of x, y, vx, vy and ω in an observation"""
 
 
+DRIFT_FIRST = "pymunk", "reference"
+"""Engines whose step moves the bodies by their velocities first, and then changes these. Box2D 2.3 does so in the other
+order: the state after its step has the positions after a step of these engines, and velocities and contacts before."""
+
+
 class LunarLander(ClassicEnv):
     """Land between the flags.
 
@@ -94,6 +99,8 @@ class LunarLander(ClassicEnv):
     ) -> None:
         """Create an environment; `reset` begins an episode."""
         super().__init__("games/lunar_lander", engine, render_mode)
+        if engine not in DRIFT_FIRST:
+            raise ValueError(f"{engine} changes velocities before it moves bodies; use {' or '.join(DRIFT_FIRST)}")
         if not -12.0 < gravity < 0.0:
             raise ValueError(f"gravity must be between -12 and 0 m/s², is {gravity!r}")
         self.continuous, self.gravity, self.enable_wind = continuous, gravity, enable_wind
