@@ -19,7 +19,6 @@ from sandbox.action import (
     Impulse,
     Join,
     Launch,
-    Remove,
     Throttle,
     Unjoin,
     check_speed,
@@ -49,11 +48,11 @@ class PersistentActions:
 
     def record(self, action: Action) -> None:
         """Record an action that was applied."""
-        if isinstance(action, Force):
-            self._forces[action.body] = action
-        elif isinstance(action, Throttle):
+        if action.kind == "throttle":
             self._throttles[action.thrust] = action
-        elif isinstance(action, Remove):
+        elif action.kind == "force":
+            self._forces[action.body] = action
+        elif action.kind == "remove":
             self._forces.pop(action.body, None)
 
     def remove_forces(self, removed: Iterable[str]) -> None:

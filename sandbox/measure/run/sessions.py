@@ -228,7 +228,7 @@ class Episode(SteppedGame):
 
     def _advance_quietly(self, steps: int) -> int:
         """Make at most so many steps, of which the rules see only the last, and the one before if something happens."""
-        simulation, table, retired = self.simulation, self._table, self.simulation.retired
+        simulation, table, retired = self.simulation, self._table, len(self.simulation.retired)
         table.clear()
         self._frame = None
         try:
@@ -238,10 +238,10 @@ class Episode(SteppedGame):
                 self._show_quiet_step(table.frame(table.count - 1, self.frame().present))
             raise
         contacts = simulation.contacts()
-        removed = simulation.retired.keys() - retired.keys()
+        removed = [*simulation.retired][retired:]
         if table.steps > 1 and (len(contacts) or removed):
             present = self.frame().present.copy()
-            present[list(removed)] = True
+            present[removed] = True
             self._show_quiet_step(table.frame(table.count - 2, present))
         self._update_rules(contacts)
         return table.steps
