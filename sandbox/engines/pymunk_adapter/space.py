@@ -72,6 +72,7 @@ class SpaceBodies:
         self._h = settings.h
         self.air = Air.of(scene.world, setup.bodies)
         """forces that depend on velocity"""
+        self._air_acts = self.air.acts_by_force
         self._space = new_space(scene, settings)
         self._members: dict[int, SpaceBody] = {}
         self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of bodies held by zones
@@ -401,7 +402,7 @@ class SpaceBodies:
     def rebuild_world(self, scene: Scene, air: Air) -> None:
         """Update after a change of the scene's gravity or air, or of its bodies."""
         self._scene, self._needs_check = scene, None
-        self.air = air
+        self.air, self._air_acts = air, air.acts_by_force
         self.field.fractions.clear()
         gravity = gravity_of(scene.world, self.air)
         if self._space.gravity != gravity:  # to set it wakes bodies
@@ -453,7 +454,7 @@ class SpaceBodies:
 
     def _set_forces(self, time: float) -> None:
         """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts, liquids and the air."""
-        if self.liquids is None and not self.air.acts_by_force:
+        if self.liquids is None and not self._air_acts:
             for set_forces in self._forces():
                 set_forces(time)
             return
@@ -481,7 +482,7 @@ class SpaceBodies:
         others = sum_of_loads(constant, thrusts)
         liquids.update(self._bodies, self.layer, self._read(), self._resting.keys(), self._scene.world.gravity, others)
         loads = sum_of_loads(thrusts, liquids.loads)
-        if self.air.acts_by_force:
+        if self._air_acts:
             self._apply_air(*self._read(), loads)
             return
         for n, (x, y, turn) in sum_of_loads(loads, constant).items():
@@ -494,7 +495,7 @@ class SpaceBodies:
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
-            or self.air.acts_by_force
+            or self._air_acts
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
@@ -550,7 +551,8 @@ class SpaceBodies:
         if not self._moving:
             return False
         self._read()
-        return self._state_check()(self._reader.numbers)
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
+            return self._state_check()(self._reader.numbers)
 
     def _state_check(self) -> StateCheck:
         """Return the check of states after each step of a batch; it is kept until bodies or bounds change."""

@@ -312,7 +312,7 @@ class SegmentBoxes:
 
     @property
     def sorted(self) -> tuple[FloatArray, IntArray, float, float]:
-        """The boxes (G, 4), m, from left to right, the index of each segment, the largest width and the highest top, m."""
+        """The boxes (G, 4), m, from left to right, the index of each segment, the largest width and highest top, m."""
         return self.box, self.index, self.max_width, self.max_top
 
 

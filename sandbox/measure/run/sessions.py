@@ -183,11 +183,12 @@ class Episode(SteppedGame):
         self._table = FrameTable(MAX_QUIET_STEPS, len(self.simulation.bodies))
         self._quiet_rules = self.rules if isinstance(self.rules, HasQuietSteps) else None
         self._levels = [0.0] * len(self.rules.controls)
+        self._dt, self._duration = self.scene.solver.dt, self.scene.world.duration
 
     @property
     def late(self) -> bool:
         """Whether the duration of the scene is over."""
-        return self.simulation.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+        return self.simulation.time >= self._duration - 0.5 * self._dt
 
     @property
     def ended(self) -> bool:
@@ -254,8 +255,7 @@ class Episode(SteppedGame):
     @property
     def _steps_left(self) -> int:
         """Number of steps to the duration of the scene."""
-        dt = self.scene.solver.dt
-        return math.ceil((self.scene.world.duration - self.simulation.time) / dt - 0.5)
+        return math.ceil((self._duration - self.simulation.time) / self._dt - 0.5)
 
 
 def _value(control: Control, level: float) -> float:
