@@ -6,6 +6,7 @@ are read as arrays afterwards, takes a tenth of the time of reading after each.
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,11 +45,16 @@ MAX_CONTACTS = (MAX_WORDS // 3) * 2
 """Upper bound of the contacts in a batch, while a substep has no more than half of them."""
 
 
-FEW_BODIES = 4
+FEW_BODIES = 8
 """Number of moving bodies up to which plain numbers are compared faster than arrays."""
 
 StateCheck = Callable[[FloatArray], bool]
-"""Returns whether a state (6·R,) has to be checked: a body may have diverged or left `world.bounds`."""
+"""Returns whether a state (6·R,) has to be checked: a body may have diverged or left `world.bounds`.
+
+With more than `FEW_BODIES` moving bodies it is called while numpy's warnings are switched off."""
+
+ignoring_overflow = partial(np.errstate, over="ignore", invalid="ignore")
+"""Context in which numpy does not warn about states that are not valid."""
 
 
 def state_check(
@@ -68,18 +74,20 @@ def state_check(
         bounds: of the scene, m; None without any.
     """
     needs_check = _vector_check(bodies, moving, within, bound, bounds)
-    if not isinstance(moving, slice) or moving.stop > FEW_BODIES:
+    begins = [STATE_WIDTH * row for row in np.arange(bodies)[moving].tolist()]
+    if len(begins) > FEW_BODIES:
         return needs_check
+    end = max(begins, default=0) + STATE_WIDTH
     (left, bottom), (right, top) = bounds or ((-math.inf, -math.inf), (math.inf, math.inf))
-    width = STATE_WIDTH * moving.stop
 
     def needs_check_of_few(state: FloatArray) -> bool:
-        values = state[:width].tolist()
-        for k in range(0, width, STATE_WIDTH):
+        values = state[:end].tolist()
+        for k in begins:
             x, y, angle, vx, vy, spin = values[k : k + STATE_WIDTH]
             size = abs(x) + abs(y) + abs(angle) + abs(vx) + abs(vy) + abs(spin)
             if not (left <= x <= right and bottom <= y <= top and size < bound):  # nan: not within
-                return needs_check(state)
+                with ignoring_overflow():
+                    return needs_check(state)
         return False
 
     return needs_check_of_few
@@ -190,7 +198,7 @@ class BatchReader:
         space, body_list, contact_list = self._space._space, self._bodies.data, contacts.data
         row = made = substep = 0
         is_checked = False
-        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
+        with ignoring_overflow():
             while made < steps and not is_checked:
                 time = (first + made) * dt
                 for k in range(substeps):

@@ -13,7 +13,7 @@ from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.forces.air import Air, mean_fraction, rates
-from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader, StateCheck, state_check
+from sandbox.engines.pymunk_adapter.batch_reader import FEW_BODIES, Batch, BatchReader, StateCheck, state_check
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
@@ -551,8 +551,7 @@ class SpaceBodies:
         if not self._moving:
             return False
         self._read()
-        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
-            return self._state_check()(self._reader.numbers)
+        return self._moving > FEW_BODIES or self._state_check()(self._reader.numbers)
 
     def _state_check(self) -> StateCheck:
         """Return the check of states after each step of a batch; it is kept until bodies or bounds change."""
