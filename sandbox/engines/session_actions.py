@@ -20,7 +20,6 @@ from sandbox.action import (
     Impulse,
     Join,
     Launch,
-    Remove,
     Throttle,
     Unjoin,
     check_speed,
@@ -54,13 +53,13 @@ class PersistentActions:
 
     def record(self, action: Action) -> None:
         """Record an action that was applied."""
-        if isinstance(action, Force):
-            self._forces[action.body] = action
-        elif isinstance(action, Throttle):
+        if action.kind == "throttle":
             self._throttles[action.thrust] = action
-        elif isinstance(action, Actuate):
+        elif action.kind == "actuate":
             self._motor_levels |= action.levels
-        elif isinstance(action, Remove):
+        elif action.kind == "force":
+            self._forces[action.body] = action
+        elif action.kind == "remove":
             self._forces.pop(action.body, None)
 
     def remove_forces(self, removed: Iterable[str]) -> None:
@@ -89,7 +88,7 @@ class PersistentActions:
         Args:
             joints: those that are left; the other motors have broken or were removed.
         """
-        levels = {name: level for name, level in self._motor_levels.items() if joints.motor_of(name) is not None}
+        levels = {name: level for name, level in self._motor_levels.items() if name in joints.motor_rows}
         motors = [Actuate(time=0.0, levels=levels)] if levels else []
         return [*self._forces.values(), *self._throttles.values(), *motors]
 

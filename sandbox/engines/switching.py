@@ -268,7 +268,7 @@ class SwitchableSimulation:
     @property
     def retired(self) -> Mapping[int, float]:
         """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return MappingProxyType({**self._retired, **self._segment.retired})
+        return MappingProxyType({**self._retired, **self._segment.retired}) if self._retired else self._segment.retired
 
     @property
     def broken(self) -> Mapping[int, float]:
@@ -324,7 +324,7 @@ class SwitchableSimulation:
         """
         self._apply_events()
         segment, before = self._segment, frames.steps
-        if math.isfinite(self._events.next):
+        if self._events.pending:
             steps = max(min(steps, math.ceil((self._events.next - self.time) / self.settings.dt - ROUNDING)), 1)
         # Mouse joints act in each step, sensors detect after each, and frames of a later segment have other indices.
         if self._pulls.any or self._sensors.is_started or segment.before is not None:
@@ -385,30 +385,22 @@ class SwitchableSimulation:
         Raises:
             ActionError: the action cannot be applied. The simulation is left unchanged.
         """
-        match action:
-            case Explosion():
-                self._explode(action)
-            case Pull():
-                self._pulls.set_pull(action, self._segment.simulation)
-            case Switch():
-                self._switch(action)
-            case Launch():
-                frame, bodies, is_launched = launch_state(action, self.scene, self.bodies, self.frame())
-                retired = {n: time for n, time in self.retired.items() if not is_launched[n]}
-                self._hand_over(self.engine, self.wanted, bodies, frame, retired)
-            case Spawn():
-                self._spawn(action)
-            case Join():
-                self._join(action)
-            case Unjoin():
-                self._unjoin(action)
-            case _:
-                self._segment.simulation.apply(action)
-                self._persistent.record(action)
-                if isinstance(action, SetParameter):
-                    self._segment.bodies = replace(
-                        self._segment.bodies, elements=self._segment.simulation.bodies.elements
-                    )
+        apply = _SESSION_ACTIONS.get(type(action))
+        if apply is not None:
+            apply(self, action)
+            return
+        self._segment.simulation.apply(action)
+        self._persistent.record(action)
+        if type(action) is SetParameter:
+            self._segment.bodies = replace(self._segment.bodies, elements=self._segment.simulation.bodies.elements)
+
+    def _pull(self, action: Pull) -> None:
+        self._pulls.set_pull(action, self._segment.simulation)
+
+    def _launch(self, action: Launch) -> None:
+        frame, bodies, is_launched = launch_state(action, self.scene, self.bodies, self.frame())
+        retired = {n: time for n, time in self.retired.items() if not is_launched[n]}
+        self._hand_over(self.engine, self.wanted, bodies, frame, retired)
 
     def _spawn(self, action: Spawn) -> None:
         name = action.single.name or self.bodies.new_name("spawned", self.scene.fixed_names)
@@ -424,6 +416,8 @@ class SwitchableSimulation:
         Raises:
             Exhaustion: one cannot be applied.
         """
+        if not self._events.pending:
+            return
         now = self.time + ROUNDING * self.settings.dt  # as for actions
         if self._events.next > now:
             return
@@ -621,6 +615,18 @@ class SwitchableSimulation:
     def close(self) -> None:
         """Release the resources of the engine."""
         self._segment.simulation.close()
+
+
+_SESSION_ACTIONS: Mapping[type, Callable[[SwitchableSimulation, Any], None]] = {
+    Explosion: SwitchableSimulation._explode,
+    Pull: SwitchableSimulation._pull,
+    Switch: SwitchableSimulation._switch,
+    Launch: SwitchableSimulation._launch,
+    Spawn: SwitchableSimulation._spawn,
+    Join: SwitchableSimulation._join,
+    Unjoin: SwitchableSimulation._unjoin,
+}
+"""Method that applies each action of a session; all others are those of an engine."""
 
 
 class Switchable(Protocol):

@@ -167,7 +167,7 @@ class GameSession:
 
     def note_actions(self, actions: Iterable[Action]) -> None:
         """Add actions of the player to the input of the next step, except switches of the engine."""
-        self._done += [action for action in actions if not isinstance(action, Switch)]
+        self._done += [action for action in actions if type(action) is not Switch]
 
     def replay(self, time: float, own: Sequence[Action], recorded: Sequence[Action]) -> None:
         """Compare the actions of the rules with the recording, and repeat the recorded inputs of a time.

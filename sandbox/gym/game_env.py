@@ -93,7 +93,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
         self.observed_bodies = np.asarray(_body_indices(self.scene, bodies), np.int64)
         """indices of the observed bodies"""
-        self._has_observation = isinstance(rules, HasObservation)
+        self._has_observation, self._has_players = isinstance(rules, HasObservation), isinstance(rules, HasPlayers)
         states = [
             f"{self.scene.bodies.names[index]} {state}" for index in self.observed_bodies.tolist() for state in STATES
         ]
@@ -215,14 +215,14 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
     def _info(self) -> dict[str, Any]:
         episode = self._current_episode()
-        rules = episode.rules
+        rules: Any = episode.rules
         info: dict[str, Any] = {
             "time": episode.time,
             "score": rules.score,
             "over": rules.game_over,
             "seed": episode.scene.world.seed,
         }
-        if isinstance(rules, HasPlayers):
+        if self._has_players:
             info |= {"player": rules.player, "scores": dict(rules.scores)}
         return info
 

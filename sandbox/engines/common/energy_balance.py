@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import numpy as np
 
@@ -60,16 +60,24 @@ def total_energy(simulation: Simulation) -> float:
     return energy_of(simulation.frame(), simulation.bodies, setup.scene.world.gravity, setup, breaks)[2]
 
 
-@contextmanager
-def record_energy_change(account: EnergyLedger | None, cause: Cause, simulation: Simulation) -> Iterator[None]:
+def record_energy_change(
+    account: EnergyLedger | None, cause: Cause, simulation: Simulation
+) -> AbstractContextManager[None]:
     """Attribute the energy change of a simulation within the context to a cause. Without an account do nothing.
 
     If the context raises, nothing is added: the simulation is unchanged then.
     """
-    before = 0.0 if account is None else total_energy(simulation)
+    return NO_RECORD if account is None else _recorded_change(account, cause, simulation)
+
+
+NO_RECORD: AbstractContextManager[None] = nullcontext()
+
+
+@contextmanager
+def _recorded_change(account: EnergyLedger, cause: Cause, simulation: Simulation) -> Iterator[None]:
+    before = total_energy(simulation)
     yield
-    if account is not None:
-        account.add(cause, total_energy(simulation) - before)
+    account.add(cause, total_energy(simulation) - before)
 
 
 class LedgerHandover:

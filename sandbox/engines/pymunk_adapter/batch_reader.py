@@ -5,7 +5,8 @@ are read as arrays afterwards, takes a tenth of the time of reading after each.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ import pymunk
 from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart
+from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart, WarmStarts
 from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_BODY, LIST_CONTACT, WORD, Listing
 from sandbox.engines.pymunk_adapter.reader import (
     SECOND_FLAGS,
@@ -26,6 +27,7 @@ from sandbox.engines.pymunk_adapter.reader import (
     VECTORS_OF_TWO_POINTS,
 )
 from sandbox.scene.description.base import Point
+from sandbox.scene.description.world import Settings
 
 OrderOf = Callable[[bytes], IntArray | None]
 """Returns the rows of a list of bodies, given by its ids, in the order of the reader; None if they are in it."""
@@ -43,8 +45,16 @@ MAX_CONTACTS = (MAX_WORDS // 3) * 2
 """Upper bound of the contacts in a batch, while a substep has no more than half of them."""
 
 
+FEW_BODIES = 8
+"""Number of moving bodies up to which plain numbers are compared faster than arrays."""
+
 StateCheck = Callable[[FloatArray], bool]
-"""Returns whether a state (6·R,) has to be checked: a body may have diverged or left `world.bounds`."""
+"""Returns whether a state (6·R,) has to be checked: a body may have diverged or left `world.bounds`.
+
+With more than `FEW_BODIES` moving bodies it is called while numpy's warnings are switched off."""
+
+ignoring_overflow = partial(np.errstate, over="ignore", invalid="ignore")
+"""Context in which numpy does not warn about states that are not valid."""
 
 
 def state_check(
@@ -54,7 +64,7 @@ def state_check(
     bound: float,
     bounds: tuple[Point, Point] | None,
 ) -> StateCheck:
-    """Return a check that decides most states by the product of one vector with itself.
+    """Return a check that decides most states by a few comparisons, or by the product of one vector with itself.
 
     Args:
         bodies: number of bodies in the space, R.
@@ -63,6 +73,34 @@ def state_check(
         bound: states whose vector is shorter than this are within.
         bounds: of the scene, m; None without any.
     """
+    needs_check = _vector_check(bodies, moving, within, bound, bounds)
+    begins = [STATE_WIDTH * row for row in np.arange(bodies)[moving].tolist()]
+    if len(begins) > FEW_BODIES:
+        return needs_check
+    end = max(begins, default=0) + STATE_WIDTH
+    (left, bottom), (right, top) = bounds or ((-math.inf, -math.inf), (math.inf, math.inf))
+
+    def needs_check_of_few(state: FloatArray) -> bool:
+        values = state[:end].tolist()
+        for k in begins:
+            x, y, angle, vx, vy, spin = values[k : k + STATE_WIDTH]
+            size = abs(x) + abs(y) + abs(angle) + abs(vx) + abs(vy) + abs(spin)
+            if not (left <= x <= right and bottom <= y <= top and size < bound):  # nan: not within
+                with ignoring_overflow():
+                    return needs_check(state)
+        return False
+
+    return needs_check_of_few
+
+
+def _vector_check(
+    bodies: int,
+    moving: slice | IntArray,
+    within: Callable[[FloatArray], BoolArray],
+    bound: float,
+    bounds: tuple[Point, Point] | None,
+) -> StateCheck:
+    """Return a check by the product of one vector with itself; the arguments are those of `state_check`."""
 
     def is_within(state: FloatArray) -> bool:
         return bool(within(state.reshape(-1, STATE_WIDTH)[moving]).all())
@@ -105,14 +143,15 @@ class Batch(NamedTuple):
 class BatchReader:
     """Makes many substeps of a space, and lists its bodies and contacts."""
 
-    def __init__(self, space: pymunk.Space, order_of: OrderOf | None = None) -> None:
+    def __init__(self, space: pymunk.Space, settings: Settings, order_of: OrderOf | None = None) -> None:
         """Create a reader.
 
         Args:
             space: the space.
+            settings: its steps.
             order_of: `SpaceReader.order_of` if bodies may fall asleep, else None.
         """
-        self._space, self._order_of = space, order_of
+        self._space, self._settings, self._order_of = space, settings, order_of
         self._bodies, self._contacts = Listing(STATE if order_of is None else STATE_BY_ID), Listing(TOUCH)
         self._states: FloatArray = np.empty(0)  # memory of the list of bodies, which never grows
 
@@ -122,52 +161,49 @@ class BatchReader:
 
     def step(
         self,
-        h: float,
+        first: int,
         steps: int,
-        substeps: int,
         bodies: int,
         moving: slice | Any,
         *,
         lists_substeps: bool,
-        lists_contacts: bool,
         polygons: bool,
         until_contact: bool,
-        warm_start: Callable[[], WarmStart | None] | None,
-        before_substep: Callable[[int, int], None] | None,
+        warm_starts: WarmStarts | None,
+        forces: Sequence[Callable[[float], None]],
         needs_check: StateCheck,
     ) -> Batch:
         """Make at most so many steps, until one whose state has to be checked.
 
         Args:
-            h: substep, s.
+            first: number of steps made before.
             steps: largest number of steps; their lists must fit, see `max_rows`.
-            substeps: substeps of a step.
             bodies: number of bodies in the space.
             moving: rows of the moving bodies in a list.
             lists_substeps: whether bodies are listed after every substep, not only after every step.
-            lists_contacts: whether contacts are listed, after every substep.
             polygons: whether contacts have up to two points.
             until_contact: whether the batch ends after a step for which contacts were listed, open ones or ended ones
                 that Munk2D still keeps.
-            warm_start: returns the impulses with which contacts of the last substep began, if there are any.
-            before_substep: is called before each substep, with the index of its step and its index in that step.
+            warm_starts: impulses with which contacts begin; contacts are listed, after every substep, if it is given.
+            forces: functions that set forces before each substep, given its start, s.
             needs_check: returns whether the batch ends with the present state, given the list of it (6·bodies,).
         """
-        width = STATE_WIDTH * bodies
+        h, dt, substeps, width = self._settings.h, self._settings.dt, self._settings.substeps, STATE_WIDTH * bodies
         rows = self._prepare(steps * (substeps if lists_substeps else 1), width)
         contacts = self._contacts
         contacts.clear()
         contacts.data.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
-        words, ends, warm_starts = contacts.integers, [], {}
+        words, ends, found = contacts.integers, list[int](), dict[int, WarmStart]()
         each_body, each_contact, step = lib.cpSpaceEachBody, lib.cpSpaceEachCachedArbiter, lib.cpSpaceStep
         space, body_list, contact_list = self._space._space, self._bodies.data, contacts.data
         row = made = substep = 0
         is_checked = False
-        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
+        with ignoring_overflow():
             while made < steps and not is_checked:
+                time = (first + made) * dt
                 for k in range(substeps):
-                    if before_substep is not None:
-                        before_substep(made, k)
+                    for set_forces in forces:
+                        set_forces(time + k * h)
                     if substep:
                         step(space, h)
                     else:  # checks bodies that are new
@@ -177,21 +213,21 @@ class BatchReader:
                         if self._order_of is not None:
                             self._put_in_order(rows[row], self._order_of)
                         row += 1
-                    if lists_contacts:
+                    if warm_starts is not None:
                         each_contact(space, LIST_CONTACT, contact_list)
                         ends.append(words.num)
-                        if warm_start is not None and (found := warm_start()) is not None:
-                            warm_starts[substep] = found
+                        if warm_starts.began.num and (warm_start := warm_starts.take()) is not None:
+                            found[substep] = warm_start
                     substep += 1
                 made += 1
                 is_checked = needs_check(rows[row - 1])
                 if words.num > (0 if until_contact else MAX_WORDS):
                     break
         lists = None
-        if lists_contacts:
+        if warm_starts is not None:
             width = VECTORS_OF_TWO_POINTS if polygons else VECTORS
             memory = ffi.buffer(words.arr, words.num * WORD) if words.num else b""
-            lists = ContactLists(memory, ends, contacts.numbers(np.complex128), width, warm_starts)
+            lists = ContactLists(memory, ends, contacts.numbers(np.complex128), width, found)
         return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], lists, is_checked)
 
     def _put_in_order(self, row: FloatArray, order_of: OrderOf) -> None:
@@ -206,6 +242,6 @@ class BatchReader:
         size = (rows + 1) * width  # one row more than needed: a full array would grow
         if len(self._states) < size:
             self._states = np.empty(size)
-        self._bodies.buffer.set_float_buf(self._states)
+            self._bodies.buffer.set_float_buf(self._states)
         self._bodies.clear()
         return self._states[: rows * width].reshape(rows, width)

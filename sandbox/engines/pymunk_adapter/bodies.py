@@ -68,6 +68,7 @@ class PymunkBodies(BodyStore):
         self.space_bodies = SpaceBodies(setup, settings)
         self.particles = Particles(setup.scene.world, settings.h, self.space_bodies.field)
         super().__init__(setup, settings.h)
+        self._ahead = self._velocity_ahead()
         self.velocity[~self.bodies.fixed] += self.ahead
         self.space_bodies.layer = self.layer
         self.space_bodies.rebuild(self.scene, self._air, self.contact_matrix)
@@ -79,6 +80,10 @@ class PymunkBodies(BodyStore):
     @property
     def ahead(self) -> FloatArray:
         """Velocity, (2,) m/s, by which velocities are ahead of time: half a kick, or 0."""
+        return self._ahead
+
+    def _velocity_ahead(self) -> FloatArray:
+        """Return `ahead` for the present gravity."""
         return np.asarray(self.scene.world.gravity) * self._half_kick
 
     @property
@@ -176,6 +181,7 @@ class PymunkBodies(BodyStore):
         self.refresh()
         present_velocity = self.velocity[self.mobile] - self.ahead
         super().change(setup, spawned)
+        self._ahead = self._velocity_ahead()
         self.velocity[self.mobile] = present_velocity + self.ahead
         if self._half_kick:
             for index in self.space_bodies.movable_indices():
@@ -253,8 +259,9 @@ class PymunkBodies(BodyStore):
 
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s."""
-        super().set_velocity(index, velocity + self.ahead)
-        self._owner(index).set_velocity(index, velocity + self.ahead)
+        velocity_ahead = velocity + self.ahead
+        super().set_velocity(index, velocity_ahead)
+        self._owner(index).set_velocity(index, velocity_ahead)
 
     def set_spin(self, index: int, spin: float) -> None:
         """Set the angular velocity of a body, rad/s."""

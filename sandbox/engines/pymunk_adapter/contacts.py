@@ -38,6 +38,8 @@ class WarmStarts:
         self.points: dict[int, npt.NDArray[Any]] | None = None
         """`CONTACT_POINT`s of contacts that began with impulses, by address of the arbiter; filled if it is a dict"""
         self._began = Listing(BEGINNING)
+        self.began = self._began.integers
+        """array whose `num` is not 0 if contacts have begun since the last `take`"""
         space.on_collision(begin=self._begin)
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
@@ -50,7 +52,7 @@ class WarmStarts:
 
     def take(self) -> WarmStart | None:
         """Return and clear the impulses; None if all contacts of the last substep began at 0."""
-        if not self._began.integers.num:
+        if not self.began.num:
             return None
         impulses = self._began.numbers(np.complex128)
         started = np.flatnonzero(impulses)
@@ -205,34 +207,37 @@ class ContactLists:
         self._words, self._vectors, self.width = words, vectors, width
         self.count = word_ends[-1] // 3
         """number of all contacts, with those that have ended and that Munk2D still keeps"""
-        self._byte_ends = [0, *(end * WORD for end in word_ends)]
-        self._vector_ends = [0, *(end // 3 * width for end in word_ends)]
+        self._ends = [0, *word_ends]
         self.warm_starts = warm_starts
         """impulses with which contacts began, by substep"""
 
     def __len__(self) -> int:
-        return len(self._byte_ends) - 1
+        return len(self._ends) - 1
 
     def words(self, k: int) -> bytes:
         """Return the integers of a substep: two ids and the number of points of each contact."""
-        words: bytes = self._words[self._byte_ends[k] : self._byte_ends[k + 1]]
+        words: bytes = self._words[self._ends[k] * WORD : self._ends[k + 1] * WORD]
         return words
 
     def vectors(self, k: int) -> ComplexArray:
         """Return the vectors of a substep."""
-        return self._vectors[self._vector_ends[k] : self._vector_ends[k + 1]]
+        return self._vectors[self._vector_index(k) : self._vector_index(k + 1)]
 
     def stack(self, begin: int, end: int) -> ComplexArray:
         """Return the vectors of substeps whose integers are equal, one row each."""
-        return self._vectors[self._vector_ends[begin] : self._vector_ends[end]].reshape(end - begin, -1)
+        return self._vectors[self._vector_index(begin) : self._vector_index(end)].reshape(end - begin, -1)
+
+    def _vector_index(self, k: int) -> int:
+        """Return the index of the first vector of a substep."""
+        return self._ends[k] // 3 * self.width
 
     def end_of_same(self, k: int) -> int:
         """Return the first substep after k whose integers differ from those of k, or that has warm starts."""
-        words, ends, last, count = self._words, self._byte_ends, self.words(k), len(self)
-        if not self.warm_starts and words[ends[k] :] == last * (count - k):
+        last, count = self.words(k), len(self)
+        if not self.warm_starts and self._words[self._ends[k] * WORD :] == last * (count - k):
             return count
         end = k + 1
-        while end < count and words[ends[end] : ends[end + 1]] == last and end not in self.warm_starts:
+        while end < count and self.words(end) == last and end not in self.warm_starts:
             end += 1
         return end
 
@@ -253,12 +258,8 @@ class ContactReader:
             impulses_suffice: whether impulses alone suffice if the contacts are those of the last call, in that order.
         """
         is_same = self._reader.read_contacts(polygons) and self.is_started
-        self._start().lists_pairs = True
-        return self._corrected(is_same and impulses_suffice, self.take_warm_start())
-
-    def take_warm_start(self) -> WarmStart | None:
-        """Return and clear the impulses with which contacts of the last substep began; None if there are none."""
-        return None if self._warm_starts is None else self._warm_starts.take()
+        self.warm_starts.lists_pairs = True
+        return self._corrected(is_same and impulses_suffice, self.warm_starts.take())
 
     @property
     def is_listed(self) -> bool:
@@ -330,7 +331,9 @@ class ContactReader:
         ids, impulses = warm_start
         return subtract_impulses(found, self._reader.indices(ids), impulses)
 
-    def _start(self) -> WarmStarts:
+    @property
+    def warm_starts(self) -> WarmStarts:
+        """The impulses with which contacts begin, which are listed from the first call on."""
         if self._warm_starts is None:
             self._warm_starts = WarmStarts(self._space)
         return self._warm_starts
@@ -338,5 +341,5 @@ class ContactReader:
     def points(self) -> ContactPoints:
         """Return the contact points of the last substep; from the first call on, their impulses are corrected."""
         if self._points is None:
-            self._points = ContactPointReader(self._space, self._start(), self._pair_callbacks)
+            self._points = ContactPointReader(self._space, self.warm_starts, self._pair_callbacks)
         return self._points.read(self._reader.records)

@@ -21,7 +21,7 @@ velocity update.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 import numpy as np
@@ -31,7 +31,7 @@ from pymunk._chipmunk_cffi import ffi, lib
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.forces.air import Air, mean_acceleration, mean_angular_acceleration
 from sandbox.engines.forces.attraction import pull
-from sandbox.engines.forces.thrust import load
+from sandbox.engines.forces.thrust import load as thrust_load
 from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
@@ -42,6 +42,12 @@ from sandbox.scene.geometry.shapes import geometry_of
 
 if TYPE_CHECKING:
     from sandbox.engines.forces.liquid import Liquids
+
+
+Load: TypeAlias = tuple[float, float, float]
+"""Force (x, y), N, and torque, N·m, on a body"""
+
+NO_LOAD: Load = 0.0, 0.0, 0.0
 
 
 class AttractionField:
@@ -131,48 +137,68 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
 
 
 class BodyThrusts:
-    """Thrusts on one body."""
+    """Thrusts on one body in the space."""
 
-    def __init__(self, thrusts: list[tuple[int, Thrust, Point]], body: pymunk.Body) -> None:
-        """Apply thrusts, each with its index and its arm in the body's frame, m, to a body in the space."""
-        self._thrusts, self.record = thrusts, body._body
+    def __init__(
+        self,
+        thrusts: list[tuple[int, Thrust, Point]],
+        levels: Sequence[float],
+        body: pymunk.Body,
+        began: float,
+        h: float,
+    ) -> None:
+        """Apply thrusts to a body.
+
+        Args:
+            thrusts: each with its index and its arm in the body's frame, m.
+            levels: of all thrusts of the scene; they may change, see `invalidate`.
+            body: the body.
+            began: time of the scene at the start of the simulation, s.
+            h: substep, s.
+        """
+        self._thrusts, self._levels, self._record, self._began, self._h = thrusts, levels, body._body, began, h
         self._is_timed = any(thrust.begin > 0.0 or thrust.end is not None for _, thrust, _ in thrusts)
-        self._constant: tuple[float, float, float] | None = None
+        self._own_load: Load | None = None  # in the body's frame; None if it has to be computed
+        self.load: Load = NO_LOAD
+        """force (x, y), N, and torque, N·m, in the last substep"""
 
     def invalidate(self) -> None:
         """Record that a level has changed."""
-        self._constant = None
+        self._own_load = None
 
-    def load(self, levels: Sequence[float], time: float, h: float) -> tuple[float, float, float]:
-        """Return the force (x, y), N, and torque, N·m, in a substep.
-
-        Args:
-            levels: of all thrusts.
-            time: of the scene at the start of the substep, s.
-            h: substep, s.
-        """
-        load = self._constant
+    def update(self, time: float) -> Load:
+        """Return `load`, updated to that of a substep that starts at a time of the simulation, s."""
+        load = self._own_load
         if load is None:
-            load = self._sum(levels, time)
+            load = self._sum(self._began + time)
             if not self._is_timed:
-                self._constant = load
+                self._own_load = load
         x, y, torque = load
-        if not (x or y):  # a torque is the same in every frame
-            return load
-        record = self.record
-        angle = lib.cpBodyGetAngle(record) + lib.cpBodyGetAngularVelocity(record) * h
-        if not math.isfinite(angle):  # math.cos would raise; the step is found to have diverged
-            return load
-        cos, sin = math.cos(angle), math.sin(angle)
-        return x * cos - y * sin, x * sin + y * cos, torque
+        if x or y:  # a torque is the same in every frame
+            angle = lib.cpBodyGetAngle(self._record) + lib.cpBodyGetAngularVelocity(self._record) * self._h
+            if math.isfinite(angle):  # else math.cos would raise; the step is found to have diverged
+                cos, sin = math.cos(angle), math.sin(angle)
+                load = x * cos - y * sin, x * sin + y * cos, torque
+        self.load = load
+        return load
 
-    def _sum(self, levels: Sequence[float], time: float) -> tuple[float, float, float]:
-        """Return force and torque in the body's frame."""
+    def apply(self, time: float, constant: tuple[FloatArray, float] | None = None) -> None:
+        """Set the force and torque of a substep that starts at a time, s, with constant ones on the body."""
+        x, y, torque = self.update(time)
+        if constant is not None:
+            force, constant_torque = constant
+            x, y, torque = x + force[0], y + force[1], torque + constant_torque
+        if x or y or torque:  # pymunk resets them to 0 after each step
+            lib.cpBodySetForce(self._record, (x, y))
+            lib.cpBodySetTorque(self._record, torque)
+
+    def _sum(self, time: float) -> Load:
+        """Return force and torque in the body's frame, at a time of the scene, s."""
         x = y = torque = 0.0
         for k, thrust, arm in self._thrusts:
-            level = levels[k]
+            level = self._levels[k]
             if level and thrust.begin <= time and (thrust.end is None or time < thrust.end):
-                fx, fy, turning = load(level, *thrust.force, *arm)
+                fx, fy, turning = thrust_load(level, *thrust.force, *arm)
                 x, y, torque = x + fx, y + fy, torque + turning
         return x, y, torque
 
@@ -180,10 +206,11 @@ class BodyThrusts:
 class Thrusts:
     """Thrusts on bodies in the space."""
 
-    def __init__(self, setup: Setup) -> None:
+    def __init__(self, setup: Setup, h: float) -> None:
+        """Start with the levels of a scene; h is the substep, s."""
         scene, bodies = setup.scene, setup.bodies
         self._levels = [0.0 if thrust.key else 1.0 for thrust in scene.thrusts]
-        self._began = setup.time
+        self._began, self._h = setup.time, h
         self._of_body: dict[int, list[tuple[int, Thrust, Point]]] = {}
         for k, thrust in enumerate(scene.thrusts):
             index = bodies.number_of.get(thrust.body)
@@ -193,12 +220,6 @@ class Thrusts:
             arm = thrust.point[0] - x, thrust.point[1] - y
             self._of_body.setdefault(index, []).append((k, thrust, arm))
         self._in_space: dict[int, BodyThrusts] = {}
-        self.loads: dict[int, tuple[float, float, float]] = {}
-        """force (x, y), N, and torque, N·m, on each body in the last substep, by body index"""
-
-    def __len__(self) -> int:
-        """Return the number of bodies in the space that carry thrusts."""
-        return len(self._in_space)
 
     def acts_on(self, index: int) -> bool:
         """Return whether a body carries a thrust."""
@@ -206,12 +227,11 @@ class Thrusts:
 
     def join(self, index: int, body: pymunk.Body) -> None:
         """Apply the thrusts to a body in the space from now on."""
-        self._in_space[index] = BodyThrusts(self._of_body[index], body)
+        self._in_space[index] = BodyThrusts(self._of_body[index], self._levels, body, self._began, self._h)
 
     def leave(self, index: int) -> None:
         """Stop: a body leaves the space."""
         self._in_space.pop(index, None)
-        self.loads.pop(index, None)
 
     def set_level(self, index: int, level: float) -> None:
         """Set the level of a thrust, by its index in the scene."""
@@ -219,27 +239,23 @@ class Thrusts:
         for each in self._in_space.values():
             each.invalidate()
 
-    def apply(self, time: float, h: float, constant: Mapping[int, tuple[FloatArray, float]]) -> None:
-        """Set the forces and torques of a substep.
+    def forces(self, constant: Mapping[int, tuple[FloatArray, float]]) -> Iterator[Callable[[float], None]]:
+        """Yield functions that set the force and torque of a substep on each body, given its start, s.
 
         Args:
-            time: start of the substep, s.
-            h: substep, s.
             constant: other forces, N, and torques, N·m, to add, by body index.
         """
-        self.update_loads(time, h)
-        for index, (x, y, torque) in self.loads.items():
-            if index in constant:
-                force, constant_torque = constant[index]
-                x, y, torque = x + force[0], y + force[1], torque + constant_torque
-            if x or y or torque:  # pymunk resets them to 0 after each step
-                lib.cpBodySetForce(self._in_space[index].record, (x, y))
-                lib.cpBodySetTorque(self._in_space[index].record, torque)
-
-    def update_loads(self, time: float, h: float) -> None:
-        """Update `loads` to those of a substep of h, s, that starts at a time, s."""
         for index, each in self._in_space.items():
-            self.loads[index] = each.load(self._levels, self._began + time, h)
+            yield partial(each.apply, constant=constant[index]) if index in constant else each.apply
+
+    def update_loads(self, time: float) -> "BodyLoads":
+        """Return `loads`, updated to those of a substep that starts at a time, s."""
+        return {index: each.update(time) for index, each in self._in_space.items()}
+
+    @property
+    def loads(self) -> "BodyLoads":
+        """Force (x, y), N, and torque, N·m, on each body in the last substep, by body index."""
+        return {index: each.load for index, each in self._in_space.items()}
 
 
 @cache
@@ -266,8 +282,8 @@ def scale_gravity(body: pymunk.Body, scale: float) -> None:
     body.velocity_func = update_velocity
 
 
-BodyLoads: TypeAlias = Mapping[int, tuple[float, float, float]]
-"""Force (x, y), N, and torque, N·m, on some bodies, by their index"""
+BodyLoads: TypeAlias = Mapping[int, Load]
+"""Loads on some bodies, by their index"""
 
 
 def sum_of_loads(*each: BodyLoads) -> dict[int, tuple[float, float, float]]:

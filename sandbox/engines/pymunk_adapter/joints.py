@@ -243,17 +243,17 @@ class SpaceJoints:
         if before is None or joints is before:
             return
         self._joints = joints
-        for k, constraint in self._constraints.items():
+        changed = (joints.figures != before.figures).any(axis=1) | (joints.max_force != before.max_force)
+        for k in np.flatnonzero(changed).tolist():  # only of these, as to set values wakes bodies
+            constraint = self._constraints.get(k)
             if isinstance(constraint, pymunk.SimpleMotor):
-                rate, max_force = -float(joints.figures[k, 0]), float(joints.max_force[k])
-                if (constraint.rate, constraint.max_force) != (rate, max_force):  # to set them wakes bodies
-                    constraint.rate, constraint.max_force = rate, max_force
-            elif isinstance(constraint, pymunk.PinJoint) and joints.kind[k] == JointKind.LINEAR_MOTOR:
-                speed, max_force = float(joints.figures[k, 2]), float(joints.max_force[k])
-                if (before.figures[k, 2], before.max_force[k]) != (speed, max_force):
-                    _set_speed(constraint, joints, k)
-                    constraint.max_force = max_force
-        self._rebuild(self._of_constraints())
+                constraint.rate = -float(joints.figures[k, 0])
+            elif isinstance(constraint, pymunk.PinJoint):
+                _set_speed(constraint, joints, k)
+            else:
+                continue
+            constraint.max_force = float(joints.max_force[k])
+        self._by_kind = None
 
     def remove(self, index: int) -> None:
         """Remove the joints of a body that leaves."""
@@ -299,7 +299,7 @@ class SpaceJoints:
         """The present joints by kind."""
         if self._by_kind is None:
             springs, rotary = JointKind.SPRING, JointKind.ROTARY_SPRING
-            present = self._present
+            present = self._of_constraints()
             rigid = present.some(~np.isin(present.kind, (springs, rotary)))
             self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(*MOTORS))
         return self._by_kind
@@ -327,13 +327,13 @@ class SpaceJoints:
 
     def _of_constraints(self) -> JointArrays:
         """Return the joints that have a constraint."""
-        assert self._joints is not None
+        if self._joints is None:
+            return JointArrays.none()
         return self._joints.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64))
 
     def _rebuild(self, joints: JointArrays) -> None:
         """Update the lists of present joints, and of those that can break."""
         self.count = len(self._constraints)
-        self._present: JointArrays = joints
         self._by_kind = None
         breakable = joints.some(np.isfinite(joints.strength))
         kinds = JointKind.SPRING, JointKind.ROTARY_SPRING

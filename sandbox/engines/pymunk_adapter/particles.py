@@ -5,6 +5,7 @@ rounding, so the result is identical to pymunk's, bit for bit, with and without 
 of a frame are computed while a body's state is in registers.
 """
 
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -87,7 +88,7 @@ class Particles:
 
     def holds(self, index: int) -> bool:
         """Return whether a body is a particle."""
-        row = int(np.searchsorted(self.indices, index))
+        row = bisect_left(self.indices, index)
         return row < len(self.indices) and int(self.indices[row]) == index
 
     def _set_indices(self, indices: IntArray) -> None:

@@ -9,7 +9,7 @@ from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, 
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
-from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_CONTACT, Listing
+from sandbox.engines.pymunk_adapter.munk2d_memory import LIST_BODY, LIST_CONTACT, Listing
 
 LARGEST_TABLE = 1 << 22
 """Slots; 32 MB. If addresses are more scattered than that, ids are searched instead."""
@@ -82,12 +82,13 @@ class SpaceReader:
 
     def __init__(self, space: pymunk.Space, can_sleep: bool = False) -> None:
         self._space, self._can_sleep = space, can_sleep
-        self._fields = STATE_BY_ID if can_sleep else STATE
         self._ids: IntArray = np.empty(0, np.int64)  # of all bodies, in the order of rows
         self._rank = self._ids  # rank of each of these ids
         self._reordered: tuple[bytes, IntArray] = b"", self._ids  # ids of a list in another order, and its sorted rows
-        self._bodies, self._pairs, self._forces = Buffer(), Buffer(), Buffer()
-        self._contacts = Listing(TOUCH)
+        self._bodies, self._contacts = Listing(STATE_BY_ID if can_sleep else STATE), Listing(TOUCH)
+        self._pairs, self._forces = Buffer(), Buffer()
+        self.numbers: FloatArray = np.empty(0)
+        """all numbers of the last list of bodies, (6·B,) in the order of rows; valid until the next list"""
         self._vectors = NO_VECTORS  # of the present list of contacts
         self._index_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
@@ -116,10 +117,12 @@ class SpaceReader:
         if self._is_order_stale:
             self._read_order()
         self._bodies.clear()
-        get_space_bodies(self._space, self._fields, self._bodies)
-        table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
-        if self._can_sleep and (order := self.order_of(bytes(self._bodies.int_buf()))) is not None:
+        lib.cpSpaceEachBody(self._space._space, LIST_BODY, self._bodies.data)
+        self.numbers = self._bodies.numbers()
+        table = self.numbers.reshape(-1, STATE_WIDTH)
+        if self._can_sleep and (order := self.order_of(self._bodies.words())) is not None:
             table = table[order]
+            self.numbers = table.reshape(-1)
         return self._indices, table[: len(self._rows)] if self._moving_come_first else table[self._rows]
 
     def indices(self, ids: IntArray) -> IntArray:
@@ -146,8 +149,8 @@ class SpaceReader:
     def _read_order(self) -> None:
         """Read the order of the rows by their ids. It holds until bodies are added or removed."""
         self._bodies.clear()
-        get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies)
-        self._ids = ids = np.frombuffer(self._bodies.int_buf(), np.int64).copy()
+        get_space_bodies(self._space, BodyFields.BODY_ID, self._bodies.buffer)
+        self._ids = ids = np.frombuffer(self._bodies.words(), np.int64)
         self._rank = np.argsort(np.argsort(ids))
         self._rows = np.flatnonzero(np.isin(ids, self._moving))
         self._indices = self._index_of.indices(ids[self._rows])

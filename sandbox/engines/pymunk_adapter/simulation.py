@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from sandbox.action import Action
+from sandbox.action import Action, Force, Impulse
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BaseSimulation, observe_path
@@ -169,8 +169,15 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
             self._check_running()
             self._make_step(self._settings.substeps)
             self._steps += 1
-            self._check_state()
-            self._retire()
+            if self._needs_check:
+                self._check_state()
+                self._retire()
+
+    @property
+    def _needs_check(self) -> bool:
+        """Whether a body may have diverged, or may have to be removed."""
+        store = self._store
+        return len(store.particles) > 0 or store.has_lifetimes or store.space_bodies.needs_check
 
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
@@ -189,9 +196,9 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
             self._check_running()
             frames.prepare(steps, len(self.bodies))
             end, is_over = frames.steps + steps, False
-            while frames.steps < end and self._can_batch and not is_over:
+            while frames.steps < end and not is_over:
                 self._advance_batch(end - frames.steps, frames, until_event)
-                is_over = until_event
+                is_over = until_event or not self._can_batch
 
     @property
     def _can_batch(self) -> bool:
@@ -209,12 +216,11 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
         """Make at most so many steps in one batch, which ends when a body leaves or, if wanted, has a contact."""
         store, observed = self._store, self._observer is not None
         space_bodies, substeps, h = store.space_bodies, self._settings.substeps, self._h
-        steps = min(steps, space_bodies.batch_steps(substeps, observed))
+        steps = min(steps, space_bodies.batch_steps(observed))
         start = self._state()[0].copy() if observed else NO_POSITIONS
         batch = space_bodies.step_batch(
             self._steps,
             steps,
-            substeps,
             lists_substeps=observed,
             lists_contacts=self._recorder is not None,
             until_contact=until_contact,
@@ -255,16 +261,14 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
         rows, n = slice(frames.count, frames.count + len(states)), len(self.bodies)
         due = np.arange(self._steps + first_due, self._steps + first_due + every * len(states), every)
         frames.time[rows] = due * self._settings.dt
-        columns = [
-            array[rows, :n] for array in (frames.position, frames.velocity, frames.angle, frames.angular_velocity)
-        ]
-        fixed = (store.position, store.velocity, store.angle, store.angular_velocity)
-        if len(store.space_bodies) < n:  # without those in the space that move
-            for column, values in zip(columns, fixed, strict=True):
-                column[:] = values
-        store.space_bodies.write_states(states, *columns)
+        arrays = frames.position, frames.velocity, frames.angle, frames.angular_velocity
+        if len(store.space_bodies) < n:  # of those outside the space, and those that do not move
+            fixed = store.position, store.velocity, store.angle, store.angular_velocity
+            for array, values in zip(arrays, fixed, strict=True):
+                array[rows, :n] = values
+        store.space_bodies.write_states(states, rows, *arrays)
         if self._settings.half_kick:
-            columns[1][:, store.mobile] -= store.ahead
+            frames.velocity[rows, :n][:, store.mobile] -= store.ahead
         if len(store.scene.layers) > 1:
             frames.layer_rows()[rows, :n] = store.layer
         frames.finish_rows(len(states), n)
@@ -308,6 +312,8 @@ class PymunkSimulation(HasBodyStore, BaseSimulation):
                 leaving = apply_action(action, self._store)
                 self._store.invalidate()
                 self._shared_angles = None
+            if type(action) in (Impulse, Force):  # which neither place nor change bodies
+                return
             self._store.space_bodies.extend_planes()
             if self._recorder is not None:
                 self._recorder.rebuild()

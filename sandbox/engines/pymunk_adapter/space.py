@@ -1,7 +1,7 @@
 """Bodies in the pymunk space: their creation, steps and state."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from sandbox.engines.common.base import BEYOND, FARTHEST
 from sandbox.engines.common.collision_bits import bits_of_body
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
 from sandbox.engines.forces.air import Air, mean_fraction, rates
-from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader, StateCheck, state_check
+from sandbox.engines.pymunk_adapter.batch_reader import FEW_BODIES, Batch, BatchReader, StateCheck, state_check
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
@@ -72,12 +72,13 @@ class SpaceBodies:
         self._h = settings.h
         self.air = Air.of(scene.world, setup.bodies)
         """forces that depend on velocity"""
+        self._air_acts = self.air.acts_by_force
         self._space = new_space(scene, settings)
         self._members: dict[int, SpaceBody] = {}
         self._resting: dict[int, tuple[float, float]] = {}  # mass and moment of bodies held by zones
         self._state: tuple[IntArray, FloatArray] | None = None  # as last read; None after a change
         self._reader = SpaceReader(self._space, bool(settings.sleeping))
-        self._batch_reader = BatchReader(self._space, self._reader.order_of if settings.sleeping else None)
+        self._batch_reader = BatchReader(self._space, settings, self._reader.order_of if settings.sleeping else None)
         self._surface_setter = SurfaceSetter(self._space, settings.h)
         self._static_shapes = StaticShapes(self._space, self._surface_setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
@@ -91,7 +92,7 @@ class SpaceBodies:
         self._name_of: dict[int, str] = {}
         self.contact_reader = ContactReader(self._space, self._reader, self._surface_setter.pair_callbacks)
         """reads the contacts of the space"""
-        self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
+        self.field, self.thrusts = AttractionField(setup), Thrusts(setup, settings.h)
         self.liquids = SpaceLiquids.of(scene, settings.h)
         """liquids of zones; None without any"""
         self._bodies = setup.bodies
@@ -197,7 +198,7 @@ class SpaceBodies:
 
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s."""
-        self._members[index].body.velocity = float(velocity[0]), float(velocity[1])
+        lib.cpBodySetVelocity(self._members[index].body._body, (velocity[0], velocity[1]))
         self._state = None
 
     def set_spin(self, index: int, spin: float) -> None:
@@ -401,7 +402,7 @@ class SpaceBodies:
     def rebuild_world(self, scene: Scene, air: Air) -> None:
         """Update after a change of the scene's gravity or air, or of its bodies."""
         self._scene, self._needs_check = scene, None
-        self.air = air
+        self.air, self._air_acts = air, air.acts_by_force
         self.field.fractions.clear()
         gravity = gravity_of(scene.world, self.air)
         if self._space.gravity != gravity:  # to set it wakes bodies
@@ -453,29 +454,35 @@ class SpaceBodies:
 
     def _set_forces(self, time: float) -> None:
         """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts, liquids and the air."""
+        if self.liquids is None and not self._air_acts:
+            for set_forces in self._forces():
+                set_forces(time)
+            return
         if self._paths:
             self._paths.before(time)
+        thrusts = self.thrusts.update_loads(time)
         if self.liquids is not None:
-            self._apply_liquids(time, self.liquids)
-            return
-        if self.air.acts_by_force:
-            self.thrusts.update_loads(time, self._h)
-            self._apply_air(*self._read(), self.thrusts.loads)
-            return
-        if self.constant_forces:
-            self.constant_forces.apply(self._body)
-        if self.thrusts:
-            self.thrusts.apply(time, self._h, self.constant_forces.total)
+            self._apply_liquids(self.liquids, thrusts)
+        else:
+            self._apply_air(*self._read(), thrusts)
 
-    def _apply_liquids(self, time: float, liquids: SpaceLiquids) -> None:
-        """Set the forces of a substep that starts at a time, s, in a scene with liquids."""
-        self.thrusts.update_loads(time, self._h)
-        thrusts = self.thrusts.loads
+    def _forces(self) -> list[Callable[[float], None]]:
+        """Return the functions that set forces before a substep, given its start, s; without air and liquids."""
+        forces: list[Callable[[float], None]] = []
+        if self._paths:
+            forces.append(self._paths.before)
+        if self.constant_forces:
+            forces.append(lambda _: self.constant_forces.apply(self._body))
+        forces += self.thrusts.forces(self.constant_forces.total)
+        return forces
+
+    def _apply_liquids(self, liquids: SpaceLiquids, thrusts: BodyLoads) -> None:
+        """Set the forces of the next substep in a scene with liquids; `thrusts` are the loads of thrusts."""
         constant = {n: (float(x), float(y), turn) for n, ((x, y), turn) in self.constant_forces.items()}
         others = sum_of_loads(constant, thrusts)
         liquids.update(self._bodies, self.layer, self._read(), self._resting.keys(), self._scene.world.gravity, others)
         loads = sum_of_loads(thrusts, liquids.loads)
-        if self.air.acts_by_force:
+        if self._air_acts:
             self._apply_air(*self._read(), loads)
             return
         for n, (x, y, turn) in sum_of_loads(loads, constant).items():
@@ -488,7 +495,7 @@ class SpaceBodies:
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
-            or self.air.acts_by_force
+            or self._air_acts
             or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
@@ -498,16 +505,15 @@ class SpaceBodies:
             or self.rolling.is_active
         )
 
-    def batch_steps(self, substeps: int, lists_substeps: bool) -> int:
+    def batch_steps(self, lists_substeps: bool) -> int:
         """Return the largest number of steps of `step_batch`."""
         rows = self._batch_reader.max_rows(self._reader.body_count)
-        return max(rows // substeps, 1) if lists_substeps else rows
+        return max(rows // self._settings.substeps, 1) if lists_substeps else rows
 
     def step_batch(
         self,
         first: int,
         steps: int,
-        substeps: int,
         *,
         lists_substeps: bool,
         lists_contacts: bool,
@@ -518,34 +524,34 @@ class SpaceBodies:
         Args:
             first: number of steps made before.
             steps: largest number of steps, at most `batch_steps`.
-            substeps: substeps of a step.
             lists_substeps: whether states are listed after every substep, not only after every step.
             lists_contacts: whether contacts are listed, after every substep.
             until_contact: whether the batch ends after the first step with contacts.
         """
-        contacts, dt = self.contact_reader, self._settings.dt
         self._state = None
-
-        def before_substep(step: int, k: int) -> None:
-            self._set_forces((first + step) * dt + k * self._h)
-
         batch = self._batch_reader.step(
-            self._h,
+            first,
             steps,
-            substeps,
             self._reader.body_count,
             self._reader.moving_rows,
             lists_substeps=lists_substeps,
-            lists_contacts=lists_contacts,
             polygons=self._polygons,
             until_contact=until_contact,
-            warm_start=contacts.take_warm_start if lists_contacts else None,
-            before_substep=before_substep if self.thrusts or self.constant_forces or self._paths else None,
+            warm_starts=self.contact_reader.warm_starts if lists_contacts else None,
+            forces=self._forces(),
             needs_check=self._state_check(),
         )
         # The states are valid until the next batch, like those that the reader returns.
         self._state = self._reader.moving_indices, batch.states[-1]
         return batch
+
+    @property
+    def needs_check(self) -> bool:
+        """Whether the state after a step has to be checked: a body may have diverged or left `world.bounds`."""
+        if not self._moving:
+            return False
+        self._read()
+        return self._moving > FEW_BODIES or self._state_check()(self._reader.numbers)
 
     def _state_check(self) -> StateCheck:
         """Return the check of states after each step of a batch; it is kept until bodies or bounds change."""
@@ -559,15 +565,16 @@ class SpaceBodies:
     def write_states(
         self,
         states: FloatArray,
+        rows: slice,
         position: FloatArray,
         velocity: FloatArray,
         angle: FloatArray,
         angular_velocity: FloatArray,
     ) -> None:
-        """Write states (S, R, 6) of a batch into arrays of S frames, in scene order."""
+        """Write states (S, R, 6) of a batch into S rows of arrays of frames, in scene order."""
         slots = self._reader.slots
-        position[:, slots], velocity[:, slots] = states[..., 0:2], states[..., 3:5]
-        angle[:, slots], angular_velocity[:, slots] = states[..., 2], states[..., 5]
+        position[rows, slots], velocity[rows, slots] = states[..., 0:2], states[..., 3:5]
+        angle[rows, slots], angular_velocity[rows, slots] = states[..., 2], states[..., 5]
 
     def write_positions(self, states: FloatArray, position: FloatArray) -> None:
         """Write positions of states (S, R, 6) of a batch into an array (S, N, 2) in scene order."""

@@ -305,14 +305,15 @@ class SegmentBoxes:
         self.index: IntArray = np.argsort(low[:, 0], kind="stable")
         self.box: FloatArray = np.hstack((low, high))[self.index]
         self.max_width = float((high - low)[:, 0].max(initial=0.0))
+        self.max_top = float(high[:, 1].max(initial=-math.inf))
 
     def __len__(self) -> int:
         return len(self.index)
 
     @property
-    def sorted(self) -> tuple[FloatArray, IntArray, float]:
-        """The boxes (G, 4), m, from left to right, the index of each segment, and the largest width, m."""
-        return self.box, self.index, self.max_width
+    def sorted(self) -> tuple[FloatArray, IntArray, float, float]:
+        """The boxes (G, 4), m, from left to right, the index of each segment, the largest width and highest top, m."""
+        return self.box, self.index, self.max_width, self.max_top
 
 
 @bare_kernel
@@ -323,6 +324,7 @@ def near_segments(
     box: FloatArray,
     index: IntArray,
     max_width: float,
+    max_top: float,
     margin: float,
     max_tests: int,
     keys: IntArray,
@@ -339,6 +341,8 @@ def near_segments(
             return found, EXCEEDED
         x, y, limit = position[i, 0], position[i, 1], radius[i] + margin
         limit += ROUNDING * (abs(x) + abs(y) + limit + max_width)
+        if y - limit > max_top:
+            continue
         low, high = 0, len(box)
         while low < high:  # the first that begins at x − reach − widest or farther right
             middle = (low + high) // 2

@@ -107,6 +107,7 @@ class CompiledStepper:
             max_tests=pipeline.max_pairs,
             max_contacts=solver.max_contacts,
             segment_width=boxes.max_width,
+            segment_top=boxes.max_top,
             plane_tests=pipeline.plane_tests,
             began=store.setup.time,
             left=float(low[0]),

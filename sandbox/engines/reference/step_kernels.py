@@ -74,6 +74,8 @@ class StepConstants(NamedTuple):
     """largest number of contacts of a substep"""
     segment_width: float
     """m, largest width of a segment's box"""
+    segment_top: float
+    """m, highest top of a segment's box"""
     plane_tests: int
     """pairs of a ball, or piece, and a plane"""
     began: float
@@ -431,7 +433,7 @@ def find_near_segments(
     """Write the sorted keys of discs and segments that may touch; return as `find_near_pairs` does."""
     if len(walls.segment_index) == 0:
         return 0, 0
-    boxes = walls.segment_box, walls.segment_index, number.segment_width
+    boxes = walls.segment_box, walls.segment_index, number.segment_width, number.segment_top
     found, tests = near_segments(middle, radius, can_touch, *boxes, 0.0, number.max_tests, keys)
     if tests == EXCEEDED or found > len(keys):
         return -1, 0

@@ -132,7 +132,7 @@ class VectorLanding:
         for k, force in enumerate(self._forces):
             rate += levels[:, k] * force
         self._burn_rate[games] = rate
-        self.thrust_level[np.ix_(games, self._columns)] = levels
+        self.thrust_level[games[:, None], self._columns] = levels
 
     def _touch_pad(self, game: int, states: WorldStates, elapsed: float) -> str | None:
         """Update a game whose ship touches the pad only; return the reason why it is over, or None."""

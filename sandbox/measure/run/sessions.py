@@ -183,11 +183,12 @@ class Episode(SteppedGame):
         self._table = FrameTable(MAX_QUIET_STEPS, len(self.simulation.bodies))
         self._quiet_rules = self.rules if isinstance(self.rules, HasQuietSteps) else None
         self._levels = [0.0] * len(self.rules.controls)
+        self._dt, self._duration = self.scene.solver.dt, self.scene.world.duration
 
     @property
     def late(self) -> bool:
         """Whether the duration of the scene is over."""
-        return self.simulation.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+        return self.simulation.time >= self._duration - 0.5 * self._dt
 
     @property
     def ended(self) -> bool:
@@ -228,7 +229,7 @@ class Episode(SteppedGame):
 
     def _advance_quietly(self, steps: int) -> int:
         """Make at most so many steps, of which the rules see only the last, and the one before if something happens."""
-        simulation, table, retired = self.simulation, self._table, self.simulation.retired
+        simulation, table, retired = self.simulation, self._table, len(self.simulation.retired)
         table.clear()
         self._frame = None
         try:
@@ -238,10 +239,10 @@ class Episode(SteppedGame):
                 self._show_quiet_step(table.frame(table.count - 1, self.frame().present))
             raise
         contacts = simulation.contacts()
-        removed = simulation.retired.keys() - retired.keys()
+        removed = [*simulation.retired][retired:]
         if table.steps > 1 and (len(contacts) or removed):
             present = self.frame().present.copy()
-            present[list(removed)] = True
+            present[removed] = True
             self._show_quiet_step(table.frame(table.count - 2, present))
         self._update_rules(contacts)
         return table.steps
@@ -254,8 +255,7 @@ class Episode(SteppedGame):
     @property
     def _steps_left(self) -> int:
         """Number of steps to the duration of the scene."""
-        dt = self.scene.solver.dt
-        return math.ceil((self.scene.world.duration - self.simulation.time) / dt - 0.5)
+        return math.ceil((self._duration - self.simulation.time) / self._dt - 0.5)
 
 
 def _value(control: Control, level: float) -> float:

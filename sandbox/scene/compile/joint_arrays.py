@@ -8,6 +8,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -120,12 +121,12 @@ class JointArrays:
     def __len__(self) -> int:
         return len(self.kind)
 
-    def motor_of(self, name: str) -> int | None:
-        """Return the row of the motor of a joint; None if no joint of that name has one."""
-        if name not in self.names:
-            return None
-        rows = self.whole(np.asarray([self.names.index(name)])).tolist()
-        return next((row for row in rows if self.kind[row] in MOTORS), None)
+    @cached_property
+    def motor_rows(self) -> dict[str, int]:
+        """Row of the motor of each joint that has one, by the name of the joint."""
+        motors = np.flatnonzero(np.isin(self.kind, MOTORS)).tolist()
+        first = dict(zip(self.number.tolist(), self.names, strict=True))
+        return {first[int(self.part_of[row])]: row for row in motors}
 
     def actuated(self, levels: Mapping[int, float]) -> Self:
         """Return the joints with motors at levels, −1 to 1, by their rows: their rates and largest forces."""

@@ -53,9 +53,12 @@ class Timed(Part):
         """Return the action with another time, s."""
         if time == self.time:
             return self
-        copied = self.__copy__()
-        copied.__dict__["time"] = time  # as `model_copy` does, which takes three times as long
-        copied.__pydantic_fields_set__.add("time")
+        # As `model_copy` does, which takes five times as long.
+        copied, set_value = object.__new__(type(self)), object.__setattr__
+        set_value(copied, "__dict__", {**self.__dict__, "time": time})
+        set_value(copied, "__pydantic_fields_set__", self.__pydantic_fields_set__ | {"time"})
+        set_value(copied, "__pydantic_extra__", None)
+        set_value(copied, "__pydantic_private__", None)
         return copied
 
 
