@@ -216,6 +216,11 @@ def train(name: str, workers: int, seed: int = 1) -> None:
 
 OBSERVED = {
     "LunarLander": ("x", "y", "vx", "vy", "angle", "ω", "first leg", "second leg"),
+    "BipedalWalker": (
+        *("angle", "ω", "vx", "vy"),
+        *(f"{leg} {what}" for leg in ("first", "second") for what in ("hip", "hip rate", "knee", "knee rate", "foot")),
+        *(f"ray {k + 1}" for k in range(10)),
+    ),
 }
 """names of the numbers of an observation"""
 
