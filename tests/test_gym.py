@@ -124,6 +124,14 @@ def test_episodes_with_the_same_seed_are_equal() -> None:
     assert play_episode(env, 5) != play_episode(env, 6)
 
 
+@pytest.mark.parametrize("name", ["EightBall", "NineBall", "ArtilleryDuel", "Landing"])
+def test_episodes_with_other_seeds_start_otherwise(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v1")
+    starts = [env.reset(seed=seed)[0].tobytes() for seed in (1, 2, 1)]
+    assert starts[0] != starts[1]
+    assert starts[0] == starts[2]
+
+
 def test_first_episode_has_the_seed_of_the_scene_and_later_ones_others() -> None:
     env = SandboxEnv("landing")
     seeds = [env.reset()[1]["seed"] for _ in range(3)]
