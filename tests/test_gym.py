@@ -17,6 +17,7 @@ from sandbox.engines.contract import Refusal, SnapshotError
 from sandbox.game_names import games_with_rules
 from sandbox.games.contract import Control, UnsuitableSceneError
 from sandbox.games.landing import rules as landing
+from sandbox.games.registry import required_rules
 from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.run.sessions import rerun
 from sandbox.scene.files.load import load, loads
@@ -57,6 +58,7 @@ def test_random_episode_ends_within_its_limit_and_all_numbers_are_in_their_range
     env = gymnasium.make(f"sandbox/{name}-v1", observe=("time", "score")).unwrapped
     assert isinstance(env, SandboxEnv)
     assert len(set(env.observed)) == len(env.observed) == len(env.observed_ranges)
+    assert required_rules(env.scene).observation_ranges().keys() <= {*env.observed}  # type: ignore[attr-defined]
     env.bounds = np.array([[-np.inf], [np.inf]])
     low, high = (np.array([each[k] for each in env.observed_ranges]) for k in (0, 1))
     assert (low < high).all()
@@ -402,6 +404,14 @@ def test_sync_and_async_vector_environments_agree(name: str) -> None:
         games.close()
     assert found[0].tobytes() == found[1].tobytes()
     assert (found[0][-1, 0] != found[0][-1, 1]).any()  # random actions differ
+
+
+def test_spawned_processes_import_the_environment_by_its_spec() -> None:
+    kwargs = {"context": "spawn"}
+    games = gymnasium.make_vec("sandbox/Landing-v1", num_envs=1, vectorization_mode="async", vector_kwargs=kwargs)
+    observations, _ = games.reset(seed=5)
+    games.close()
+    assert observations[0].tobytes() == gymnasium.make("sandbox/Landing-v1").reset(seed=5)[0].tobytes()
 
 
 def test_environment_is_pickled_and_copied_before_an_episode() -> None:

@@ -104,9 +104,10 @@ def _groups(env: SandboxEnv) -> Iterator[tuple[int, list[str]]]:
 def _body_rows(env: SandboxEnv) -> Iterator[Row]:
     for first, names in _groups(env):
         for k, state in enumerate(STATES, first):
-            number = f"{k}" if len(names) == 1 else f"{k} + {len(STATES)}k"
-            body = names[0] if len(names) == 1 else f"{names[0]} {ELLIPSIS} {names[-1]}"
-            yield number, f"{body}: {state}", env.observed_ranges[k]
+            if len(names) == 1:
+                yield f"{k}", env.observed[k], env.observed_ranges[k]
+            else:
+                yield f"{k} + {len(STATES)}k", f"{names[0]} {ELLIPSIS} {names[-1]}: {state}", env.observed_ranges[k]
 
 
 def _rules_rows(env: SandboxEnv) -> Iterator[Row]:
