@@ -142,13 +142,8 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         corners = bounds or ((-math.inf, -math.inf), (math.inf, math.inf))
         for index in self.observed_bodies.tolist():
             speed, spin = float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])
-            limits = (
-                *zip(*corners, strict=True),
-                *2 * ((-speed, speed),),
-                (-math.inf, math.inf),
-                (-spin, spin),
-                (0.0, 1.0),
-            )
+            across, up = zip(*corners, strict=True)
+            limits = across, up, (-speed, speed), (-speed, speed), (-math.inf, math.inf), (-spin, spin), (0.0, 1.0)
             for state, unit, (low, high) in zip(STATES, STATE_UNITS, limits, strict=True):
                 ranges[f"{bodies.names[index]} {state}"] = ObservationRange(low, high, unit)
         last = self.scene.world.duration + self.every * self.scene.solver.dt  # an episode ends with a whole action
