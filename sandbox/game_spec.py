@@ -16,7 +16,7 @@ class Environment:
     """Gymnasium environment of a game."""
 
     name: str
-    """in the environment id: `sandbox/<name>-v0`"""
+    """in the environment id"""
     scene: str
     """name of a shipped scene"""
     frame_skip: int = 1
@@ -25,6 +25,13 @@ class Environment:
     """name of the engine"""
     duration: float | None = None
     """longest simulated time of an episode, s; None for the duration of the scene"""
+    version: int = 1
+    """increases when observations, rewards or episodes of the environment change"""
+
+    @property
+    def id(self) -> str:
+        """Id of the environment for `gymnasium.make`."""
+        return f"sandbox/{self.name}-v{self.version}"
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,20 @@ import copy
 import pickle
 import subprocess
 import sys
+import warnings
+from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 from sandbox.engines.contract import Refusal, SnapshotError
 from sandbox.game_names import games_with_rules
 from sandbox.games.contract import Control, UnsuitableSceneError
 from sandbox.games.landing import rules as landing
+from sandbox.games.registry import required_rules
 from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.run.sessions import rerun
 from sandbox.scene.files.load import load, loads
@@ -35,22 +39,79 @@ def play_episode(env: SandboxEnv, seed: int | None, action_seed: int = 1) -> lis
 
 @pytest.mark.parametrize("name", GAMES)
 def test_shipped_games_pass_gymnasiums_checker(name: str) -> None:
-    # pytest turns warnings into errors, those of the checker among them
-    check_env(gymnasium.make(f"sandbox/{name}-v0").unwrapped)
+    check(gymnasium.make(f"sandbox/{name}-v1").unwrapped, skip_render_check=False)
+
+
+def check(env: Any, skip_render_check: bool = True) -> None:
+    """Check an environment; the render check needs one made from an id.
+
+    pytest turns warnings into errors, those of the checker among them, except that unbounded numbers are unusual.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*Box observation space m(in|ax)imum value is -?infinity")
+        check_env(env, skip_render_check=skip_render_check)
 
 
 @pytest.mark.parametrize("name", GAMES)
-def test_observed_numbers_have_distinct_names_and_stay_in_the_space(name: str) -> None:
-    env = gymnasium.make(f"sandbox/{name}-v0").unwrapped
+def test_random_episode_ends_within_its_limit_and_all_numbers_are_in_their_ranges(name: str) -> None:
+    """The ranges hold without clipping, except for the last position of a body that has left the bounds."""
+    env = gymnasium.make(f"sandbox/{name}-v1", observe=("time", "score")).unwrapped
     assert isinstance(env, SandboxEnv)
-    assert len(set(env.observed)) == len(env.observed)
+    assert len(set(env.observed)) == len(env.observed) == len(env.observed_ranges)
+    assert required_rules(env.scene).observation_ranges().keys() <= {*env.observed}  # type: ignore[attr-defined]
+    env.bounds = np.array([[-np.inf], [np.inf]])
+    low, high = (np.array([each[k] for each in env.observed_ranges]) for k in (0, 1))
+    assert (low < high).all()
+    env.action_space.seed(2)
+    observation, _ = env.reset(seed=1)
+    count, over, late = 0, False, False
+    while not (over or late):
+        rounding = 1e-6 * np.abs(observation)  # float32
+        inside = (low - rounding <= observation) & (observation <= high + rounding)
+        assert inside.all(), [env.observed[k] for k in np.flatnonzero(~inside)]
+        if count % 7 == 0:  # held for some steps, as a player does
+            action = env.action_space.sample()
+        count += 1
+        observation, _, over, late, _ = env.step(action)
+    assert over
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_observations_are_in_the_space_at_the_end_of_an_episode_too(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v1", duration=3.0, observe="time").unwrapped
     env.action_space.seed(2)
     for seed in (1, 2):
         observation, _ = env.reset(seed=seed)
-        for _ in range(30):
+        ended = False
+        while not ended:
             assert env.observation_space.contains(observation)
-            assert np.isfinite(observation).all()
-            observation, *_ = env.step(env.action_space.sample())
+            observation, _, over, late, _ = env.step(env.action_space.sample())
+            ended = over or late
+        assert env.observation_space.contains(observation)
+
+
+def test_body_that_leaves_the_bounds_is_observed_at_the_bounds() -> None:
+    env = SandboxEnv("landing", every=100)
+    env.reset(seed=9)
+    over = False
+    while not over:
+        observation, _, over, _, info = env.step([0.6, 0.0, 0.2])
+    assert info["over"] == "lost in space"
+    assert env.observation_space.contains(observation)
+    (x0, y0), (x1, y1) = env.scene.world.bounds or ((0.0, 0.0), (0.0, 0.0))
+    assert observation[0] in (x0, x1) or observation[1] in (y0, y1)
+
+
+def test_positions_and_velocities_are_bounded_where_the_scene_bounds_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sandbox.games.landing.rules.Landing", Toy)
+    limits = TOY.replace("radius = 0.2", "radius = 0.2\nmax_speed = 3.0\nmax_angular_velocity = 5.0")
+    bounds = limits.replace("duration = 2.0", "duration = 2.0\nbounds = [[-4.0, -1.0], [4.0, 9.0]]")
+    free, fast, boxed = (SandboxEnv(loads(text)) for text in (TOY, limits, bounds))
+    inf = np.inf
+    assert free.observation_space.high.tolist() == [inf, inf, inf, inf, inf, inf, 1.0]  # type: ignore[attr-defined]
+    assert fast.observation_space.high.tolist() == [inf, inf, 3.0, 3.0, inf, 5.0, 1.0]  # type: ignore[attr-defined]
+    assert boxed.observation_space.low.tolist() == [-4.0, -1.0, -3.0, -3.0, -inf, -5.0, 0.0]  # type: ignore[attr-defined]
+    assert [each.unit for each in free.observed_ranges] == ["m", "m", "m/s", "m/s", "rad", "rad/s", ""]
 
 
 def test_every_shipped_game_has_an_id() -> None:
@@ -63,6 +124,14 @@ def test_episodes_with_the_same_seed_are_equal() -> None:
     env = SandboxEnv("landing", every=10)
     assert play_episode(env, 5) == play_episode(SandboxEnv("landing", every=10), 5)
     assert play_episode(env, 5) != play_episode(env, 6)
+
+
+@pytest.mark.parametrize("name", ["EightBall", "NineBall", "ArtilleryDuel", "Landing"])
+def test_episodes_with_other_seeds_start_otherwise(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v1")
+    starts = [env.reset(seed=seed)[0].tobytes() for seed in (1, 2, 1)]
+    assert starts[0] != starts[1]
+    assert starts[0] == starts[2]
 
 
 def test_first_episode_has_the_seed_of_the_scene_and_later_ones_others() -> None:
@@ -83,11 +152,14 @@ def test_recording_of_an_episode_replays_with_equal_hash_and_score() -> None:
     assert run.info["game"]["otherwise"] is None
 
 
-def test_observation_has_bodies_gauges_time_and_score() -> None:
-    env = SandboxEnv("landing", every=2)
+def test_observation_has_bodies_gauges_and_on_request_time_and_score() -> None:
+    plain = (*(f"ship {state}" for state in STATES), "fuel")
+    assert SandboxEnv("landing").observed == plain
+    assert SandboxEnv("landing", observe="time").observed == (*plain, "time")
+    env = SandboxEnv("landing", every=2, observe=["time", "score"])
     first, _ = env.reset()
     observation, _, _, _, info = env.step([0.0, 0.0, 0.0])
-    assert env.observed == (*(f"ship {state}" for state in STATES), "fuel", "time", "score")
+    assert env.observed == (*plain, "time", "score")
     assert observation.shape == (len(env.observed),)
     dt, gravity = env.scene.solver.dt, env.scene.world.gravity[1]
     assert observation[-2] == pytest.approx(2 * dt)  # s
@@ -122,7 +194,7 @@ class Digital(Toy):
 def test_digital_controls_have_a_discrete_action_space(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sandbox.games.landing.rules.Landing", Digital)
     env = SandboxEnv(loads(TOY), every=10)
-    check_env(env, skip_render_check=True)  # the render check makes an environment from an id
+    check(env)
     assert env.action_space == gymnasium.spaces.MultiDiscrete([2])
     env.reset()
     _, reward, *_ = env.step(np.array([1]))
@@ -318,11 +390,12 @@ def test_curling_observes_broom_weight_turn_and_team() -> None:
     assert observed_value(env, thrown, "stones run") == 1.0
 
 
-def test_sync_and_async_vector_environments_agree() -> None:
+@pytest.mark.parametrize("name", GAMES)
+def test_sync_and_async_vector_environments_agree(name: str) -> None:
     """Equal seeds and actions give equal observations in one process and in several."""
     found = []
     for mode in ("sync", "async"):
-        games = gymnasium.make_vec("sandbox/ArtilleryDuel-v0", num_envs=2, vectorization_mode=mode)
+        games = gymnasium.make_vec(f"sandbox/{name}-v1", num_envs=2, vectorization_mode=mode)
         observations, info = games.reset(seed=5)
         assert info["seed"].tolist() == [5, 6]
         games.action_space.seed(1)
@@ -330,7 +403,15 @@ def test_sync_and_async_vector_environments_agree() -> None:
         found.append(np.stack(rows))
         games.close()
     assert found[0].tobytes() == found[1].tobytes()
-    assert (found[0][:, 0] != found[0][:, 1]).any()
+    assert (found[0][-1, 0] != found[0][-1, 1]).any()  # random actions differ
+
+
+def test_spawned_processes_import_the_environment_by_its_spec() -> None:
+    kwargs = {"context": "spawn"}
+    games = gymnasium.make_vec("sandbox/Landing-v1", num_envs=1, vectorization_mode="async", vector_kwargs=kwargs)
+    observations, _ = games.reset(seed=5)
+    games.close()
+    assert observations[0].tobytes() == gymnasium.make("sandbox/Landing-v1").reset(seed=5)[0].tobytes()
 
 
 def test_environment_is_pickled_and_copied_before_an_episode() -> None:
@@ -338,7 +419,7 @@ def test_environment_is_pickled_and_copied_before_an_episode() -> None:
     episode = play_episode(SandboxEnv("landing", every=20), 4)
     assert play_episode(pickle.loads(pickle.dumps(env)), 4) == play_episode(copy.deepcopy(env), 4) == episode
     env.reset()
-    with pytest.raises(TypeError, match="a running simulation cannot be pickled"):
+    with pytest.raises(TypeError, match=r"a running simulation cannot be pickled.*close\(\).*recording\(\)"):
         pickle.dumps(env)
     env.close()
     assert play_episode(pickle.loads(pickle.dumps(env)), 4) == episode
@@ -367,9 +448,43 @@ def test_copy_of_an_environment_in_an_episode_continues_alike(scene: str, engine
 def test_copy_of_an_environment_on_pymunk_in_an_episode_is_refused() -> None:
     env = SandboxEnv("landing")
     env.reset()
-    with pytest.raises(SnapshotError, match="pymunk"):
+    with pytest.raises(SnapshotError, match=r"on 'pymunk'.*exact and reference can.*same seed and repeat the actions"):
         copy.deepcopy(env)
+    env.step([1.0, 0.0, 0.0])  # the original continues
     env.close()
+
+
+def test_environment_that_has_been_rendered_is_copied() -> None:
+    env = SandboxEnv("landing", "reference", render_mode="rgb_array")
+    env.reset(seed=3)
+    picture = env.render()
+    copied = copy.deepcopy(env)
+    assert (copied.render() == picture).all()
+    env.close()
+    env.reset(seed=3)
+    env.render()
+    env._release()  # an episode is over; the canvas is kept
+    assert play_episode(pickle.loads(pickle.dumps(env)), 4) == play_episode(env, 4)
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_environment_is_made_again_from_its_spec(name: str) -> None:
+    env = gymnasium.make(f"sandbox/{name}-v1", every=20, duration=9.0, observe=["score"])
+    assert env.spec is not None
+    for spec in (env.spec, EnvSpec.from_json(env.spec.to_json())):
+        again = gymnasium.make(spec).unwrapped
+        assert isinstance(again, SandboxEnv)
+        assert (again.every, again.scene.world.duration, again.observed[-1]) == (20, 9.0, "score")
+        assert again.observation_space == env.observation_space
+        assert again.reset(seed=2)[0].tobytes() == env.reset(seed=2)[0].tobytes()
+
+
+def test_old_version_of_an_id_names_the_new_one() -> None:
+    with (
+        pytest.warns(DeprecationWarning, match=r"sandbox/Landing-v0 is out of date.*`v1`"),
+        pytest.raises(gymnasium.error.DeprecatedEnv, match="use `sandbox/Landing-v1` instead"),
+    ):
+        gymnasium.make("sandbox/Landing-v0")
 
 
 def test_invalid_scene_option_or_engine_raises() -> None:
@@ -387,6 +502,18 @@ def test_invalid_scene_option_or_engine_raises() -> None:
         SandboxEnv("landing", engine="box3d")
     with pytest.raises(Refusal, match=r"drag or polygons.*pymunk, box2d, reference"):
         SandboxEnv("duel", engine="exact")
+    for wrong in ("speed", ["time", "time"]):
+        with pytest.raises(ValueError, match="observe accepts 'time' and 'score', each once"):
+            SandboxEnv("landing", observe=wrong)
+    with pytest.raises(ValueError, match="unknown reward 'points'; rewards: score, lead, outcome"):
+        SandboxEnv("duel", reward="points")
+    for reward in ("lead", "outcome"):
+        with pytest.raises(ValueError, match="needs a game of several players"):
+            SandboxEnv("landing", reward=reward)
+    with pytest.raises(ValueError, match="no player is named 'Green'; players: Red, Blue"):
+        SandboxEnv("duel", player="Green")
+    with pytest.raises(ValueError, match="a game of one player"):
+        SandboxEnv("landing", player="Red")
     assert SandboxEnv("landing", bodies="ship").observed == SandboxEnv("landing").observed
     with pytest.raises(gymnasium.error.ResetNeeded):
         SandboxEnv("landing").step([0.0, 0.0, 0.0])
@@ -413,7 +540,7 @@ SIDES = {
 
 @pytest.mark.parametrize("name", GAMES)
 def test_info_has_the_scores_of_all_players_and_whose_turn_it_is(name: str) -> None:
-    env = gymnasium.make(f"sandbox/{name}-v0")
+    env = gymnasium.make(f"sandbox/{name}-v1")
     _, info = env.reset(seed=1)
     if name in SIDES:
         assert info["scores"] == dict.fromkeys(SIDES[name], 0)
@@ -423,7 +550,7 @@ def test_info_has_the_scores_of_all_players_and_whose_turn_it_is(name: str) -> N
 
 
 def test_reward_of_the_duel_is_that_of_its_first_player_while_the_bot_scores_too() -> None:
-    env = gymnasium.make("sandbox/ArtilleryDuel-v0")
+    env = gymnasium.make("sandbox/ArtilleryDuel-v1")
     _, info = env.reset(seed=3)
     idle, total, over = np.zeros(env.action_space.shape or ()), 0.0, False
     fire = idle.copy()
@@ -439,15 +566,75 @@ def test_reward_of_the_duel_is_that_of_its_first_player_while_the_bot_scores_too
     assert info["scores"]["Blue"] > 0
 
 
-@pytest.mark.parametrize("name", ["EightBall", "NineBall"])
-def test_frame_of_billiards_has_time_for_many_shots(name: str) -> None:
-    env = gymnasium.make(f"sandbox/{name}-v0")
-    assert env.unwrapped.scene.world.duration == 1800.0  # type: ignore[attr-defined]
+@pytest.mark.parametrize(
+    ("name", "player"), [("ArtilleryDuel", "Red"), ("ArtilleryFour", "Red"), ("Curling", "red"), ("NineBall", None)]
+)
+def test_reward_is_that_of_the_only_player_that_is_no_bot(name: str, player: str | None) -> None:
+    assert gymnasium.make(f"sandbox/{name}-v1").unwrapped.player == player  # type: ignore[attr-defined]
+
+
+def total_rewards(environments: dict[str, SandboxEnv], seed: int) -> tuple[dict[str, float], dict[str, Any]]:
+    """Play the same random game in several environments; return the sums of the rewards, and the last info."""
+    space = next(iter(environments.values())).action_space
+    space.seed(seed)
+    infos = {key: env.reset(seed=seed)[1] for key, env in environments.items()}
+    totals, over = dict.fromkeys(environments, 0.0), False
+    while not over:
+        action = space.sample()
+        for key, env in environments.items():
+            _, reward, over, late, infos[key] = env.step(action)
+            totals[key] += reward
+            assert not late
+    info = infos.popitem()[1]
+    assert all(other == info for other in infos.values())
+    return totals, info
+
+
+@pytest.mark.parametrize(
+    ("scene", "player"), [("duel", "Red"), ("curling", "red"), ("9-ball", "player 1"), ("9-ball", "player 2")]
+)
+def test_rewards_add_up_to_score_lead_and_outcome(scene: str, player: str) -> None:
+    engine = "exact" if scene == "9-ball" else "pymunk"
+    loaded = load(scene, ["play.curling.ends=1"] if scene == "curling" else [])
+    kinds = {
+        reward: SandboxEnv(loaded, engine, every=50, duration=1800.0, reward=reward, player=player)
+        for reward in ("score", "lead", "outcome")
+    }
+    totals, info = total_rewards(kinds, seed=3)
+    (opponent,) = info["scores"].keys() - {player}
+    assert totals["score"] == info["scores"][player]
+    assert totals["lead"] == info["scores"][player] - info["scores"][opponent]
+    assert totals["outcome"] == (1.0 if player in info["over"] else -1.0)
+    assert (player in info["over"]) != (opponent in info["over"])
+
+
+def test_reward_in_self_play_is_that_of_the_player_whose_turn_it_is() -> None:
+    env = SandboxEnv("9-ball", "exact", every=50, duration=1800.0)
+    env.action_space.seed(3)
+    _, info = env.reset(seed=3)
+    totals, over = dict.fromkeys(info["scores"], 0.0), False
+    while not over:
+        player = info["player"]
+        _, reward, over, _, info = env.step(env.action_space.sample())
+        totals[player] += reward
+    assert totals == info["scores"]
+
+
+def test_values_in_the_dead_zone_release_the_plunger() -> None:
+    env = SandboxEnv("pinball/classic", every=2)
+    heights = {}
+    for rest in (0.0, 0.09, 0.2):
+        env.reset(seed=1)
+        for level, steps in ((1.0, 60), (rest, 40)):
+            for _ in range(steps):
+                observation, *_ = env.step([0.0, 0.0, level, 0.0, 0.0, 0.0])
+        heights[rest] = observed_value(env, observation, "ball y")
+    assert heights[0.09] == heights[0.0] > heights[0.2] + 0.3  # m: up the lane, or still at the plunger
 
 
 def test_duration_ends_an_episode_and_bounds_its_time() -> None:
-    env = SandboxEnv("landing", every=50, duration=1.2)
-    check_env(env, skip_render_check=True)  # the render check makes an environment from an id
+    env = SandboxEnv("landing", every=50, duration=1.2, observe=("time",))
+    check(env)
     env.reset()
     times, ended = [0.0], False
     while not ended:

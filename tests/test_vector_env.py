@@ -54,8 +54,9 @@ def assert_equal_infos(a: dict[str, Any], b: dict[str, Any]) -> None:
 
 def compare(scene: Scene | str, policy: Policy, seed: int, every: int, steps: int) -> Counter[str]:
     """Compare a vector environment with environments one after the other; return why episodes ended."""
-    many = SandboxVectorEnv(scene, COUNT, every=every)
-    singles = SyncVectorEnv([lambda: SandboxEnv(scene, "reference", every=every)] * COUNT)
+    observe = "time", "score"
+    many = SandboxVectorEnv(scene, COUNT, every=every, observe=observe)
+    singles = SyncVectorEnv([lambda: SandboxEnv(scene, "reference", every=every, observe=observe)] * COUNT)
     rng, ends = np.random.default_rng(seed), Counter[str]()
     observation, info = many.reset(seed=seed)
     expected, expected_info = singles.reset(seed=seed)
@@ -169,7 +170,7 @@ def test_reset_takes_seeds_and_a_mask() -> None:
 def test_spaces_and_metadata() -> None:
     env = SandboxVectorEnv("landing", 4, bodies=["ship"])
     assert env.action_space.shape == (4, 3)
-    assert env.observation_space.shape == (4, 10)
+    assert env.observation_space.shape == (4, 8)
     assert env.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     assert env.unwrapped is env
 
@@ -189,15 +190,30 @@ def test_what_cannot_be_compiled_is_refused(scene: Scene, engine: str) -> None:
     assert isinstance(make_vector_env(2, scene=scene, engine=engine), SyncVectorEnv)
 
 
+@pytest.mark.parametrize("observe", [(), ("score",), ("score", "time")])
+def test_observed_numbers_are_those_of_a_single_environment(observe: tuple[str, ...]) -> None:
+    env, alone = (make(observe) for make in (lambda o: SandboxVectorEnv("landing", 2, observe=o), single))
+    assert env.observed == alone.observed
+    assert env.observed_ranges == alone.observed_ranges
+    env.reset(seed=4)
+    alone.reset(seed=4)
+    found = env.step(np.zeros((2, 3)))[0][0]
+    assert found.tobytes() == alone.step([0.0, 0.0, 0.0])[0].tobytes()
+
+
+def single(observe: tuple[str, ...]) -> SandboxEnv:
+    return SandboxEnv("landing", "reference", observe=observe)
+
+
 def test_number_of_episodes_is_checked() -> None:
     with pytest.raises(ValueError, match="num_envs"):
         SandboxVectorEnv("landing", 0)
 
 
 def test_make_vec_chooses_the_compiled_environment_where_it_can() -> None:
-    fast = gymnasium.make_vec("sandbox/Landing-v0", num_envs=2, engine="reference")
+    fast = gymnasium.make_vec("sandbox/Landing-v1", num_envs=2, engine="reference")
     assert isinstance(fast, SandboxVectorEnv if COMPILED else SyncVectorEnv)
-    assert isinstance(gymnasium.make_vec("sandbox/Landing-v0", num_envs=2), SyncVectorEnv)
-    assert isinstance(gymnasium.make_vec("sandbox/Curling-v0", num_envs=2), SyncVectorEnv)
-    shown = gymnasium.make_vec("sandbox/Landing-v0", num_envs=2, engine="reference", render_mode="rgb_array")
+    assert isinstance(gymnasium.make_vec("sandbox/Landing-v1", num_envs=2), SyncVectorEnv)
+    assert isinstance(gymnasium.make_vec("sandbox/Curling-v1", num_envs=2), SyncVectorEnv)
+    shown = gymnasium.make_vec("sandbox/Landing-v1", num_envs=2, engine="reference", render_mode="rgb_array")
     assert isinstance(shown, SyncVectorEnv)

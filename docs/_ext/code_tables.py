@@ -8,6 +8,7 @@ from dataclasses import fields
 from types import NoneType
 from typing import get_args, get_type_hints
 
+from environment_tables import arguments, environment, environments
 from gallery import gallery
 from python_tables import classes, model_fields
 from replays import replay
@@ -252,6 +253,9 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "game-keys": game_keys,
     "store-columns": store_columns,
     "stored-arrays": stored_arrays,
+    "environments": environments,
+    "environment": environment,
+    "environment-arguments": arguments,
     "gallery": gallery,
     "replay": replay,
 }

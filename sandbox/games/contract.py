@@ -11,18 +11,20 @@ the next step. Once `game_over` is not None, the actions of the last `on_step` a
 any more. Rules must support `copy.deepcopy`, because undo restores a copy. They are deterministic: all random numbers
 derive from the seed of the scene.
 
-Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `quiet_steps(dt)`,
-`view_state(time)`.
+Optional members, each with a protocol: `log`, `observation()`, `observation_ranges()`, `lit_lamps()`, `waiting`,
+`quiet_steps(dt)`, `view_state(time)`; and of games of several players `player`, `scores`, `bots` and `winner`.
 
 The skill of a bot is a number from 0 to 1.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
 from sandbox.recording import Press
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Point
 from sandbox.scene.description.scene import first_sensor
 from sandbox.trajectory import Contacts, Frame
 
@@ -31,14 +33,18 @@ __all__ = [
     "HasLamps",
     "HasLog",
     "HasObservation",
+    "HasObservationRanges",
+    "HasPlayers",
     "HasQuietSteps",
     "HasViewState",
     "HasWaiting",
+    "ObservationRange",
     "Policy",
     "Press",
     "Rules",
     "StepInfo",
     "UnsuitableSceneError",
+    "position_ranges",
     "sensed_objects",
 ]
 
@@ -93,6 +99,9 @@ class Control(NamedTuple):
     """whether its value is any number from 0 to 1; otherwise it is 0 or 1"""
     often: float = 1.0
     """relative frequency with which a random player presses it; greater than 0"""
+    dead_zone: float = 0.0
+    """value up to which an analogue control counts as released in an action of an environment, because agents rarely
+    choose exactly 0"""
 
 
 class Rules(Protocol):
@@ -149,6 +158,37 @@ class HasObservation(Protocol):
         """Return names and finite values; names and order are constant during a game, for every seed."""
 
 
+class ObservationRange(NamedTuple):
+    """Range and unit of an observed number."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    unit: str = ""
+    """empty for numbers without a dimension"""
+
+
+FLAG = ObservationRange(0.0, 1.0)
+"""Range of a number that is 0 or 1."""
+
+
+@runtime_checkable
+class HasObservationRanges(Protocol):
+    """Rules that state the ranges of observed numbers, as bounds of the observation space."""
+
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return ranges by the names of `observation`, and of states of bodies, such as `ball x`.
+
+        Numbers without a range are unbounded. Observed numbers are clipped to their ranges. The ranges are constant
+        during a game, for every seed.
+        """
+
+
+def position_ranges(bodies: Iterable[str], lower: Point, upper: Point) -> dict[str, ObservationRange]:
+    """Return the ranges of x and y of bodies that stay in a rectangle, by its lower left and upper right corner, m."""
+    ranges = {axis: ObservationRange(lower[k], upper[k], "m") for k, axis in enumerate("xy")}
+    return {f"{body} {axis}": each for body in bodies for axis, each in ranges.items()}
+
+
 @runtime_checkable
 class HasPlayers(Protocol):
     """Rules of a game of several players or teams, who take turns."""
@@ -160,6 +200,14 @@ class HasPlayers(Protocol):
     @property
     def scores(self) -> Mapping[str, int | float]:
         """Score of each player by name; the names are constant during a game."""
+
+    @property
+    def bots(self) -> Collection[str]:
+        """Names of the players that the rules play themselves; constant during a game."""
+
+    @property
+    def winner(self) -> str | None:
+        """Name of the winner once the game is over; None before, and after a draw."""
 
 
 @runtime_checkable

@@ -3,12 +3,12 @@
     import gymnasium
     import sandbox.gym
 
-    env = gymnasium.make("sandbox/Landing-v0")
+    env = gymnasium.make("sandbox/Landing-v1")
 
 `SandboxEnv(scene)` makes an environment of any scene whose `[play] game` has rules. Actions are the controls of the
-game, the reward is the increase of the score. `recording()` returns the episode as a recorded session, for replay in
-the window. `SandboxVectorEnv(scene, 64)` advances many episodes of a game at once by compiled calls, where game and
-engine allow that. This package alone imports gymnasium.
+game. The reward is the increase of the score, or of the lead, or the outcome. `recording()` returns the episode as a
+recorded session, for replay in the window. `SandboxVectorEnv(scene, 64)` advances many episodes of a game at once by
+compiled calls, where game and engine allow that. This package alone imports gymnasium.
 """
 
 try:
@@ -18,12 +18,15 @@ except ImportError:
 
 from sandbox.game_names import game_specs
 from sandbox.gym.bipedal_walker import BipedalWalker
-from sandbox.gym.game_env import STATES, SandboxEnv
+from sandbox.gym.game_env import OBSERVABLE, REWARDS, STATES, SandboxEnv
 from sandbox.gym.game_vector_env import CompiledOnlyError, SandboxVectorEnv, make_vector_env
 from sandbox.gym.lunar_lander import LunarLander
 
 __all__ = [
+    "CLASSICS",
     "GAMES",
+    "OBSERVABLE",
+    "REWARDS",
     "STATES",
     "BipedalWalker",
     "CompiledOnlyError",
@@ -40,7 +43,7 @@ for _spec in game_specs():
     for _each in _spec.environments:
         _options = {"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine}
         gymnasium.register(
-            f"sandbox/{_each.name}-v0",
+            _each.id,
             entry_point="sandbox.gym:SandboxEnv",
             kwargs=_options if _each.duration is None else _options | {"duration": _each.duration},
             vector_entry_point="sandbox.gym:make_vector_env" if _spec.vector_rules is not None else None,

@@ -1,10 +1,11 @@
 """Gymnasium environment of a game: its controls are the actions, the increase of its score is the reward."""
 
+import copy
 import math
 import operator
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -12,21 +13,28 @@ from gymnasium import spaces
 
 from sandbox.action import ActionError
 from sandbox.arrays import FloatArray
-from sandbox.engines.contract import Divergence, Exhaustion, Refusal
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal, SnapshotError
 from sandbox.engines.registry import able, engine_named
-from sandbox.games.contract import HasObservation, HasPlayers, Rules
+from sandbox.games.contract import HasObservation, HasObservationRanges, HasPlayers, ObservationRange, Rules
 from sandbox.games.registry import required_rules
 from sandbox.measure.run.sessions import Episode
 from sandbox.measure.seeds import with_seed
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import World
-from sandbox.scene.files.load import as_scene
+from sandbox.scene.files.load import SceneText, as_scene
+from sandbox.scene.files.shipped_scenes import find
 
-LIMIT = 1e6
-"""bound to which observed numbers are clipped: learning algorithms expect bounded spaces"""
 STATES = "x", "y", "vx", "vy", "angle", "ω", "present"
-"""observed state of a body, in m, m/s, rad and rad/s; `present` is 1, or 0 after removal"""
+"""observed state of a body; `present` is 1, or 0 after removal"""
+STATE_UNITS = "m", "m", "m/s", "m/s", "rad", "rad/s", ""
+"""units of `STATES`"""
+OBSERVABLE = "time", "score"
+"""numbers that are observed only if `observe` names them"""
+REWARDS = "score", "lead", "outcome"
+"""rewards: see `SandboxEnv`"""
+FINITE = float(np.finfo(np.float32).max)
+"""bound to which unbounded numbers are clipped, so that they stay finite"""
 SIZE = 640, 480
 """px, size of a rendered picture"""
 SEEDS = 2**31
@@ -38,19 +46,21 @@ Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
 class SandboxEnv(gymnasium.Env[Observation, Any]):
     """Gymnasium environment of a game.
 
-    Observation: x, y, vx, vy, angle, ω and presence of each observed body; then the observation of the rules (such as
-    fuel, wind, or the setting of a gun), the time in s, and the score. `observed` has the name of each number. Numbers
-    are clipped to ±1e6; the bounds of presence and time are closer.
+    Observation: x, y, vx, vy, angle, ω and presence of each observed body; then the observation of the rules, such as
+    fuel, wind, or the setting of a gun; then what `observe` names. `observed` has the name of each number,
+    `observed_ranges` its bounds and unit. Positions are bounded by the bounds of the scene, or as the rules state;
+    velocities by the speed limits of bodies. Numbers are clipped to their bounds. Those without bounds are finite.
 
     Action: one number for each control. If a control is analogue, the space is a `Box` from 0 to 1; other controls are
-    then on above 0.5, and values out of range are clipped. Otherwise the space is a `MultiDiscrete` of 0 and 1.
+    then on above 0.5, analogue controls are released up to their `dead_zone`, and values out of range are clipped.
+    Otherwise the space is a `MultiDiscrete` of 0 and 1.
 
-    Reward: increase of the score. In games of several players, `info["scores"]` has the score of each player by name,
-    and `info["player"]` the one whose turn it is. An episode is terminated when the game is over. It is truncated at
-    its `duration`, or if the physics fails; `info["failed"]` then has the reason.
+    Reward: see `reward`. In games of several players it is that of `player`; `info["scores"]` has the score of each
+    player by name, and `info["player"]` the one whose turn it is. An episode is terminated when the game is over. It is
+    truncated at its `duration`, or if the physics fails; `info["failed"]` then has the reason.
 
-    An environment can be pickled and copied before its first episode. During an episode it can be copied
-    (`copy.deepcopy`) on engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for bit.
+    An environment can be pickled and copied between episodes. During an episode it can be copied (`copy.deepcopy`) on
+    engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for bit.
 
     Args:
         scene: scene, path of a scene file, or name of a shipped scene.
@@ -59,13 +69,18 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         every: number of steps per action.
         render_mode: None, or `rgb_array`.
         duration: longest simulated time of an episode, s; default: the duration of the scene.
+        observe: numbers to observe in addition, of `time`, s, and `score`.
+        reward: `score`, the increase of the score; `lead`, the increase of the difference to the best score of the
+            other players; or `outcome`, at the end 1 for winning and −1 for losing.
+        player: name of the player whose reward it is. Default: the player that is not a bot; if there are several, the
+            one whose turn it is at the action, as for self-play.
 
     Raises:
         SceneError: the file has faults, or no file and no shipped scene has that name.
         UnsuitableSceneError: the scene has no game with rules, or lacks an element that its game needs.
         Refusal: the engine does not support the scene.
-        ValueError: an engine, body or render mode does not exist, `every` is not an integer of at least 1, or the
-            duration is out of range.
+        ValueError: an engine, body, render mode, observable, reward or player does not exist, `every` is not an integer
+            of at least 1, or the duration is out of range.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
@@ -78,9 +93,13 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         every: int = 1,
         render_mode: str | None = None,
         duration: float | None = None,
+        observe: Sequence[str] = (),
+        reward: str = "score",
+        player: str | None = None,
     ) -> None:
         """Create an environment; `reset` begins an episode."""
         self.scene = as_scene(scene)
+        self._file = None if isinstance(scene, Scene) else SceneText.read(find(str(scene)))
         if duration is not None:
             self.scene = self.scene.with_duration(_checked_duration(duration))
         self.engine, self.every, self.render_mode = engine, _steps_per_action(every), render_mode
@@ -97,28 +116,41 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         states = [
             f"{self.scene.bodies.names[index]} {state}" for index in self.observed_bodies.tolist() for state in STATES
         ]
-        self.observed: tuple[str, ...] = (*states, *(name for name, _ in _rules_observation(rules)), "time", "score")
+        self.observe = _checked_observables(observe)
+        self.observed: tuple[str, ...] = (*states, *(name for name, _ in _rules_observation(rules)), *self.observe)
         """name of each number of an observation"""
+        self.observed_ranges = self._ranges(rules)
+        """range and unit of each number of an observation"""
+        self.reward, self.player = _checked_reward(reward, rules), _checked_player(player, rules)
         count = len(self.controls)
         self.analogue = any(control.analogue for control in self.controls)
         self.action_space = (
             spaces.Box(0.0, 1.0, (count,), np.float32) if self.analogue else spaces.MultiDiscrete([2] * count)
         )
-        self.observation_space = spaces.Box(*self._bounds(), dtype=np.float32)
+        low, high = (np.array([each[k] for each in self.observed_ranges], np.float32) for k in (0, 1))
+        self.observation_space = spaces.Box(low, high, dtype=np.float32)
+        self.bounds = np.clip((low, high), -FINITE, FINITE, dtype=np.float64)
+        """(2, O) bounds to which observations are clipped: those of the space, or finite numbers"""
         self.metadata = self.metadata | {"render_fps": max(round(1.0 / (self.scene.solver.dt * every)), 1)}
         self._episode: Episode | None = None
         self._ended = False
         self._canvas: Any = None
 
-    def _bounds(self) -> tuple[Observation, Observation]:
-        """Return the lower and upper bounds of an observation."""
-        upper = np.full(len(self.observed), LIMIT, np.float32)
-        lower, presence = -upper, len(STATES) - 1
-        states = slice(presence, len(STATES) * len(self.observed_bodies), len(STATES))
-        lower[states], upper[states] = 0.0, 1.0
+    def _ranges(self, rules: Rules) -> tuple[ObservationRange, ...]:
+        """Return range and unit of each number of an observation."""
+        bodies, bounds, ranges = self.scene.bodies, self.scene.world.bounds, dict[str, ObservationRange]()
+        corners = bounds or ((-math.inf, -math.inf), (math.inf, math.inf))
+        for index in self.observed_bodies.tolist():
+            speed, spin = float(bodies.max_speed[index]), float(bodies.max_angular_velocity[index])
+            across, up = zip(*corners, strict=True)
+            limits = across, up, (-speed, speed), (-speed, speed), (-math.inf, math.inf), (-spin, spin), (0.0, 1.0)
+            for state, unit, (low, high) in zip(STATES, STATE_UNITS, limits, strict=True):
+                ranges[f"{bodies.names[index]} {state}"] = ObservationRange(low, high, unit)
         last = self.scene.world.duration + self.every * self.scene.solver.dt  # an episode ends with a whole action
-        lower[-2], upper[-2] = 0.0, min(last, LIMIT)
-        return lower, upper
+        ranges["time"] = ObservationRange(0.0, last, "s")
+        if isinstance(rules, HasObservationRanges):
+            ranges.update(rules.observation_ranges())
+        return tuple(ranges.get(name, ObservationRange()) for name in self.observed)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -127,7 +159,8 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
         Args:
             seed: seed of the scene. Without it, the first episode has the seed of the scene file, and each later one a
-                new random seed.
+                new random seed. An environment of a scene object keeps what reading its file has generated by its
+                seed, such as the rack of a billiard table.
             options: not supported.
 
         Returns:
@@ -141,8 +174,14 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         super().reset(seed=self.scene.world.seed if seed is None and first else seed)
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
         self._release()
-        self._episode, self._ended = Episode(with_seed(self.scene, number), self.engine), False
+        self._episode, self._ended = Episode(self._seeded(number), self.engine), False
         return self._observation(), self._info()
+
+    def _seeded(self, seed: int) -> Scene:
+        """Return the scene of an episode: of a file, with all that the seed generates, such as the gaps of a rack."""
+        if self._file is None:
+            return with_seed(self.scene, seed)
+        return self._file.scene([("world.seed", seed), ("world.duration", self.scene.world.duration)])
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Set the controls and advance by `every` steps, or to the end of the episode.
@@ -161,17 +200,29 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         if self._ended:
             raise gymnasium.error.ResetNeeded("the episode has ended; call reset before the next step")
         levels = self._levels_of(action)
-        before, failed = episode.rules.score, None
+        rules: Any = episode.rules
+        player, failed = (self.player or rules.player) if self._has_players else None, None
+        before = self._value(rules, player)
         try:
             episode.set_levels(levels)
             episode.advance(self.every)
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
         info = self._info() | ({} if failed is None else {"failed": failed})
-        over = episode.rules.game_over is not None
+        over = rules.game_over is not None
         late = not over and (episode.late or failed is not None)
         self._ended = over or late
-        return self._observation(), float(episode.rules.score - before), over, late, info
+        return self._observation(), self._value(rules, player) - before, over, late, info
+
+    def _value(self, rules: Any, player: str | None) -> float:
+        """Return the quantity whose increase is the reward of a player; None in games of one player."""
+        if player is None:
+            return float(rules.score)
+        if self.reward == "outcome":
+            return 0.0 if rules.winner is None else 1.0 if rules.winner == player else -1.0
+        scores: Mapping[str, float] = rules.scores
+        others = max(score for name, score in scores.items() if name != player) if self.reward == "lead" else 0.0
+        return scores[player] - others
 
     def _current_episode(self) -> Episode:
         """Return the episode.
@@ -198,7 +249,10 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         if found is None or not all(map(is_valid, found)):
             names, each = ", ".join(control.name for control in self.controls), "0 to 1" if self.analogue else "0 or 1"
             raise ValueError(f"an action is {len(self.controls)} numbers, {each}, for {names}; not {action!r}")
-        return [min(max(level, 0.0), 1.0) for level in found]
+        return [
+            min(max(level, 0.0), 1.0) if level > control.dead_zone else 0.0
+            for level, control in zip(found, self.controls, strict=True)
+        ]
 
     def _observation(self) -> Observation:
         episode = self._current_episode()
@@ -210,8 +264,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         states[:, 6] = frame.present[some]
         rules: Any = episode.rules
         numbers = [value for _, value in rules.observation()] if self._has_observation else []
-        values[states.size :] = [*numbers, episode.time, rules.score]
-        return bounded(values)
+        own = {"time": episode.time, "score": rules.score}
+        values[states.size :] = [*numbers, *(own[name] for name in self.observe)]
+        return bounded(values, self.bounds)
 
     def _info(self) -> dict[str, Any]:
         episode = self._current_episode()
@@ -246,6 +301,36 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         relay = episode.simulation
         return self._canvas.picture(relay.scene, relay.bodies, episode.frame(), episode.rules, relay.throttles)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return an independent environment, in an episode in the same state.
+
+        Raises:
+            SnapshotError: an episode runs on an engine that makes no snapshots.
+        """
+        copied = object.__new__(type(self))
+        memo[id(self)] = copied
+        try:
+            copied.__dict__.update(copy.deepcopy(self.__dict__ | {"_canvas": None}, memo))
+        except SnapshotError as error:
+            raise SnapshotError(
+                f"an environment cannot be copied during an episode on {self.engine!r}: {error}. To branch from here, "
+                "reset another environment with the same seed and repeat the actions; recording() keeps the episode"
+            ) from None
+        return copied
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state to pickle.
+
+        Raises:
+            TypeError: an episode runs.
+        """
+        if self._episode is not None:
+            raise TypeError(
+                "an environment cannot be pickled during an episode: a running simulation cannot be pickled. close() "
+                "ends the episode; recording() keeps it, and another environment with its seed and actions repeats it"
+            )
+        return self.__dict__ | {"_canvas": None}
+
     def close(self) -> None:
         """Release the engine and the canvas."""
         self._release()
@@ -267,11 +352,12 @@ def refuse_options(options: Mapping[str, Any] | None) -> None:
         raise ValueError(f"reset accepts no options {', '.join(map(repr, options))}")
 
 
-def bounded(values: FloatArray) -> Observation:
-    """Return observed numbers, clipped to their bounds; 0 for those that are not finite."""
-    if not np.vdot(values, values) < LIMIT * LIMIT:  # rarely: a number is out of bounds, or is not finite
-        values = np.nan_to_num(values, posinf=LIMIT, neginf=-LIMIT).clip(-LIMIT, LIMIT)
-    return values.astype(np.float32)
+def bounded(values: FloatArray, bounds: FloatArray) -> Observation:
+    """Return observed numbers, clipped to their lower and upper bounds, (2, O); 0 for those that are undefined."""
+    if not math.isfinite(np.vdot(values, values)):  # rarely: a number is not finite, or huge
+        values = np.nan_to_num(values)
+    observation: Observation = np.minimum(np.maximum(values, bounds[0]), bounds[1]).astype(np.float32)
+    return observation
 
 
 def _steps_per_action(every: int) -> int:
@@ -296,6 +382,48 @@ def _checked_duration(duration: float) -> float:
         PartError: it is out of range.
     """
     return World(duration=duration).duration
+
+
+def _checked_observables(observe: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of additional observed numbers; `observe` is a list of names, or one name.
+
+    Raises:
+        ValueError: a name is unknown, or is given twice.
+    """
+    names = (observe,) if isinstance(observe, str) else tuple(observe)
+    unknown = [name for name in names if name not in OBSERVABLE]
+    if unknown or len(set(names)) < len(names):
+        raise ValueError(f"observe accepts {' and '.join(map(repr, OBSERVABLE))}, each once, not {observe!r}")
+    return names
+
+
+def _checked_reward(reward: str, rules: Rules) -> str:
+    """Return a kind of reward.
+
+    Raises:
+        ValueError: it is unknown, or needs a game of several players.
+    """
+    if reward not in REWARDS:
+        raise ValueError(f"unknown reward {reward!r}; rewards: {', '.join(REWARDS)}")
+    if reward != "score" and not (isinstance(rules, HasPlayers) and len(rules.scores) > 1):
+        raise ValueError(f"the reward {reward!r} needs a game of several players; use 'score'")
+    return reward
+
+
+def _checked_player(player: str | None, rules: Rules) -> str | None:
+    """Return the player whose reward it is; None for the one whose turn it is, and in games of one player.
+
+    Raises:
+        ValueError: there is no such player.
+    """
+    scores = rules.scores if isinstance(rules, HasPlayers) else {}
+    if player is not None:
+        if player not in scores:
+            players = ", ".join(scores) or "none, it is a game of one player"
+            raise ValueError(f"no player is named {player!r}; players: {players}")
+        return player
+    people = [name for name in scores if isinstance(rules, HasPlayers) and name not in rules.bots]
+    return people[0] if len(people) == 1 else None
 
 
 def _rules_observation(rules: Rules) -> Sequence[tuple[str, float]]:

@@ -35,7 +35,7 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         engine: name of the engine.
         bodies: as for `SandboxEnv`.
         every: number of steps per action.
-        duration: as for `SandboxEnv`.
+        duration, observe, reward, player: as for `SandboxEnv`.
 
     Raises:
         CompiledOnlyError: the scene, its game or the engine does not allow compiled calls.
@@ -55,9 +55,14 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         bodies: Sequence[str] | None = None,
         every: int = 1,
         duration: float | None = None,
+        observe: Sequence[str] = (),
+        reward: str = "score",
+        player: str | None = None,
     ) -> None:
         """Create an environment; `reset` begins the episodes."""
-        self._single = single = SandboxEnv(scene, engine, bodies, every, duration=duration)
+        self._single = single = SandboxEnv(
+            scene, engine, bodies, every, duration=duration, observe=observe, reward=reward, player=player
+        )
         if num_envs < 1:
             raise ValueError(f"num_envs must be at least 1, is {num_envs!r}")
         batch = EpisodeBatch.start_batch(single.scene, engine, num_envs)
@@ -67,7 +72,9 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
                 "gymnasium.make_vec(..., vectorization_mode='sync')"
             )
         self.num_envs, self._batch, self.scene, self.engine, self.every = num_envs, batch, single.scene, engine, every
-        self.controls, self.observed, self.analogue = single.controls, single.observed, single.analogue
+        self.controls, self.analogue = single.controls, single.analogue
+        self.observed, self.observed_ranges = single.observed, single.observed_ranges
+        self._dead_zone = np.array([control.dead_zone for control in single.controls])
         self.single_action_space, self.single_observation_space = single.action_space, single.observation_space
         self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, num_envs)
         self.observation_space = gymnasium.vector.utils.batch_space(self.single_observation_space, num_envs)
@@ -160,7 +167,7 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         if not (is_valid and np.isfinite(levels).all() and (self.analogue or np.isin(levels, (0.0, 1.0)).all())):
             names, each = ", ".join(control.name for control in self.controls), "0 to 1" if self.analogue else "0 or 1"
             raise ValueError(f"actions are {self.num_envs} × {len(self.controls)} numbers, {each}, for {names}")
-        return levels.clip(0.0, 1.0)
+        return np.where(levels > self._dead_zone, levels.clip(0.0, 1.0), 0.0)
 
     def _observation(self) -> Observation:
         """Return the observations, (M, O)."""
@@ -170,9 +177,11 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
         states[..., 0:2], states[..., 2:4] = now.position[:, some], now.velocity[:, some]
         states[..., 4], states[..., 5] = now.angle[:, some], now.angular_velocity[:, some]
         states[..., 6] = self._batch.states.present[:, some]
-        values[:, states[0].size : -2] = self._batch.rules.observation()
-        values[:, -2], values[:, -1] = self._batch.states.time, self._batch.rules.score
-        return bounded(values)
+        end = len(self.observed) - len(self._single.observe)
+        values[:, states[0].size : end] = self._batch.rules.observation()
+        for k, name in enumerate(self._single.observe, end):
+            values[:, k] = self._batch.states.time if name == "time" else self._batch.rules.score
+        return bounded(values, self._single.bounds)
 
     def _info(self, mask: BoolArray, failed: Mapping[int, str] = MappingProxyType({})) -> dict[str, Any]:
         """Return the infos of those episodes that `mask` selects, and the reasons why some of them failed."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sandbox.game_names import games_with_rules
+from sandbox.game_names import game_specs, games_with_rules
 from sandbox.run_file import SHAPES
 from sandbox.scene.files.json_schema import schema
 from sandbox.trajectory import Trajectory
@@ -80,3 +80,22 @@ def test_keys_named_in_lessons_and_tutorial_are_in_the_table_of_keys() -> None:
         for key in named:
             assert key in table, (page.name, key)
     assert "`P` pauses" in texts[DOCS / "lessons" / "index.md"]
+
+
+def test_every_environment_has_tables_of_its_actions_and_observations() -> None:
+    page = page_of("environments.md")
+    source = (DOCS / "reference" / "environments.md").read_text(encoding="utf-8")
+    for each in (each for spec in game_specs() for each in spec.environments):
+        assert f"| `{each.id}` |" in page
+        assert f"```{{generated}} environment-arguments {each.name}\n" in source
+        assert f"```{{generated}} environment {each.name}\n" in source
+
+
+def test_table_of_an_environment_has_every_number_with_its_bounds() -> None:
+    table = generated.generate("environment Curling")
+    assert "| 0 + 7k | red-1 … yellow-8: x | −40.23 | 5.486 | m |" in table
+    assert "| 112 | broom | −2.3 | 2.3 | m |" in table
+    rows = [line.split("|")[1].strip() for line in table.partition("Observation space")[2].splitlines() if "|" in line]
+    assert rows[2:] == [*(f"{k} + 7k" for k in range(7)), *map(str, range(16 * 7, 123))]
+    assert "| 32–64 | height 0 … height 32 | 0 | ∞ | m |" in generated.generate("environment ArtilleryDuel")
+    assert "| 7 | fuel | 0 | 1 |  |" in generated.generate("environment Landing")

@@ -67,8 +67,8 @@ ENVIRONMENTS = (
     *(
         Bench(
             f"env-{name.lower()}",
-            f"{STEPS} steps of sandbox/{name}-v0 with random actions / of LunarLander-v3",
-            lambda name=name: env_steps(f"sandbox/{name}-v0"),
+            f"{STEPS} steps of sandbox/{name}-v1 with random actions / of LunarLander-v3",
+            lambda name=name: env_steps(f"sandbox/{name}-v1"),
             lambda: env_steps("LunarLander-v3"),
             target,
             missing=missing,

@@ -8,7 +8,7 @@ Angles are in rad, anticlockwise from the right; power is a fraction of full spe
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -16,7 +16,14 @@ import numpy as np
 from sandbox.action import Action, SetParameter
 from sandbox.arrays import FloatArray
 from sandbox.games.artillery.ballistics import Flight, landing
-from sandbox.games.artillery.battlefield import FULL_HEALTH, MIN_SETTLING_TIME, WEAPONS, Battlefield, Tank
+from sandbox.games.artillery.battlefield import (
+    FRAGMENT_COUNT,
+    FULL_HEALTH,
+    MIN_SETTLING_TIME,
+    WEAPONS,
+    Battlefield,
+    Tank,
+)
 from sandbox.games.artillery.bot_planner import BotPlanner, turn_generator
 from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
 from sandbox.games.artillery.targeting import FiringSolution
@@ -27,7 +34,7 @@ from sandbox.games.artillery.view_state import (
     FallingDirt,
     GunView,
 )
-from sandbox.games.contract import Control, StepInfo
+from sandbox.games.contract import FLAG, Control, ObservationRange, StepInfo
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 
@@ -151,6 +158,7 @@ class ArtilleryRules:
         self._planner: BotPlanner | None = None  # of a bot whose turn it is
         self._aim: FiringSolution | None = None
         self._over: str | None = None
+        self._winner: str | None = None
 
     @property
     def controls(self) -> tuple[Control, ...]:
@@ -173,6 +181,16 @@ class ArtilleryRules:
     def scores(self) -> dict[str, int]:
         """Points of each player."""
         return {tank.player.name: tank.points for tank in self.field.tanks.every}
+
+    @property
+    def bots(self) -> tuple[str, ...]:
+        """Players that are bots."""
+        return tuple(tank.name for tank in self.field.tanks.every if tank.player.bot is not None)
+
+    @property
+    def winner(self) -> str | None:
+        """Player who has won; None while the game runs, and after a draw."""
+        return self._winner
 
     @property
     def game_over(self) -> str | None:
@@ -273,6 +291,27 @@ class ArtilleryRules:
         heights = field.ground.surface(np.linspace(0.0, field.ground.width, OBSERVED_HEIGHTS))
         return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
 
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return the ranges of turn, wind, and of tanks and guns."""
+        tanks, wind = self.field.tanks.every, self.artillery.wind or math.inf
+        tank = {
+            "health": ObservationRange(0.0, FULL_HEALTH, "%"),
+            "money": ObservationRange(0.0, unit="$"),
+            "barrel": ObservationRange(0.0, math.pi, "rad"),
+            "power": ObservationRange(MIN_POWER, 1.0),
+            "weapon": ObservationRange(0.0, len(WEAPONS) - 1.0),
+        }
+        return {
+            "turn": ObservationRange(0.0, float(self.artillery.rounds * len(tanks))),
+            "shooter": ObservationRange(0.0, len(tanks) - 1.0),
+            "may fire": FLAG,
+            "wind": ObservationRange(-wind, wind, "m/s"),
+            "shells": ObservationRange(0.0, float(FRAGMENT_COUNT)),
+            **{f"{each.name} {name}": its for each in tanks for name, its in tank.items()},
+            "landed x": ObservationRange(unit="m"),
+            **{f"height {k}": ObservationRange(0.0, unit="m") for k in range(OBSERVED_HEIGHTS)},
+        }
+
     def view_state(self, time: float) -> ArtilleryViewState:
         """Return the values to draw at a time, s; for the past only the guns, as they are now."""
         tanks = self.field.tanks
@@ -349,10 +388,12 @@ class ArtilleryRules:
         """Start the turn of the next tank, with a new wind; or end the game."""
         tanks, alive = self.field.tanks.every, self.field.tanks.alive
         if len(alive) < 2:
-            return self._end(f"{alive[0].name} wins" if alive else "no tank is left: a draw")
+            if not alive:
+                return self._end("no tank is left: a draw", None)
+            return self._end(f"{alive[0].name} wins", alive[0].name)
         if self.turn >= self.artillery.rounds * len(tanks):
             best = max(tanks, key=lambda tank: (tank.points, tank.health))
-            return self._end(f"out of shells; {best.name} wins on points")
+            return self._end(f"out of shells; {best.name} wins on points", best.name)
         first = self._shooter_index + 1 if self.turn else 0
         order = (k % len(tanks) for k in range(first, first + len(tanks)))
         self._shooter_index = next(k for k in order if tanks[k].alive)
@@ -369,8 +410,8 @@ class ArtilleryRules:
         self.world = self.world.model_copy(update={"wind": wind})
         return [SetParameter(time=self._time, path="world.wind", value=list(wind))]
 
-    def _end(self, reason: str) -> list[Action]:
-        self._over = reason
+    def _end(self, reason: str, winner: str | None) -> list[Action]:
+        self._over, self._winner = reason, winner
         self.field.cues.append("win")
         return []
 

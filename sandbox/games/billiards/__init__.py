@@ -31,7 +31,7 @@ GAME = GameSpec(
     bot="sandbox.games.billiards.bot:BilliardsPolicy",
     view="sandbox.games.billiards.view.view:BilliardsView",
     environments=(
-        Environment("EightBall", "billiards/8-ball", 50, "exact", duration=1800.0),
+        Environment("EightBall", "billiards/8-ball", 50, "exact", duration=3600.0),
         Environment("NineBall", "billiards/9-ball", 50, "exact", duration=1800.0),
     ),
     presents="sandbox.games.billiards.scene:presents",

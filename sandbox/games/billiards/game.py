@@ -11,7 +11,7 @@ ball of the player to shoot is not judged: the balls stay where they come to res
 
 import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -21,7 +21,7 @@ from sandbox.action import Action, Move, Strike
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall, player_name
 from sandbox.games.billiards.table_geometry import MAX_TOUCH_GAP
-from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import FLAG, Control, ObservationRange, StepInfo, UnsuitableSceneError, position_ranges
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
@@ -130,6 +130,17 @@ class BilliardsRules:
     def scores(self) -> dict[str, int]:
         """Score of each player."""
         return {player_name(number): score for number, score in enumerate(self.match.state.scores)}
+
+    @property
+    def bots(self) -> tuple[str, ...]:
+        """No player: all shots are inputs."""
+        return ()
+
+    @property
+    def winner(self) -> str | None:
+        """Player who has won; None during the frame, and after a draw."""
+        winner = self.match.state.winner
+        return None if winner is None else player_name(winner)
 
     @property
     def game_over(self) -> str | None:
@@ -364,6 +375,22 @@ class BilliardsRules:
             ("decisions offered", float(len(self.match.choices.decisions))),
             *((f"score of {player_name(number)}", float(score)) for number, score in enumerate(state.scores)),
         )
+
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return the ranges of the state of the match, and of the positions of the balls: table and pockets."""
+        layout, players = self.match.layout, self.match.state.players
+        (x0, y0), (x1, y1) = layout.area
+        discs = [*layout.pockets.values()]
+        lower = min([x0, *(x - r for x, _, r in discs)]), min([y0, *(y - r for _, y, r in discs)])
+        upper = max([x1, *(x + r for x, _, r in discs)]), max([y1, *(y + r for _, y, r in discs)])
+        return {
+            **position_ranges(layout.names, lower, upper),
+            "waiting": FLAG,
+            "turn": ObservationRange(0.0, max(players - 1.0, 1.0)),
+            "ball in hand": FLAG,
+            "decisions offered": ObservationRange(0.0),
+            **{f"score of {player_name(number)}": ObservationRange(0.0) for number in range(players)},
+        }
 
 
 def start_game(scene: Scene, bodies: Bodies) -> BilliardsRules:  # noqa: ARG001, the signature of `GameSpec.rules`

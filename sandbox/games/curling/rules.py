@@ -13,20 +13,22 @@ Source: World Curling, The Rules of Curling, as in `sandbox.games.curling.sheet`
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from sandbox.action import Action, Impulse, Move, SetParameter
 from sandbox.formatting import format_signed
-from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import FLAG, Control, ObservationRange, StepInfo, UnsuitableSceneError, position_ranges
 from sandbox.games.curling.bot import CurlingBot, Stones
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.scene import CurlingMatch
 from sandbox.games.curling.sheet import (
+    LENGTH,
     PROTECTED,
     RELEASE,
     STONES,
     TEAMS,
+    TEES,
     WIDTH,
     end_score,
     in_free_guard_zone,
@@ -188,6 +190,17 @@ class Curling:
     def scores(self) -> dict[str, int]:
         """Points of each team."""
         return dict(zip(TEAMS, self._score.points, strict=True))
+
+    @property
+    def bots(self) -> tuple[str, ...]:
+        """Teams that the computer plays."""
+        return TEAMS[self._human_teams :]
+
+    @property
+    def winner(self) -> str | None:
+        """Team that has won; None while the match runs."""
+        red, yellow = self._score.points
+        return None if self._score.game_over is None else TEAMS[yellow > red]
 
     @property
     def game_over(self) -> str | None:
@@ -413,6 +426,19 @@ class Curling:
             ("ends played", score.played),
             *zip((f"{team} points" for team in TEAMS), score.points, strict=True),
         )
+
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return the ranges of aim, turn and score, and of the positions of the stones."""
+        beyond, aside = 0.5 * (LENGTH - TEES), parked_position(0, 0)[1]
+        return {
+            **position_ranges(self._names, (-TEES - beyond, -aside), (beyond, aside)),
+            "broom": ObservationRange(-MAX_BROOM_OFFSET, MAX_BROOM_OFFSET, "m"),
+            "weight": ObservationRange(*WEIGHT_LIMITS, "m"),
+            "turn": ObservationRange(-1.0, 1.0),
+            **dict.fromkeys(("may throw", "stones run", "team", "hammer"), FLAG),
+            "thrown": ObservationRange(0.0, 2.0 * STONES),
+            **dict.fromkeys(("ends played", *(f"{team} points" for team in TEAMS)), ObservationRange(0.0)),
+        }
 
     def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""

@@ -11,7 +11,7 @@ pad and slow.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypedDict
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from sandbox.action import Action, Move, Throttle
 from sandbox.arrays import FloatArray
 from sandbox.formatting import format_signed
-from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import Control, ObservationRange, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
@@ -236,6 +236,10 @@ class Landing:
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return the fuel as a fraction of a full tank."""
         return (("fuel", self._tank / self.full_tank),)
+
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return the range of the fuel."""
+        return {"fuel": ObservationRange(0.0, 1.0)}
 
     def height(self, frame: Frame) -> float:
         """Return the height of the lowest point of the ship above the pad, m."""

@@ -1,14 +1,15 @@
 """Rules of pinball: controls, score panel, observation for learning agents, and the rules that run the devices."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from sandbox.action import Action, Drive
-from sandbox.games.contract import Control, StepInfo
+from sandbox.games.contract import FLAG, Control, ObservationRange, StepInfo, position_ranges
 from sandbox.games.pinball.ball_control import BallSearch, Trough
 from sandbox.games.pinball.devices import Kickers, LaneLights, Ramps, ScoringSwitches, SpinnerDevice, lane_lights_of
 from sandbox.games.pinball.drop_targets import DropTargetBanks, banks_of
 from sandbox.games.pinball.events import (
     BALL_COUNT,
+    MAX_BONUS_MULTIPLIER,
     Award,
     BallSave,
     Device,
@@ -23,10 +24,10 @@ from sandbox.games.pinball.events import (
     StepContext,
     Switches,
 )
-from sandbox.games.pinball.game_flow import GameFlow
-from sandbox.games.pinball.modes import Modes, Multiball
+from sandbox.games.pinball.game_flow import BALL_SAVE_TIME, GameFlow
+from sandbox.games.pinball.modes import MULTIBALL_SAVE, Modes, Multiball
 from sandbox.games.pinball.playfield import Playfield
-from sandbox.games.pinball.tilt import NudgeAndTilt
+from sandbox.games.pinball.tilt import MAX_WARNINGS, NudgeAndTilt
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 
@@ -41,13 +42,22 @@ NUDGES = {"nudge": 1.0 + 0j, "nudge left": 1j, "nudge right": -1j}
 NUDGE_FREQUENCY = 0.05
 """frequency of random nudges, relative to other controls: the third nudge during a ball tilts the table"""
 
+PLUNGER_DEAD_ZONE, NUDGE_DEAD_ZONE = 0.1, 0.5
+"""values in actions of environments up to which plunger and nudges count as released"""
+
 CONTROLS = (
     Control(LEFT, "left flipper; lane lights move left", ("left shift", "z"), "lb lt"),
     Control(RIGHT, "right flipper; lane lights move right", ("right shift", "/"), "rb rt"),
-    Control(PLUNGER, "hold to pull the plunger, release to shoot", ("enter",), "a +righty", True),
-    Control("nudge", "nudge the table: balls move up", ("space",), "y up", True, NUDGE_FREQUENCY),
-    Control("nudge left", "nudge the table: balls move left", ("left",), "left", True, NUDGE_FREQUENCY),
-    Control("nudge right", "nudge the table: balls move right", ("right",), "right", True, NUDGE_FREQUENCY),
+    Control(
+        PLUNGER, "hold to pull the plunger, release to shoot", ("enter",), "a +righty", True, 1.0, PLUNGER_DEAD_ZONE
+    ),
+    Control("nudge", "nudge the table: balls move up", ("space",), "y up", True, NUDGE_FREQUENCY, NUDGE_DEAD_ZONE),
+    Control(
+        "nudge left", "nudge the table: balls move left", ("left",), "left", True, NUDGE_FREQUENCY, NUDGE_DEAD_ZONE
+    ),
+    Control(
+        "nudge right", "nudge the table: balls move right", ("right",), "right", True, NUDGE_FREQUENCY, NUDGE_DEAD_ZONE
+    ),
 )
 
 
@@ -227,6 +237,26 @@ class PinballRules:
         """Return the state of the game that panel and lamps show, as numbers."""
         saved = self._saved(0.0 if self._now is None else self._now.time)
         return list(observation(self.flow, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
+
+    def observation_ranges(self) -> Mapping[str, ObservationRange]:
+        """Return the ranges of the state of the game, and of the positions of the balls."""
+        board, modes = self.board, self.modes.modes
+        return {
+            **position_ranges(board.names.values(), *board.corners),
+            **{name: FLAG for name, _ in self.observation()},  # those that are not stated below
+            "player": ObservationRange(0.0, max(board.players - 1.0, 1.0)),
+            "ball": ObservationRange(1.0, BALL_COUNT + 1.0),
+            "shoot again": ObservationRange(0.0),
+            "bonus": ObservationRange(0.0),
+            "bonus times": ObservationRange(1.0, float(MAX_BONUS_MULTIPLIER)),
+            "ball save": ObservationRange(0.0, max(BALL_SAVE_TIME, MULTIBALL_SAVE), "s"),
+            "balls in play": ObservationRange(0.0, float(len(board.balls))),
+            "locked": ObservationRange(0.0, float(self.multiball.size)),
+            "mode": ObservationRange(0.0, max(float(len(modes)), 1.0)),
+            "mode left": ObservationRange(0.0, max((mode.seconds for mode in modes), default=1.0), "s"),
+            "mode to go": ObservationRange(0.0, float(max((mode.needed for mode in modes), default=1))),
+            "warnings": ObservationRange(0.0, MAX_WARNINGS + 1.0),
+        }
 
     def lit_lamps(self) -> frozenset[str]:
         """Return the names of the parts whose lamps are lit; a tilted table is dark."""
