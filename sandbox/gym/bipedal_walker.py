@@ -39,6 +39,8 @@ JOINTS = "first hip", "first knee", "second hip", "second knee"
 BODIES = "first thigh", "first shin", "second thigh", "second shin"
 ANGLE_OFFSETS = 0.05, 1.0, -0.05, 1.0
 """rad, observed angle of each joint when the two bodies are parallel"""
+LEG_NUMBERS = "hip angle", "hip rate", "knee angle", "knee rate", "foot touches"
+"""observed numbers of a leg"""
 RATES = 4.0, 6.0, 4.0, 6.0
 """rad/s, of the motors"""
 TORQUE_COST = 0.00035 * 80.0
@@ -78,6 +80,8 @@ class BipedalWalker(ClassicEnv):
         """Create an environment; `reset` begins an episode."""
         super().__init__("games/bipedal_walker", engine, render_mode)
         self.hardcore = hardcore
+        legs = (f"{leg} {number}" for leg in ("first", "second") for number in LEG_NUMBERS)
+        self.observed = "angle", "ω", "vx", "vy", *legs, *(f"ray {k + 1}" for k in range(RAYS))
         leg = [math.pi, 5.0, math.pi, 5.0, 5.0]
         high = np.asarray([math.pi, 5.0, 5.0, 5.0, *leg, *leg, *[1.0] * RAYS], np.float32)
         low = -high

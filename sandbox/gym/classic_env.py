@@ -27,6 +27,8 @@ class ClassicEnv(gymnasium.Env[Observation, Any]):
     Pickles and copies, also those of a running episode, repeat the episode from its start, and continue it alike.
     """
 
+    observed: tuple[str, ...]
+    """name of each number of an observation"""
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012, as the base has it
 
     def __init__(self, scene: str, engine: str, render_mode: str | None) -> None:

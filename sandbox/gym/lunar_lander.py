@@ -98,11 +98,12 @@ class LunarLander(ClassicEnv):
         engine: str = "pymunk",
     ) -> None:
         """Create an environment; `reset` begins an episode."""
-        super().__init__("games/lunar_lander", engine, render_mode)
         if engine not in DRIFT_FIRST:
             raise ValueError(f"{engine} changes velocities before it moves bodies; use {' or '.join(DRIFT_FIRST)}")
+        super().__init__("games/lunar_lander", engine, render_mode)
         if not -12.0 < gravity < 0.0:
             raise ValueError(f"gravity must be between -12 and 0 m/s², is {gravity!r}")
+        self.observed = "x", "y", "vx", "vy", "angle", "ω", "right leg touches", "left leg touches"
         self.continuous, self.gravity, self.enable_wind = continuous, gravity, enable_wind
         self.wind_power, self.turbulence_power = wind_power, turbulence_power
         bound = np.asarray([2.5, 2.5, 10.0, 10.0, 2.0 * math.pi, 10.0, 1.0, 1.0], np.float32)
@@ -165,7 +166,9 @@ class LunarLander(ClassicEnv):
         base, (vx, vy) = self._base, (impulse / self._mass).tolist()
         spin = ANGULAR_RESPONSE * vx
         vx, vy = LINEAR_RESPONSE[0] * vx, LINEAR_RESPONSE[1] * vy
-        vy += self.gravity * base.solver.dt  # Box2D adds it before it moves the bodies
+        substeps = base.solver.substeps
+        # Box2D adds gravity before it moves the bodies: with this, they fall by as much in each step.
+        vy += self.gravity * base.solver.dt * (substeps + 1) / (2 * substeps)
         offset = base.bodies.position - base.bodies.position[self._lander]
 
         def started(body: Any, index: int) -> Any:
@@ -261,20 +264,28 @@ class LunarLander(ClassicEnv):
     def _engine_impulse(self, frame: Frame, main: float, side: float) -> tuple[float, float, float]:
         """Return the impulse of the engines in a step, N·s, and its moment about the centre of mass, N·m·s."""
         first, second = (self.np_random.uniform(-1.0, 1.0, 2) / SCALE).tolist()
+        total = 0.0, 0.0, 0.0
         if not (main or side):
-            return 0.0, 0.0, 0.0
-        x, y, angle = self._pose(frame)
+            return total
+        (x, y, angle), (cx, cy) = self._pose(frame), frame.position[self._lander].tolist()
         sine, cosine = math.sin(angle), math.cos(angle)
-        if main:  # from the origin to the engine, along the axis and across it
-            along, across, power = MAIN_OFFSET + 2.0 * first, second, MAIN_IMPULSE * main
-            px, py = 0.0, 0.0
-        else:
-            along, across, power = first, 3.0 * second + math.copysign(SIDE_OFFSET, side), SIDE_IMPULSE * abs(side)
-            px, py = -sine * SIDE_HEIGHT[0], cosine * SIDE_HEIGHT[1]
-        ox, oy = sine * along - cosine * across, -cosine * along - sine * across
-        jx, jy = -power * ox, -power * oy
-        cx, cy = frame.position[self._lander].tolist()
-        return jx, jy, (x + ox + px - cx) * jy - (y + oy + py - cy) * jx
+        engines = (  # where each acts: along the axis of the lander, across it, and from there; and N·s per m
+            (MAIN_OFFSET + 2.0 * first, second, 0.0, 0.0, MAIN_IMPULSE * main),
+            (
+                first,
+                3.0 * second + math.copysign(SIDE_OFFSET, side),
+                -sine * SIDE_HEIGHT[0],
+                cosine * SIDE_HEIGHT[1],
+                SIDE_IMPULSE * abs(side),
+            ),
+        )
+        for along, across, px, py, power in engines:
+            if power:
+                ox, oy = sine * along - cosine * across, -cosine * along - sine * across
+                jx, jy = -power * ox, -power * oy
+                turn = (x + ox + px - cx) * jy - (y + oy + py - cy) * jx
+                total = total[0] + jx, total[1] + jy, total[2] + turn
+        return total
 
     def _next_gust(self) -> tuple[float, float]:
         """Return the impulse of the wind in a step, N·s, and its angular impulse, N·m·s."""

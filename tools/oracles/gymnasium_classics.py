@@ -157,8 +157,9 @@ def _row(label: str, peer: FloatArray, own: FloatArray, again: FloatArray) -> st
     return f"| {label} | {sides} | {figures} |"
 
 
-def certificate(name: str, episodes: int, workers: int, observed: Sequence[str]) -> None:
+def certificate(name: str, episodes: int, workers: int) -> None:
     """Print the tables of an environment."""
+    observed: Sequence[str] = make(name, False).get_wrapper_attr("observed")
     with ProcessPoolExecutor(workers) as pool:
         for kind in POLICIES:
             peer = sample(pool, name, True, kind, range(episodes))
@@ -214,21 +215,14 @@ def train(name: str, workers: int, seed: int = 1) -> None:
     weights_file(name).write_text(json.dumps(figures | {"weights": [round(w, 5) for w in mean.tolist()]}) + "\n")
 
 
-OBSERVED = {
-    "LunarLander": ("x", "y", "vx", "vy", "angle", "ω", "first leg", "second leg"),
-    "BipedalWalker": (
-        *("angle", "ω", "vx", "vy"),
-        *(f"{leg} {what}" for leg in ("first", "second") for what in ("hip", "hip rate", "knee", "knee rate", "foot")),
-        *(f"ray {k + 1}" for k in range(10)),
-    ),
-}
-"""names of the numbers of an observation"""
+NAMES = "LunarLander", "BipedalWalker"
+"""of the environments"""
 
 
 def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("name", choices=OBSERVED)
+    parser.add_argument("name", choices=NAMES)
     parser.add_argument("--train", action="store_true", help="train the policy, and write its weights")
     parser.add_argument("--episodes", type=int, default=1000, help="episodes of each policy and side")
     parser.add_argument("--workers", type=int, default=2, help="processes")
@@ -236,7 +230,7 @@ def main() -> None:
     if options.train:
         train(f"{options.name}-v3", options.workers)
     else:
-        certificate(f"{options.name}-v3", options.episodes, options.workers, OBSERVED[options.name])
+        certificate(f"{options.name}-v3", options.episodes, options.workers)
 
 
 if __name__ == "__main__":
