@@ -8,7 +8,7 @@ from dataclasses import fields
 from types import NoneType
 from typing import get_args, get_type_hints
 
-from environment_tables import arguments, environment, environments
+from environment_tables import arguments, classic, classics, environment, environments
 from gallery import gallery
 from python_tables import classes, model_fields
 from replays import replay
@@ -254,6 +254,8 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "store-columns": store_columns,
     "stored-arrays": stored_arrays,
     "environments": environments,
+    "classics": classics,
+    "classic": classic,
     "environment": environment,
     "environment-arguments": arguments,
     "gallery": gallery,

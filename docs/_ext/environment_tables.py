@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from sandbox.game_names import game_specs
 from sandbox.games.contract import ObservationRange
-from sandbox.gym import STATES, SandboxEnv
+from sandbox.gym import CLASSICS, STATES, SandboxEnv
 
 ELLIPSIS = "…"
 
@@ -54,6 +54,28 @@ def environment(name: str) -> str:
         *_bodies(env),
     ]
     return "\n\n".join(parts)
+
+
+def classics() -> str:
+    """Return a table of the environments that repeat those of Gymnasium."""
+    rows = []
+    for name, (_, _, steps, threshold) in CLASSICS.items():
+        env = gymnasium.make(f"sandbox/{name}")
+        (count,) = env.observation_space.shape or ()
+        rows.append([f"`sandbox/{name}`", f"{env.action_space}", f"{count}", f"{steps:,}", f"{threshold:g}"])
+    return table(["id", "action space", "observed numbers", "longest episode, steps", "return of a solution"], rows)
+
+
+def classic(name: str) -> str:
+    """Return the numbers of an observation of one of these environments, by its name."""
+    env = gymnasium.make(f"sandbox/{name}")
+    assert isinstance(env.observation_space, spaces.Box)
+    bounds = zip(env.observation_space.low.tolist(), env.observation_space.high.tolist(), strict=True)
+    rows = [
+        [f"{k}", each, _bound(low), _bound(high)]
+        for k, (each, (low, high)) in enumerate(zip(env.get_wrapper_attr("observed"), bounds, strict=True))
+    ]
+    return table(["num", "observation", "min", "max"], rows)
 
 
 def arguments(name: str) -> str:

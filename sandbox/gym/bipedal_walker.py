@@ -5,14 +5,15 @@ units of 30 pixels. The scene is `games/bipedal_walker`.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
-from sandbox.action import Actuate
+from sandbox.action import Actuate, Throttle
 from sandbox.arrays import FloatArray
-from sandbox.gym.classic_env import ClassicEnv
+from sandbox.gym.classic_env import ClassicEnv, below
 from sandbox.gym.game_env import Observation, refuse_options
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
@@ -174,14 +175,13 @@ class BipedalWalker(ClassicEnv):
         base = self._base
         wall, soil = base.walls[0], base.play.markings[-1]
         velocity = push / float(base.bodies.mass.sum()), 0.0
-        end = ground[-1][0]
         return base.model_copy(
             update={
                 "play": base.play.model_copy(
                     update={
                         "markings": (
                             *base.play.markings[:-1],
-                            soil.model_copy(update={"points": (*ground, (end, -HEIGHT), (0.0, -HEIGHT))}),
+                            soil.model_copy(update={"points": (*ground, *below(ground))}),
                         )
                     }
                 ),
@@ -288,6 +288,13 @@ class BipedalWalker(ClassicEnv):
         hits = (along >= 0.0) & (across >= 0.0) & (across <= 1.0)
         distances: list[float] = np.where(hits, along, 1.0).min(axis=1).clip(0.0, 1.0).tolist()
         return distances
+
+    def _drawn(self) -> tuple[Scene, Mapping[str, Throttle]]:
+        """Return the scene with a view that moves with the walker."""
+        scene, frame = self._running.scene, self._running.frame()
+        left = float(frame.position[self._hull, 0]) - 0.2 * WIDTH
+        play = scene.play.model_copy(update={"view": ((left, 0.0), (left + WIDTH, HEIGHT))})
+        return scene.model_copy(update={"play": play}), {}
 
 
 def _box(x: float, y: float, width: float, height: float) -> list[Point]:

@@ -1,6 +1,6 @@
 """Base of the environments that repeat Gymnasium's Box2D environments on a scene and an engine of the sandbox."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -12,11 +12,22 @@ from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.gym.game_env import Observation
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Contacts
 
 SIZE = 600, 400
 """px, size of a rendered picture"""
+
+
+FAR = 20.0
+"""m, to which the ground is drawn on each side and below"""
+
+
+def below(ground: Sequence[Point]) -> tuple[Point, ...]:
+    """Return the corners that complete those of a ground, m, to the outline of the soil as it is drawn."""
+    (left, first), (right, last) = ground[0], ground[-1]
+    return (right + FAR, last), (right + FAR, -FAR), (left - FAR, -FAR), (left - FAR, first)
 
 
 class ClassicEnv(gymnasium.Env[Observation, Any]):

@@ -12,7 +12,7 @@ import numpy as np
 from gymnasium import spaces
 
 from sandbox.action import Impulse, Throttle
-from sandbox.gym.classic_env import ClassicEnv
+from sandbox.gym.classic_env import ClassicEnv, below
 from sandbox.gym.game_env import Observation, refuse_options
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
@@ -176,7 +176,7 @@ class LunarLander(ClassicEnv):
             return body.model_copy(update={"velocity": (vx - spin * dy, vy + spin * dx), "angular_velocity": spin})
 
         moon = base.play.markings[-1]
-        rock = moon.model_copy(update={"points": (*ground, (WIDTH, -HEIGHT), (0.0, -HEIGHT))})
+        rock = moon.model_copy(update={"points": (*ground, *below(ground))})
         return base.model_copy(
             update={
                 "world": base.world.model_copy(update={"gravity": (0.0, self.gravity)}),
