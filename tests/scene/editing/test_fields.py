@@ -53,7 +53,7 @@ def test_there_is_a_field_for_each_key_of_a_model(model: type[BaseModel]) -> Non
 def test_only_lists_of_tables_and_tables_of_games_are_not_edited_as_a_field() -> None:
     """They have sections of their own in the property panel."""
     others = {case[1].key.rpartition(".")[2] for case in SPECS if case[1].kind == "other"}
-    tables = {"billiards", "pinball", "terrain", "artillery", "curling", "place"}  # `place`: points by name
+    tables = {"billiards", "pinball", "terrain", "artillery", "curling"} | {"place", "levels"}  # points, levels by name
     assert others - tables <= {name for name, field in named_fields() if is_list_of_tables(field)}
 
 
