@@ -142,7 +142,7 @@ class Comparison(NamedTuple):
     @classmethod
     def of(cls, first: FloatArray, second: FloatArray) -> "Comparison":
         """Compare two samples."""
-        test = stats.ks_2samp(first, second)
+        test = stats.ks_2samp(first, second, method="asymp")
         deviations = float(first.std(ddof=1)), float(second.std(ddof=1))
         pooled = math.sqrt(0.5 * (deviations[0] ** 2 + deviations[1] ** 2))
         means = float(first.mean()), float(second.mean())

@@ -5,6 +5,7 @@ exactly if their kinds, layers and categories all allow it, because each side of
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.filters import bits_of_categories
@@ -71,6 +72,7 @@ def bits_of_sensor(scene: SceneDescription, detects: tuple[str, ...] | None, *, 
     return every, _repeated(kinds, layers, wanted, count)
 
 
+@lru_cache(maxsize=1024)  # scenes have many colliders, and few different ones
 def _repeated(kinds: int, layers: int, categories: int, count: int) -> int:
     """Return the bits of some kinds on some layers and in some categories."""
     return sum(kinds << KINDS * (max(count, 1) * layer + k) for layer in _ones(layers) for k in _ones(categories))
