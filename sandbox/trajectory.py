@@ -51,8 +51,10 @@ class Frame:
 
     def __post_init__(self) -> None:
         """Freeze the arrays, which frames may share."""
-        for array in self._arrays():
-            array.setflags(write=False)
+        state = self.position, self.velocity, self.angle, self.angular_velocity, self.present
+        for array in (*state, self.roll, self.layer, self.visits, self.drives, self.passing):
+            if array is not None:
+                array.setflags(write=False)
 
     def __repr__(self) -> str:
         """Return the time, the number of bodies and the largest speed."""

@@ -1,7 +1,9 @@
 """Actions: validation, JSON, order in time."""
 
+import copy
 import json
 import math
+import pickle
 from typing import Any
 
 import pytest
@@ -170,3 +172,13 @@ def test_faults_of_a_value_of_several_types_name_the_types() -> None:
         actions_from_json('[{"kind": "set", "time": 0, "path": "ball.a.restitution", "value": {}}]')
     kinds = [line.partition(":")[0].removeprefix("0.set.value.") for line in str(caught.value).splitlines()]
     assert kinds == ["float", "int", "bool", "str", "list[float]"]
+
+
+@given(actions(), numbers(0.0, 1e6))
+def test_action_at_another_time_equals_one_that_was_created_so(some: tuple[Action, ...], time: float) -> None:
+    for action in some:
+        moved = action.at(time)
+        assert moved == type(action).model_validate({**dict(action), "time": time})
+        assert moved.model_fields_set == action.model_fields_set | {"time"}
+        assert pickle.loads(pickle.dumps(moved)) == moved == copy.deepcopy(moved) == moved.model_copy()
+        assert action.time == time or moved != action  # the original keeps its time

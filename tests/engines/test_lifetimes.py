@@ -166,3 +166,19 @@ def test_partial_last_step_ends_lifetimes(engine: str) -> None:
         simulation.finish(part)
         end = 0.02 if simulation.makes_whole_steps else 0.01 + 0.01 * part
         assert dict(simulation.retired) == (dict.fromkeys((0, 1), end) if end >= 0.015 else {})
+
+
+@pytest.mark.parametrize("others", [0, 12])  # pymunk checks the states of a few bodies in another way
+@pytest.mark.parametrize("engine", ENGINES)
+def test_body_is_removed_at_the_first_frame_outside_of_the_bounds(engine: str, others: int) -> None:
+    resting = [{"position": [0.0, 2.0 + 0.5 * k], "radius": 0.1} for k in range(others)]
+    leaving = {"name": "leaving", "position": [0.005, 0.0], "velocity": [1.0, 0.0], "radius": 0.1}
+    world = {"gravity": [0.0, 0.0], "duration": 2.0, "bounds": [[-9.0, -9.0], [1.0, 9.0]]}
+    simulation = start(from_document({"world": world, "solver": {"dt": 0.01}, "ball": [*resting, leaving]}), engine)
+    simulation.contacts()
+    for _ in range(99):
+        simulation.step()
+    assert not simulation.retired
+    assert simulation.frame().position[-1, 0] == pytest.approx(0.995, abs=1e-4)  # box2d has single precision
+    simulation.step()
+    assert dict(simulation.retired) == {others: pytest.approx(1.0, abs=1e-12)}  # rounding of k·dt

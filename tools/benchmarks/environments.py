@@ -80,7 +80,7 @@ ENVIRONMENTS = (
         f"{STEPS} steps of an episode, one of {EPISODES} in a SandboxVectorEnv of landing / of LunarLander-v3",
         vector_steps,
         lambda: env_steps("LunarLander-v3"),
-        2.0,
+        0.3,
         missing=missing,
     ),
 )

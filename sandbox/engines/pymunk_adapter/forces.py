@@ -44,10 +44,10 @@ if TYPE_CHECKING:
     from sandbox.engines.forces.liquid import Liquids
 
 
-Load: TypeAlias = tuple[float, float, float]
+BodyLoad: TypeAlias = tuple[float, float, float]
 """Force (x, y), N, and torque, N·m, on a body"""
 
-NO_LOAD: Load = 0.0, 0.0, 0.0
+NO_LOAD: BodyLoad = 0.0, 0.0, 0.0
 
 
 class AttractionField:
@@ -158,15 +158,15 @@ class BodyThrusts:
         """
         self._thrusts, self._levels, self._record, self._began, self._h = thrusts, levels, body._body, began, h
         self._is_timed = any(thrust.begin > 0.0 or thrust.end is not None for _, thrust, _ in thrusts)
-        self._own_load: Load | None = None  # in the body's frame; None if it has to be computed
-        self.load: Load = NO_LOAD
+        self._own_load: BodyLoad | None = None  # in the body's frame; None if it has to be computed
+        self.load: BodyLoad = NO_LOAD
         """force (x, y), N, and torque, N·m, in the last substep"""
 
     def invalidate(self) -> None:
         """Record that a level has changed."""
         self._own_load = None
 
-    def update(self, time: float) -> Load:
+    def update(self, time: float) -> BodyLoad:
         """Return `load`, updated to that of a substep that starts at a time of the simulation, s."""
         load = self._own_load
         if load is None:
@@ -192,7 +192,7 @@ class BodyThrusts:
             lib.cpBodySetForce(self._record, (x, y))
             lib.cpBodySetTorque(self._record, torque)
 
-    def _sum(self, time: float) -> Load:
+    def _sum(self, time: float) -> BodyLoad:
         """Return force and torque in the body's frame, at a time of the scene, s."""
         x = y = torque = 0.0
         for k, thrust, arm in self._thrusts:
@@ -282,7 +282,7 @@ def scale_gravity(body: pymunk.Body, scale: float) -> None:
     body.velocity_func = update_velocity
 
 
-BodyLoads: TypeAlias = Mapping[int, Load]
+BodyLoads: TypeAlias = Mapping[int, BodyLoad]
 """Loads on some bodies, by their index"""
 
 
