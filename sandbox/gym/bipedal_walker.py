@@ -36,6 +36,8 @@ MAX_START_IMPULSE = 5.0 / 50.0
 """N·s, largest horizontal impulse at the start"""
 RAYS, RAY_ANGLE, RAY_LENGTH = 10, 1.5, 160.0 / SCALE
 """number of range finders, rad between straight down and the first beyond the last, and m"""
+EDGES_IN_RANGE = math.ceil(RAY_LENGTH / GROUND_STEP) + 2
+"""number of edges of the ground that rays can reach"""
 JOINTS = "first hip", "first knee", "second hip", "second knee"
 BODIES = "first thigh", "first shin", "second thigh", "second shin"
 ANGLE_OFFSETS = 0.05, 1.0, -0.05, 1.0
@@ -122,8 +124,10 @@ class BipedalWalker(ClassicEnv):
         self.np_random.uniform(size=CLOUD_NUMBERS)
         push = float(self.np_random.uniform(-MAX_START_IMPULSE, MAX_START_IMPULSE))
         self._begin(self._scene_of(ground, boxes, push))
-        outlines = [ground, *([*box, box[0]] for box in boxes)]
-        self._edges: FloatArray = np.concatenate([np.column_stack((line[:-1], line[1:])) for line in outlines])
+        self._edges, *box_edges = (
+            np.column_stack((line[:-1], line[1:])) for line in (ground, *([*box, box[0]] for box in boxes))
+        )
+        self._box_edges = np.concatenate(box_edges) if box_edges else None
         self._touching = set[tuple[int, int]]()
         self._foot_contact, self._fallen = [0.0, 0.0], False
         self._shaping: float | None = None
@@ -279,7 +283,11 @@ class BipedalWalker(ClassicEnv):
 
     def _distances(self, x: float, y: float) -> list[float]:
         """Return the distances to the ground, in parts of the range, that the range finders measure from a point, m."""
-        start, way = self._edges[:, :2] - (x, y), self._edges[:, 2:] - self._edges[:, :2]
+        first = max(int(x / GROUND_STEP) - 1, 0)
+        edges = self._edges[first : first + EDGES_IN_RANGE]
+        if self._box_edges is not None:
+            edges = np.concatenate((edges, self._box_edges))
+        start, way = edges[:, :2] - (x, y), edges[:, 2:] - edges[:, :2]
         rays = self._rays[:, None, :]
         cross = rays[..., 0] * way[:, 1] - rays[..., 1] * way[:, 0]
         with np.errstate(divide="ignore", invalid="ignore"):  # rays along an edge do not meet it
