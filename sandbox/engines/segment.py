@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Force, Pull, Throttle
+from sandbox.action import Action, ActionError, Force, Pull, Steer, Throttle
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
@@ -35,6 +35,7 @@ class Checkpoint:
     joined: Mapping[int, float]
     forces: Mapping[str, Force]
     throttles: Mapping[str, Throttle]
+    steering: Mapping[str, Steer]
     pulls: Mapping[str, Pull]
     setup: Setup
     """with all joints, numbered as `broken`"""
@@ -249,7 +250,7 @@ def start_segment(
     wanted: Settings,
     bodies: Bodies,
     frame: Frame,
-    persistent: Iterable[Force | Throttle],
+    persistent: Iterable[Force | Throttle | Steer],
     broken: Collection[int] = (),
     plane_reach: PlaneReach | None = None,
 ) -> Segment:
@@ -261,7 +262,7 @@ def start_segment(
         wanted: settings.
         bodies: all bodies, by session index.
         frame: the state.
-        persistent: actions that still act: constant forces, and levels of thrusts.
+        persistent: actions that still act: constant forces, and levels of thrusts and tyres.
         broken: indices of broken joints.
         plane_reach: of the simulation that is resumed; by default it follows from the positions of the bodies.
 
@@ -275,11 +276,11 @@ def start_segment(
             simulation.apply(action)
         except ActionError as error:
             simulation.close()
-            description = (
-                f"the constant force on {action.body!r}"
-                if isinstance(action, Force)
-                else f"the thrust {action.thrust!r}"
-            )
+            description = {
+                "force": lambda each: f"the constant force on {each.body!r}",
+                "throttle": lambda each: f"the thrust {each.thrust!r}",
+                "steer": lambda each: f"the tyre {each.tyre!r}",
+            }[action.kind](action)
             raise ActionError(f"{engine} cannot continue with {description}: {error}") from None
     body_indices = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")

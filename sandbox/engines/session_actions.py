@@ -20,6 +20,7 @@ from sandbox.action import (
     Join,
     Launch,
     Remove,
+    Steer,
     Throttle,
     Unjoin,
     check_speed,
@@ -40,12 +41,16 @@ from sandbox.trajectory import Frame
 
 
 class PersistentActions:
-    """Actions that keep acting: constant forces by the name of the body, throttles by the name of the thrust."""
+    """Actions that keep acting: constant forces by the name of the body, levels by that of the thrust or tyre."""
 
     def __init__(
-        self, forces: Mapping[str, Force] | None = None, throttles: Mapping[str, Throttle] | None = None
+        self,
+        forces: Mapping[str, Force] | None = None,
+        throttles: Mapping[str, Throttle] | None = None,
+        steering: Mapping[str, Steer] | None = None,
     ) -> None:
         self._forces, self._throttles = dict(forces or {}), dict(throttles or {})
+        self._steering = dict(steering or {})
 
     def record(self, action: Action) -> None:
         """Record an action that was applied."""
@@ -53,6 +58,8 @@ class PersistentActions:
             self._forces[action.body] = action
         elif isinstance(action, Throttle):
             self._throttles[action.thrust] = action
+        elif isinstance(action, Steer):
+            self._steering[action.tyre] = action
         elif isinstance(action, Remove):
             self._forces.pop(action.body, None)
 
@@ -71,9 +78,14 @@ class PersistentActions:
         """Throttle of each thrust."""
         return dict(self._throttles)
 
-    def actions(self) -> list[Force | Throttle]:
-        """Return the actions that reproduce the forces and throttles in another simulation."""
-        return [*self._forces.values(), *self._throttles.values()]
+    @property
+    def steering(self) -> dict[str, Steer]:
+        """Levels of each tyre."""
+        return dict(self._steering)
+
+    def actions(self) -> list[Force | Throttle | Steer]:
+        """Return the actions that reproduce the forces and levels in another simulation."""
+        return [*self._forces.values(), *self._throttles.values(), *self._steering.values()]
 
 
 def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:

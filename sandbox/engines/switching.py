@@ -22,6 +22,7 @@ from sandbox.action import (
     Pull,
     SetParameter,
     Spawn,
+    Steer,
     Switch,
     Throttle,
     Unjoin,
@@ -183,6 +184,7 @@ class SwitchableSimulation:
             joined=dict(self._joined),
             forces=self._active_actions().forces,
             throttles=self._persistent.throttles,
+            steering=self._persistent.steering,
             pulls=self._pulls.pulls,
             setup=self.setup,
             plane_reach=self.plane_reach,
@@ -206,7 +208,7 @@ class SwitchableSimulation:
         """
         simulation = cls.__new__(cls)
         simulation.engine, simulation.wanted = point.engine, point.wanted
-        simulation._persistent = PersistentActions(point.forces, point.throttles)
+        simulation._persistent = PersistentActions(point.forces, point.throttles, point.steering)
         persistent = simulation._persistent.actions()
         simulation._segment = start_segment(
             point.setup,
@@ -294,6 +296,11 @@ class SwitchableSimulation:
     def throttles(self) -> Mapping[str, Throttle]:
         """Throttles that were set, by the name of the thrust."""
         return self._persistent.throttles
+
+    @property
+    def steering(self) -> Mapping[str, Steer]:
+        """Levels of tyres that were set, by the name of the tyre."""
+        return self._persistent.steering
 
     @property
     def work(self) -> Mapping[str, int]:

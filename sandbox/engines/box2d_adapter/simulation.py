@@ -108,6 +108,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         Forces depend on the state, or there are drives, motors along an axis, paths, zones or limits of speeds.
         """
         forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
+        forces = forces or self._field.tyres is not None
         moves = self._joints.has_linear_motors or self._drives is not None or self._paths is not None
         return forces or moves or self._zoned is not None or self._limits is not None
 
@@ -119,7 +120,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _apply_forces(self, time: float, length: float) -> None:
         """Apply the forces of a step of Box2D that starts at a time, s, and takes a length, s.
 
-        They are constant forces, attraction, thrusts, springs, liquids and the air.
+        They are constant forces, attraction, thrusts, springs, liquids, the air and tyres.
         """
         store, air = self._store, self._air
         force, torque = store.force.copy(), store.torque.copy()
@@ -144,6 +145,13 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             state = store.velocity, store.angular_velocity
             mean = mean_acceleration(air, ALL, world_gravity, *state, applied, length)
             force = np.where(moving[:, None], mass[:, None] * (mean - world_gravity), 0.0)
+        if self._field.tyres is not None:
+            own = store.world_gravity + force / mass[:, None], torque * store.inverse_moment
+            rates = np.column_stack((store.velocity + length * own[0], store.angular_velocity + length * own[1]))
+            loads = self._field.tyre_loads(np.column_stack((store.position, store.angle)), rates, length)
+            total = loads.drive + loads.friction
+            force[self._field.tyres.bodies] += total[:, :2]
+            torque[self._field.tyres.bodies] += total[:, 2]
         if self._limits is not None:  # positions follow the velocities that these forces give
             own = store.world_gravity + force / mass[:, None], torque * store.inverse_moment
             rates = np.column_stack((store.velocity + length * own[0], store.angular_velocity + length * own[1]))

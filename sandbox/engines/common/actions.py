@@ -26,6 +26,7 @@ from sandbox.action import (
     Reshape,
     SetParameter,
     Spawn,
+    Steer,
     Strike,
     Switch,
     Throttle,
@@ -130,6 +131,13 @@ class ActionTarget(Protocol):
 
         Raises:
             ActionError: the engine models no thrust.
+        """
+
+    def steer(self, index: int, levels: tuple[float, float, float]) -> None:
+        """Set the levels of drive, brake and steering of a tyre, by its index in the scene.
+
+        Raises:
+            ActionError: the engine models no tyres.
         """
 
     def drive(self, index: int, level: float) -> None:
@@ -306,7 +314,7 @@ def reshape(action: Reshape, target: ActionTarget) -> None:
 
 def sets_level(action: Action) -> bool:
     """Return whether an action sets a level only: the state of the bodies, and what can touch, stay as they are."""
-    return isinstance(action, (Throttle, Drive))
+    return isinstance(action, (Throttle, Steer, Drive))
 
 
 ENVIRONMENT_FIELDS = {"world", "surface"}
@@ -335,6 +343,9 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
         case Throttle():
             thrusts = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(target.scene.thrusts)]
             target.throttle(index_of_name(thrusts, action.thrust, "thrust"), action.level)
+        case Steer():
+            tyres = [tyre.name or default_name("tyre", k) for k, tyre in enumerate(target.scene.tyres)]
+            target.steer(index_of_name(tyres, action.tyre, "tyre"), (action.drive, action.brake, action.steer))
         case Reshape():
             reshape(action, target)
         case Drive():

@@ -33,6 +33,7 @@ from sandbox.engines.pymunk_adapter.forces import (
     BodyLoads,
     ConstantForces,
     SpaceLiquids,
+    SpaceTyres,
     Thrusts,
     scale_gravity,
     sum_of_loads,
@@ -94,6 +95,8 @@ class SpaceBodies:
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.liquids = SpaceLiquids.of(scene, settings.h)
         """liquids of zones; None without any"""
+        self.tyres = SpaceTyres.of(setup, settings.h)
+        """tyres of bodies; None without any"""
         self._bodies = setup.bodies
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
@@ -284,6 +287,8 @@ class SpaceBodies:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
                 self.thrusts.join(index, body)
+            if self.tyres is not None:
+                self.tyres.join(index, body)
             if self._settings.sleeping and bodies.gravity_scale[index] != 1.0:
                 scale_gravity(body, float(bodies.gravity_scale[index]))
             if bodies.limited[index]:
@@ -348,6 +353,8 @@ class SpaceBodies:
             self.thrusts.leave(index)
             if self.liquids is not None:
                 self.liquids.leave(index)
+            if self.tyres is not None:
+                self.tyres.leave(index)
             self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
@@ -452,7 +459,13 @@ class SpaceBodies:
                 self.limit_changes.append((index, change * x, change * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
-        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts, liquids and the air."""
+        """Set what acts in a substep that starts at a time, s."""
+        self._set_external_forces(time)
+        if self.tyres is not None:  # they oppose the motion to which all other forces lead
+            self.tyres.apply(self._space, self._resting.keys())
+
+    def _set_external_forces(self, time: float) -> None:
+        """Set paths, constant forces, thrusts, liquids and the air of a substep that starts at a time, s."""
         if self._paths:
             self._paths.before(time)
         if self.liquids is not None:
@@ -498,6 +511,11 @@ class SpaceBodies:
             or self.rolling.is_active
         )
 
+    @property
+    def _acts_before_substeps(self) -> bool:
+        """Whether forces or paths have to be set before each substep."""
+        return bool(self.thrusts or self.constant_forces or self._paths or self.tyres is not None)
+
     def batch_steps(self, substeps: int, lists_substeps: bool) -> int:
         """Return the largest number of steps of `step_batch`."""
         rows = self._batch_reader.max_rows(self._reader.body_count)
@@ -540,7 +558,7 @@ class SpaceBodies:
             polygons=self._polygons,
             until_contact=until_contact,
             warm_start=contacts.take_warm_start if lists_contacts else None,
-            before_substep=before_substep if self.thrusts or self.constant_forces or self._paths else None,
+            before_substep=before_substep if self._acts_before_substeps else None,
             needs_check=self._state_check(),
         )
         # The states are valid until the next batch, like those that the reader returns.

@@ -32,6 +32,9 @@ Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 Level = Annotated[float, Field(ge=0, le=1)]
 """Fraction of a thrust, or level of a drive."""
 
+SignedLevel = Annotated[float, Field(ge=-1, le=1)]
+"""Level of the engine or steering of a tyre."""
+
 Value = float | int | bool | str | None
 """Value of a setting."""
 
@@ -219,6 +222,20 @@ class Throttle(Timed):
     """fraction of the force of the thrust"""
 
 
+class Steer(Timed):
+    """Set the levels of the engine, brake and steering of a tyre of the scene. They act until the next such action."""
+
+    kind: Literal["steer"] = default_kind("steer")
+    tyre: Name
+    """name of the tyre"""
+    drive: SignedLevel = 0.0
+    """fraction of the force of its engine; negative values drive backwards"""
+    brake: Level = 0.0
+    """fraction of the force of its brake"""
+    steer: SignedLevel = 0.0
+    """fraction of its steering angle; negative values steer to the right"""
+
+
 class Reshape(Timed):
     """Replace the points of a wall, for example to dig a crater into terrain or to raise it.
 
@@ -313,6 +330,7 @@ _AnyEvent: TypeAlias = (
     | SetParameter
     | Launch
     | Throttle
+    | Steer
     | Drive
     | Toggle
     | Reshape
