@@ -150,7 +150,7 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         "dragged": substeps * colliding * scene.world.has_drag,
         "attracted": substeps * bodies * len(scene.attractions),
         "attracted_rk4": substeps * bodies * len(scene.attractions) * (settings.integrator == "rk4"),
-        "driven": substeps * (len(scene.thrusts) + len(scene.drives)),
+        "driven": substeps * (len(scene.thrusts) + len(scene.tyres) + len(scene.drives)),
         "joined": substeps * len(setup.joints),
         "springs": substeps * len(setup.joints.of(JointKind.SPRING, JointKind.ROTARY_SPRING)),
         "on_floor": substeps * (scene.surface is not None),
