@@ -134,7 +134,7 @@ class ActionTarget(Protocol):
         """
 
     def steer(self, index: int, levels: tuple[float, float, float]) -> None:
-        """Set the levels of drive, brake and steering of a tyre, by its index in the scene.
+        """Set the throttle, brake and steering of a tyre, by its index in the scene.
 
         Raises:
             ActionError: the engine models no tyres.
@@ -345,7 +345,7 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
             target.throttle(index_of_name(thrusts, action.thrust, "thrust"), action.level)
         case Steer():
             tyres = [tyre.name or default_name("tyre", k) for k, tyre in enumerate(target.scene.tyres)]
-            target.steer(index_of_name(tyres, action.tyre, "tyre"), (action.drive, action.brake, action.steer))
+            target.steer(index_of_name(tyres, action.tyre, "tyre"), (action.throttle, action.brake, action.steer))
         case Reshape():
             reshape(action, target)
         case Drive():

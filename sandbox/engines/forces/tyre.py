@@ -84,7 +84,7 @@ def solve_tyres(
 
     Args:
         tyres: Y tyres of T bodies.
-        level: (Y, 3) of drive, brake and steering.
+        level: (Y, 3) of throttle, brake and steering.
         pose: (T, 3) m and rad.
         rate: (T, 3) m/s and rad/s at the end of the step without tyres; replaced by the rates with them.
         inverse: (T, 2) inverse mass and moment of inertia; tyres of a body with mass 0 do not act.
@@ -168,7 +168,7 @@ class Tyres:
         """Return the mean loads on T bodies in a step of h, s.
 
         Args:
-            level: (L, 3) of drive, brake and steering of all tyres of the scene.
+            level: (L, 3) of throttle, brake and steering of all tyres of the scene.
             pose: (T, 3) m and rad.
             rate: (T, 3) m/s and rad/s at the end of the step, without tyres.
             inverse: (T, 2) inverse mass, 1/kg, and inverse moment of inertia, 1/(kg·m²).

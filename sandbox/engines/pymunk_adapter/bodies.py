@@ -301,7 +301,7 @@ class PymunkBodies(BodyStore):
         self.space_bodies.thrusts.set_level(index, level)
 
     def steer(self, index: int, levels: tuple[float, float, float]) -> None:
-        """Set the levels of drive, brake and steering of a tyre, by its index in the scene."""
+        """Set the throttle, brake and steering of a tyre, by its index in the scene."""
         assert self.space_bodies.tyres is not None
         self.space_bodies.tyres.set_levels(index, levels)
 

@@ -382,7 +382,7 @@ class SpaceTyres:
         self._in_space.pop(index, None)
 
     def set_levels(self, index: int, levels: tuple[float, float, float]) -> None:
-        """Set the levels of drive, brake and steering of a tyre, by its index in the scene."""
+        """Set the throttle, brake and steering of a tyre, by its index in the scene."""
         self._levels[index] = levels
 
     def apply(self, space: pymunk.Space, resting: AbstractSet[int]) -> None:

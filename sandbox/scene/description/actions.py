@@ -33,7 +33,7 @@ Level = Annotated[float, Field(ge=0, le=1)]
 """Fraction of a thrust, or level of a drive."""
 
 SignedLevel = Annotated[float, Field(ge=-1, le=1)]
-"""Level of the engine or steering of a tyre."""
+"""Throttle or steering of a tyre."""
 
 Value = float | int | bool | str | None
 """Value of a setting."""
@@ -223,13 +223,13 @@ class Throttle(Timed):
 
 
 class Steer(Timed):
-    """Set the levels of the engine, brake and steering of a tyre of the scene. They act until the next such action."""
+    """Set the throttle, brake and steering of a tyre of the scene. They act until the next such action."""
 
     kind: Literal["steer"] = default_kind("steer")
     tyre: Name
     """name of the tyre"""
-    drive: SignedLevel = 0.0
-    """fraction of the force of its engine; negative values drive backwards"""
+    throttle: SignedLevel = 0.0
+    """fraction of the force that drives it; negative values drive backwards"""
     brake: Level = 0.0
     """fraction of the force of its brake"""
     steer: SignedLevel = 0.0

@@ -201,7 +201,7 @@ TYRE_KEYS = {
     "right": (0.0, 0.0, -1.0),
     "space": (0.0, 1.0, 0.0),
 }
-"""Keys of tyres: what each adds to the levels of drive, brake and steering while it is held"""
+"""Keys of tyres: what each adds to the throttle, brake and steering while it is held"""
 
 
 def tyre_keys(
@@ -221,9 +221,9 @@ def tyre_keys(
         if first is not None:
             first()
         (held.add if is_held else held.discard)(key)
-        drive, brake, steer = np.sum([(0.0, 0.0, 0.0), *(TYRE_KEYS[each] for each in held)], axis=0).tolist()
+        throttle, brake, steer = np.sum([(0.0, 0.0, 0.0), *(TYRE_KEYS[each] for each in held)], axis=0).tolist()
         for name in names:
-            live.apply(Steer(time=0.0, tyre=name, drive=drive, brake=brake, steer=steer))
+            live.apply(Steer(time=0.0, tyre=name, throttle=throttle, brake=brake, steer=steer))
 
     on_press = {KEYS[key]: partial(change, key, True, pressed.get(KEYS[key])) for key in TYRE_KEYS}
     on_release = {KEYS[key]: partial(change, key, False, released.get(KEYS[key])) for key in TYRE_KEYS}
