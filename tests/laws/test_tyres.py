@@ -195,6 +195,14 @@ def test_slow_car_turns_on_the_circle_of_the_bicycle_model(engine: str, dt: floa
 
 
 @every_engine
+def test_tyres_without_a_limit_hold_their_directions(engine: str) -> None:
+    scene = bicycle({"angle": DELTA, "grip": 1e30}, {"grip": 1e30}, velocity=[1.0, 0.0], duration=0.1)
+    result = run(scene, engine)
+    # rounding; reference and box2d turn by ω·h = 2e-4 rad after the step's velocity
+    assert forward(result)[-1] / result.angular_velocity[-1, 0] == pytest.approx(LENGTH / math.tan(DELTA), rel=2e-4)
+
+
+@every_engine
 def test_steering_is_left_and_keeps_its_circle(engine: str) -> None:
     scene = bicycle({"steer": 2.0 * DELTA, "grip": 1e3}, {"grip": 1e3}, velocity=[1.0, 0.0], duration=8.0)
     result = run(scene, engine, actions=(Steer(time=0.0, tyre="tyre 0", steer=0.5),))

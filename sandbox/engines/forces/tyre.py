@@ -33,7 +33,7 @@ MAX_ITERATIONS = 200
 """Iterations over the tyres in a step; a bicycle takes about 15, four tyres without slip about 50"""
 
 CONVERGED = 1e-13
-"""Change of a force in an iteration, as a fraction of the grip, below which it has converged: rounding"""
+"""Change of a force in an iteration, as a fraction of its size, below which it has converged: rounding"""
 
 
 class TyreColumns(NamedTuple):
@@ -95,7 +95,7 @@ def solve_tyres(
     """
     force[:] = 0.0
     for iteration in range(MAX_ITERATIONS):
-        largest = 0.0
+        is_solved = iteration > 0
         for k in range(len(tyres.row)):
             i = tyres.row[k]
             if inverse[i, 0] == 0.0 or not math.isfinite(pose[i, 2] + rate[i, 0] + rate[i, 1] + rate[i, 2]):
@@ -135,8 +135,9 @@ def solve_tyres(
             loads[i, 0] += fx
             loads[i, 1] += fy
             loads[i, 2] += torque
-            largest = 1.0 if iteration == 0 else max(largest, abs(change_x) / grip, abs(change_y) / grip)
-        if largest <= CONVERGED:
+            size = max(abs(force[k, 0]), abs(force[k, 1]))
+            is_solved = is_solved and max(abs(change_x), abs(change_y)) <= CONVERGED * size
+        if is_solved:
             return
 
 
