@@ -90,9 +90,24 @@ def test_car_that_slides_sideways_stops_after_v2_over_2_mu_g_and_stays(engine: s
 
 
 @every_engine
-def test_friction_never_reverses_the_sliding(engine: str) -> None:
-    result = run(car({}, velocity=[0.0, 4.0], duration=2.0, dt=0.03), engine)
+@pytest.mark.parametrize(
+    "air",
+    [{}, {"linear_drag": 0.5}, {"damping": 0.3}, {"quadratic_drag": 0.3}, {"quadratic_drag": 0.1, "wind": [0, 3]}],
+)
+def test_friction_never_reverses_the_sliding(engine: str, air: Document) -> None:
+    result = run(car({}, velocity=[0.0, 4.0], duration=2.0, dt=0.03, world=air), engine)
     assert result.velocity[:, 0, 1].min() > -1e-6  # 32-bit numbers of box2d
+    assert abs(result.velocity[-1, 0, 1]) < 1e-6  # likewise
+
+
+@every_engine
+def test_friction_does_not_reverse_a_body_with_damping_of_its_own(engine: str) -> None:
+    own = {"linear_damping": 0.7, "angular_damping": 0.4, "angular_velocity": 1.0}
+    tyres = [{"point": [x, 0.0], "rolling_drag": GRIP} for x in (-0.8, 0.8)]
+    result = run(car(*tyres, velocity=[0.0, 4.0], duration=2.0, dt=0.03, **own), engine)
+    lowest = min(result.velocity[:, 0, 1].min(), result.angular_velocity.min())
+    assert lowest > -1e-6  # 32-bit numbers of box2d
+    assert np.abs(result.velocity[-1]).max() + abs(result.angular_velocity[-1, 0]) < 1e-6  # likewise
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
