@@ -280,6 +280,41 @@ def test_friction_takes_the_kinetic_energy_of_a_car_that_stops(engine: str) -> N
     assert account[Cause.FRICTION] == pytest.approx(-0.5 * M * 25.0, rel=1e-12)  # rounding
 
 
+def _towing(**more: Any) -> Scene:
+    """Return a scene with a car that turns, and tows a trailer."""
+    half = 0.5 * LENGTH
+    trailer = {"name": "trailer", "position": [-2.5, 0.0], "size": [2.0, 1.0], "mass": M, "velocity": [2.0, 0.0]}
+    own = {"name": "car", "position": [0.0, 0.0], "size": [2.0, 1.0], "mass": M, "velocity": [2.0, 0.0]}
+    tyres = [("car", half, 0.2), ("car", -half, 0.0), ("trailer", -0.3, 0.0)]
+    return from_document(
+        {
+            "world": {"gravity": [0.0, 0.0], "duration": 6.0},
+            "solver": {"dt": 0.005},
+            "box": [{**each, "collides": "fixed"} for each in (own, trailer)],
+            "joint": [{"kind": "pivot", "between": ["car", "trailer"], "anchors": [[-1.2, 0.0], [1.3, 0.0]]}],
+            "tyre": [{"body": body, "point": [x, 0.0], "angle": angle, "grip": 100.0} for body, x, angle in tyres],
+            **more,
+        }
+    )
+
+
+@every_engine
+def test_trailer_follows_at_the_angle_of_its_circle(engine: str) -> None:
+    frame = run(_towing(), engine)
+    radius = LENGTH / math.tan(0.2)
+    # hitch 0.4 m behind the rear axle, axle of the trailer 1.6 m behind the hitch
+    angle = math.atan(0.4 / radius) + math.asin(1.6 / math.hypot(radius, 0.4))
+    assert frame.angle[-1, 0] - frame.angle[-1, 1] == pytest.approx(angle, rel=0.02)  # the pivot acts after tyres
+    assert frame.angular_velocity[-1, 1] == pytest.approx(frame.angular_velocity[-1, 0], rel=0.01)  # likewise
+
+
+@pytest.mark.parametrize("engine", [name for name in WITH_TYRES if ENGINES[name].knows_impulses])
+def test_account_closes_with_joints_and_contacts(engine: str) -> None:
+    wall = {"points": [[3.0, -9.0], [3.0, 9.0]], "restitution": 0.5, "friction": 0.3}
+    account = closed_account(_towing(wall=[wall]), 400, engine=engine, closes=1e-10)
+    assert account[Cause.FRICTION] < 0.0
+
+
 @every_engine
 def test_mirror_image_is_driven_as_the_mirror_image(engine: str) -> None:
     ways = []
