@@ -117,9 +117,9 @@ def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
 
 DIMENSIONLESS = {
     "axis", "ball_restitution", "bias", "bot", "bounce", "brake", "curl", "cushion_friction", "cushion_restitution",
-    "damping", "direction", "error", "facing", "friction", "gravity_scale", "height", "hold_ratio", "level", "lift", "normal",
-    "one_way", "ratio", "restitution", "return_ratio", "rolling_friction", "rolling_resistance", "roughness", "side",
-    "sliding_friction", "spinning_friction", "steer", "stretch", "throttle",
+    "damping", "direction", "error", "facing", "friction", "gravity_scale", "height", "hold_ratio", "level", "lift",
+    "normal", "one_way", "ratio", "restitution", "return_ratio", "rolling_friction", "rolling_resistance", "roughness",
+    "side", "sliding_friction", "spinning_friction", "steer", "stretch", "throttle",
 }  # fmt: skip
 """keys of the numbers without a unit, checked by eye; `brake` and `steer` are levels in events"""
 
