@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         Reshape as Reshape,
         SetParameter as SetParameter,
         Spawn as Spawn,
+        Steer as Steer,
         Strike as Strike,
         Switch as Switch,
         Throttle as Throttle,
@@ -283,6 +284,7 @@ if TYPE_CHECKING:
         StrokeDrive as StrokeDrive,
         Thrust as Thrust,
         TorqueDrive as TorqueDrive,
+        Tyre as Tyre,
     )
     from sandbox.scene.description.generators import (
         Cloth as Cloth,
@@ -359,7 +361,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "sandbox.action": (
         "ActionError Actuate Drive Explosion Force Impulse Join Launch Move Pull Remove Reshape SetParameter Spawn "
-        "Strike Switch Throttle Toggle Unjoin"
+        "Steer Strike Switch Throttle Toggle Unjoin"
     ),
     "sandbox.batch.query": "QuantityStatistics RunGroup StoredRuns open_store",
     "sandbox.batch.store": "Store",
@@ -421,7 +423,7 @@ _NAMES = {
     "sandbox.scene.description.bodies": "BallPart Box BoxPart Capsule CapsulePart Compound Polygon PolygonPart",
     "sandbox.scene.description.discs": "Ball Emitter Grid Scatter",
     "sandbox.scene.description.fixed": "Liquid Plane Post Sensor Wall Zone",
-    "sandbox.scene.description.forces": "Attraction PlungerDrive StrokeDrive Thrust TorqueDrive",
+    "sandbox.scene.description.forces": "Attraction PlungerDrive StrokeDrive Thrust TorqueDrive Tyre",
     "sandbox.scene.description.generators": "Cloth Ragdoll Rope RopeAttachment Stack",
     "sandbox.scene.description.joints": (
         "Gear Groove Motor Pivot Prismatic Pulley Ratchet Rod RotaryLimit RotarySpring Slide Spring Weld Wheel"

@@ -28,6 +28,7 @@ from sandbox.scene.description.actions import Remove as Remove
 from sandbox.scene.description.actions import Reshape as Reshape
 from sandbox.scene.description.actions import SetParameter as SetParameter
 from sandbox.scene.description.actions import Spawn as Spawn
+from sandbox.scene.description.actions import Steer as Steer
 from sandbox.scene.description.actions import Strike as Strike
 from sandbox.scene.description.actions import Switch as Switch
 from sandbox.scene.description.actions import Throttle as Throttle

@@ -1,4 +1,4 @@
-"""Sample scenes: twenty shipped scenes that together demand all that shipped scenes demand of an engine.
+"""Sample scenes: twenty-one shipped scenes that together demand all that shipped scenes demand of an engine.
 
 A law that holds for each shipped scene is tested with these on every change, and with all of them nightly.
 `tests/laws/test_samples.py` asserts what they cover.
@@ -21,6 +21,7 @@ SAMPLE_SCENES = (
     "games/harbour",
     "games/landing",
     "games/moving_platforms",
+    "games/racing_car",
     "games/rube_goldberg",
     "games/table_tennis",
     "joints/atwood",

@@ -28,7 +28,7 @@ STATE_KEYS = {"position": 2, "velocity": 2, "angle": 0, "angular_velocity": 0}
 MAX_ANGLE_AND_RATE = 1e12
 """rad and rad/s: larger ones are left to the validation of the scene"""
 UNSUPPORTED = (
-    "emitters", "ropes", "cloths", "ragdolls", "joints", "thrusts", "attractions", "drives", "zones", "shots",
+    "emitters", "ropes", "cloths", "ragdolls", "joints", "thrusts", "tyres", "attractions", "drives", "zones", "shots",
     "pockets", "sensors",
 )  # fmt: skip
 """Parts that refer to bodies, or that depend on start states or the seed in another way"""

@@ -22,7 +22,7 @@ class Cause(StrEnum):
     RESTITUTION = "restitution"
     """normal impulses of contacts, as far as they remove energy"""
     FRICTION = "friction"
-    """tangential impulses of contacts, as far as they remove energy"""
+    """tangential impulses of contacts, and friction of tyres, as far as they remove energy"""
     ROLLING = "rolling resistance"
     """torques that resist rolling"""
     DRAG = "drag"
@@ -36,7 +36,8 @@ class Cause(StrEnum):
     KICKS = "kicks"
     """kicks of walls and posts, as of bumpers and slingshots"""
     DRIVES = "drives"
-    """thrusts, drives, motors, moving surfaces; forces and pulls by actions; zones that hold a body or have gravity"""
+    """thrusts, engines of tyres, drives, motors, moving surfaces; forces and pulls by actions; zones that hold a body
+    or have gravity"""
     SPEED_LIMITS = "speed limits"
     """speeds and angular speeds reduced to their limits"""
     CORRECTION = "position correction"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Actuate, Force, Pull, Throttle
+from sandbox.action import Action, ActionError, Force, Pull, Steer, Throttle
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
@@ -37,6 +37,7 @@ class Checkpoint:
     forces: Mapping[str, Force]
     throttles: Mapping[str, Throttle]
     motor_levels: Mapping[str, float]
+    steering: Mapping[str, Steer]
     pulls: Mapping[str, Pull]
     setup: Setup
     """with all joints, numbered as `broken`"""
@@ -263,7 +264,7 @@ def start_segment(
         wanted: settings.
         bodies: all bodies, by session index.
         frame: the state.
-        persistent: actions that still act: constant forces, levels of thrusts and motors.
+        persistent: actions that still act: constant forces, levels of thrusts, tyres and motors.
         broken: indices of broken joints.
         plane_reach: of the simulation that is resumed; by default it follows from the positions of the bodies.
 
@@ -277,13 +278,12 @@ def start_segment(
             simulation.apply(action)
         except ActionError as error:
             simulation.close()
-            match action:
-                case Force():
-                    description = f"the constant force on {action.body!r}"
-                case Throttle():
-                    description = f"the thrust {action.thrust!r}"
-                case Actuate():
-                    description = f"the motors {', '.join(map(repr, action.levels))}"
+            description = {
+                "force": lambda each: f"the constant force on {each.body!r}",
+                "throttle": lambda each: f"the thrust {each.thrust!r}",
+                "steer": lambda each: f"the tyre {each.tyre!r}",
+                "actuate": lambda each: f"the motors {', '.join(map(repr, each.levels))}",
+            }[action.kind](action)
             raise ActionError(f"{engine} cannot continue with {description}: {error}") from None
     body_indices = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")

@@ -20,6 +20,7 @@ from sandbox.action import (
     Impulse,
     Join,
     Launch,
+    Steer,
     Throttle,
     Unjoin,
     check_speed,
@@ -40,21 +41,24 @@ from sandbox.trajectory import Frame
 
 
 class PersistentActions:
-    """Actions that keep acting: forces by the name of the body, throttles by that of the thrust; levels of motors."""
+    """Actions that keep acting: forces by the name of the body, levels by that of the thrust, tyre or motor."""
 
     def __init__(
         self,
         forces: Mapping[str, Force] | None = None,
         throttles: Mapping[str, Throttle] | None = None,
+        steering: Mapping[str, Steer] | None = None,
         motor_levels: Mapping[str, float] | None = None,
     ) -> None:
         self._forces, self._throttles = dict(forces or {}), dict(throttles or {})
-        self._motor_levels = dict(motor_levels or {})
+        self._steering, self._motor_levels = dict(steering or {}), dict(motor_levels or {})
 
     def record(self, action: Action) -> None:
         """Record an action that was applied."""
         if action.kind == "throttle":
             self._throttles[action.thrust] = action
+        elif action.kind == "steer":
+            self._steering[action.tyre] = action
         elif action.kind == "actuate":
             self._motor_levels |= action.levels
         elif action.kind == "force":
@@ -78,19 +82,24 @@ class PersistentActions:
         return dict(self._throttles)
 
     @property
+    def steering(self) -> dict[str, Steer]:
+        """Levels of each tyre."""
+        return dict(self._steering)
+
+    @property
     def motor_levels(self) -> dict[str, float]:
         """Level of each motor that was set, by the name of its joint."""
         return dict(self._motor_levels)
 
-    def actions(self, joints: JointArrays) -> list[Force | Throttle | Actuate]:
-        """Return the actions that reproduce forces, throttles and levels of motors in another simulation.
+    def actions(self, joints: JointArrays) -> list[Force | Throttle | Steer | Actuate]:
+        """Return the actions that reproduce the forces and levels in another simulation.
 
         Args:
             joints: those that are left; the other motors have broken or were removed.
         """
         levels = {name: level for name, level in self._motor_levels.items() if name in joints.motor_rows}
         motors = [Actuate(time=0.0, levels=levels)] if levels else []
-        return [*self._forces.values(), *self._throttles.values(), *motors]
+        return [*self._forces.values(), *self._throttles.values(), *self._steering.values(), *motors]
 
 
 def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> tuple[Frame, Bodies, BoolArray]:

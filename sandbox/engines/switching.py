@@ -22,6 +22,7 @@ from sandbox.action import (
     Pull,
     SetParameter,
     Spawn,
+    Steer,
     Switch,
     Throttle,
     Unjoin,
@@ -184,6 +185,7 @@ class SwitchableSimulation:
             forces=self._active_actions().forces,
             throttles=self._persistent.throttles,
             motor_levels=self._persistent.motor_levels,
+            steering=self._persistent.steering,
             pulls=self._pulls.pulls,
             setup=self.setup,
             plane_reach=self.plane_reach,
@@ -207,7 +209,7 @@ class SwitchableSimulation:
         """
         simulation = cls.__new__(cls)
         simulation.engine, simulation.wanted = point.engine, point.wanted
-        simulation._persistent = PersistentActions(point.forces, point.throttles, point.motor_levels)
+        simulation._persistent = PersistentActions(point.forces, point.throttles, point.steering, point.motor_levels)
         simulation._segment = start_segment(
             point.setup,
             point.engine,
@@ -294,6 +296,11 @@ class SwitchableSimulation:
     def throttles(self) -> Mapping[str, Throttle]:
         """Throttles that were set, by the name of the thrust."""
         return self._persistent.throttles
+
+    @property
+    def steering(self) -> Mapping[str, Steer]:
+        """Levels of tyres that were set, by the name of the tyre."""
+        return self._persistent.steering
 
     @property
     def work(self) -> Mapping[str, int]:

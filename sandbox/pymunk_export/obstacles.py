@@ -83,6 +83,8 @@ def _forces(setup: Setup) -> Iterator[Obstacle]:
         yield Obstacle("attraction", "attraction needs a velocity function of each body")
     if scene.drives:
         yield Obstacle("drive", f"flippers and plungers are not part of pymunk: {_names(scene.drives)}")
+    if scene.tyres:
+        yield Obstacle("tyre", f"pymunk has no friction with a rolling direction: {_names(scene.tyres)}")
     keyed = [each for each in scene.thrusts if each.key is not None]
     if keyed:
         yield Obstacle("thrust", f"a thrust that follows a key is an input of the game: {_names(keyed)}")

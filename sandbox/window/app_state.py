@@ -137,7 +137,8 @@ class Preferences:
             return speed
         if isinstance(view, RecordedView):
             return speed_for(view.end_time - view.start_time)
-        has_controls = file.play.game or file.play.arrows or file.play.relaunch or file.drives or file.thrusts
+        has_keys = file.drives or file.thrusts or any(tyre.keys for tyre in file.tyres)
+        has_controls = file.play.game or file.play.arrows or file.play.relaunch or has_keys
         return 1.0 if has_controls else speed_for(file.world.duration)
 
     def toggle_ghost(self, diagnostics: Diagnostics) -> None:

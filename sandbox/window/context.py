@@ -237,8 +237,9 @@ class WindowContext:
 
 
 def _thrust_body(scene: Scene) -> int | None:
-    """Return the index of the body moved by thrust keys; None without such a body or if the scene sets its view."""
+    """Return the body moved by keys of thrusts or tyres; None without such a body or if the scene sets its view."""
     names = [thrust.body for thrust in scene.thrusts if thrust.key is not None]
+    names += [tyre.body for tyre in scene.tyres if tyre.keys]
     return scene.bodies.names.index(names[0]) if names and scene.play.view is None else None
 
 

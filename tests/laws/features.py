@@ -72,6 +72,20 @@ FEATURES: dict[str, Document] = {
             {"name": "u", "body": "b", "force": [1.0, 0.0], "point": [0.1, 0.1]},
         ]
     },
+    "tyres": {
+        "tyre": [
+            {"name": "y", "body": "a", "grip": 3.0, "point": [0.2, 0.0], "drive": 2.0, "steer": 0.3},
+            {
+                "name": "z",
+                "body": "a",
+                "grip": 2.0,
+                "point": [-0.2, 0.1],
+                "slip": 0.1,
+                "rolling_drag": 0.5,
+                "brake": 2.0,
+            },
+        ]
+    },
     "plane": {"plane": [{"point": [0, 0], "normal": [0, 1]}]},
     "wall": {"wall": [{**_WALL, "points": [[-5, 1], [0, 0.5], [5, 1]], "restitution": 0.5}]},
     "kicking wall": {"wall": [{**_WALL, "kick": {"speed": 2.0}}]},

@@ -363,6 +363,10 @@ PROOFS: dict[Demand, Proof] = {
     Demand.THRUST: Proof(
         scene(ball=[ball(name="a")], thrust=[{"body": "a", "force": [4.0, -2.0]}]), position(2.0, -1.0)
     ),
+    # friction of 1 N across, none along
+    Demand.TYRES: Proof(
+        scene(ball=[ball(vx=2.0, vy=2.0, name="a")], tyre=[{"body": "a", "grip": 1.0}]), velocity(2.0, 1.0)
+    ),
     Demand.DRIVES: Proof(
         scene(
             box=[box()],

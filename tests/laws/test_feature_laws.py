@@ -22,6 +22,7 @@ from sandbox.action import (
     Reshape,
     SetParameter,
     Spawn,
+    Steer,
     Switch,
     Throttle,
     Toggle,
@@ -47,8 +48,8 @@ STEPS = 30
 """in each part of a run; two balls fall on a wall after about 14"""
 
 SAMPLE = (
-    "attractions", "thrusts", "wall", "kicking wall", "drifting wall", "one-way wall", "groups", "kinematic body",
-    "path", "one-way body", "liquid",
+    "attractions", "thrusts", "tyres", "wall", "kicking wall", "drifting wall", "one-way wall", "groups",
+    "kinematic body", "path", "one-way body", "liquid",
     "holding zone", "sensors", "layers", "bounds", "damping", "pockets", "pucks", "emitter", "rope", "torque drive",
     "plunger drive", "pivot between two", "pulley between two", "friction of the ground", "weak spring",
 )  # fmt: skip
@@ -58,6 +59,8 @@ ACTIONS: tuple[Action, ...] = (
     Impulse(time=0.0, body="a", impulse=(0.1, 0.2)),
     Force(time=0.0, body="a", force=(0.1, 0.0)),
     Throttle(time=0.0, thrust="t", level=0.5),
+    Steer(time=0.0, tyre="y", throttle=0.5, steer=-1.0),
+    Steer(time=0.0, tyre="z", brake=0.5),
     Drive(time=0.0, drive="d", level=0.5),
     Reshape(time=0.0, thing="w", points=((-5.0, 2.4), (0.0, 2.3), (5.0, 2.4))),
 )
@@ -65,6 +68,7 @@ LATER: tuple[Action, ...] = (
     Pull(time=0.0, body="b", target=(2.0, 3.5)),
     Launch(time=0.0, generator="g", seed=3),
     Throttle(time=0.0, thrust="t", level=1.0),
+    Steer(time=0.0, tyre="y", throttle=-1.0, steer=0.5),
     Drive(time=0.0, drive="d", level=1.0),
     SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]),
     Spawn(time=0.0, ball=Ball(name="new", position=(9.0, 3.0), radius=0.5)),
@@ -105,6 +109,7 @@ def kept(simulation: SwitchableSimulation) -> list[object]:
         dict(simulation.broken),
         dict(simulation.pulls),
         dict(simulation.throttles),
+        dict(simulation.steering),
         simulation.bodies.names,
         simulation.scene,
     ]

@@ -140,6 +140,9 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     # the largest torque of a motor belongs to motors
     (Demand.MAX_FORCE, False, {"ball": [NAMED], "joint": [{**MOTOR, "max_torque": 1}]}, "none"),
     (Demand.ATTRACTION, True, {"ball": [BALL], "attraction": [{"toward": [0, 0], "strength": 1}]}, "1"),
+    (Demand.TYRES, True, {"ball": [NAMED], "tyre": [{"body": "a", "grip": 1}]}, "1"),
+    (Demand.TYRES, False, {"ball": [NAMED]}, "none"),
+    (Demand.ROTATION, True, {"ball": [NAMED], "tyre": [{"body": "a", "grip": 1}]}, "1 body"),
     (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),
     (Demand.DRIVES, True, {"box": [NAMED_BOX], "drive": [PLUNGER]}, "1"),
     (Demand.ROTATION, False, {"box": [{**NAMED_BOX, "collides": "none"}], "drive": [PLUNGER]}, "no body can be turned"),

@@ -89,6 +89,7 @@ def test_misspelt_or_foreign_key_is_refused_with_a_suggestion(typo: str, key: st
     [
         (f"{BALL}bullet = true", "sandbox check"),
         (f"{BALL}buoyancy = 2.0", "`liquid`"),
+        (f"{BALL}lateral_friction = 2.0", "`grip`"),
         ("[[water]]\ndensity = 1000", "`liquid`"),
         (f"{BALL}isSensor = true", r"\[\[sensor\]\]"),
         (f"{BALL}gravityScale = 0.5", "did you mean 'gravity_scale'"),

@@ -96,6 +96,7 @@ MOMENTS = {
     "games/landing": Moment(4.8, trail=4.8),
     "games/lunar_lander": Moment(1.1, strobe=4),
     "games/moving_platforms": Moment(1.75, trail=1.7),
+    "games/racing_car": Moment(4.0, trail=2.5),
     "games/rube_goldberg": Moment(6.0),
     "games/table_tennis": Moment(0.72, trail=0.72, box=((-1.6, 0.1), (2.0, 1.7))),
     "joints/atwood": Moment(0.8, strobe=3),

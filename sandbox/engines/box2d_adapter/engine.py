@@ -67,6 +67,7 @@ OWN = frozenset(
         Demand.WHEELS,
         Demand.ATTRACTION,
         Demand.THRUST,
+        Demand.TYRES,
         Demand.BUOYANCY,
         Demand.LAYERS,
         Demand.CATEGORIES,
@@ -98,9 +99,9 @@ class Box2DEngine:
 
     A step finds contacts once, then advances by its substeps: velocities by gravity and forces, constraints with
     overlap correction, positions by the new velocities (semi-implicit Euler), constraints again without the
-    correction; restitution follows at the end. Springs, thrusts, attraction, quadratic drag, wind, liquids and the
-    gravity of zones are forces that are constant during a substep; with these, zones or drives, each substep is a step
-    of Box2D.
+    correction; restitution follows at the end. Springs, thrusts, attraction, quadratic drag, wind, liquids, tyres and
+    the gravity of zones are forces that are constant during a substep; with these, zones or drives, each substep is a
+    step of Box2D.
 
     Lengths are scaled so that Box2D's fixed slop, 0.005 of its units, is `slop`. `iterations` has no effect: Box2D
     solves its constraints once in each substep.

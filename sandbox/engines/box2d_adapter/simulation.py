@@ -99,7 +99,8 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         is_still = air.is_linear and not any(scene.world.wind)
         self._has_air_forces = air.flows and not is_still
         self._limits = SpeedLimits.of(self._store.bodies, self._store.present)
-        self._world.set_damping(air.linear_drag * is_still + air.damping_rate, air.damping_rate)
+        self._damping = air.linear_drag * is_still + air.damping_rate, air.damping_rate
+        self._world.set_damping(*self._damping)
 
     @property
     def _has_varying_forces(self) -> bool:
@@ -108,6 +109,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         Forces depend on the state, or there are drives, motors along an axis, paths, zones or limits of speeds.
         """
         forces = self._has_air_forces or self._joints.has_springs or not self._field.empty
+        forces = forces or self._field.tyres is not None
         moves = self._joints.has_linear_motors or self._drives is not None or self._paths is not None
         return forces or moves or self._zoned is not None or self._limits is not None
 
@@ -119,7 +121,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _apply_forces(self, time: float, length: float) -> None:
         """Apply the forces of a step of Box2D that starts at a time, s, and takes a length, s.
 
-        They are constant forces, attraction, thrusts, springs, liquids and the air.
+        They are constant forces, attraction, thrusts, springs, liquids, the air and tyres.
         """
         store, air = self._store, self._air
         force, torque = store.force.copy(), store.torque.copy()
@@ -144,6 +146,12 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             state = store.velocity, store.angular_velocity
             mean = mean_acceleration(air, ALL, world_gravity, *state, applied, length)
             force = np.where(moving[:, None], mass[:, None] * (mean - world_gravity), 0.0)
+        if self._field.tyres is not None:
+            pose, rates = np.column_stack((store.position, store.angle)), self._damped_rates(force, torque, length)
+            loads = self._field.tyre_loads(pose, rates, length)
+            total = loads.drive + loads.friction
+            force[self._field.tyres.bodies] += total[:, :2]
+            torque[self._field.tyres.bodies] += total[:, 2]
         if self._limits is not None:  # positions follow the velocities that these forces give
             own = store.world_gravity + force / mass[:, None], torque * store.inverse_moment
             rates = np.column_stack((store.velocity + length * own[0], store.angular_velocity + length * own[1]))
@@ -152,6 +160,14 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             torque -= store.bodies.moment * excess[:, 2] / length
         for index in np.flatnonzero((force.any(axis=1) | (torque != 0.0)) & moving).tolist():
             self._world.push(index, force[index], float(torque[index]))
+
+    def _damped_rates(self, force: FloatArray, torque: FloatArray, length: float) -> FloatArray:
+        """Return the rates (N, 3), m/s and rad/s, to which forces and torques lead in a step, after damping."""
+        store, (linear, angular) = self._store, self._damping
+        velocity = store.velocity / (1.0 + length * (linear + store.bodies.linear_damping))[:, None]
+        spin = store.angular_velocity / (1.0 + length * (angular + store.bodies.angular_damping))
+        velocity = velocity + length * (store.world_gravity + force / store.bodies.mass[:, None])
+        return np.column_stack((velocity, spin + length * torque * store.inverse_moment))
 
     def _make_step(self, part: float) -> None:
         """Advance by a fraction of dt: in one step of Box2D, or in one for each substep if forces vary."""

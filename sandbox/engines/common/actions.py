@@ -28,6 +28,7 @@ from sandbox.action import (
     Reshape,
     SetParameter,
     Spawn,
+    Steer,
     Strike,
     Switch,
     Throttle,
@@ -132,6 +133,13 @@ class ActionTarget(Protocol):
 
         Raises:
             ActionError: the engine models no thrust.
+        """
+
+    def steer(self, index: int, levels: tuple[float, float, float]) -> None:
+        """Set the throttle, brake and steering of a tyre, by its index in the scene.
+
+        Raises:
+            ActionError: the engine models no tyres.
         """
 
     def drive(self, index: int, level: float) -> None:
@@ -311,7 +319,7 @@ def reshape(action: Reshape, target: ActionTarget) -> None:
 
 def sets_level(action: Action) -> bool:
     """Return whether an action sets a level only: the state of the bodies, and what can touch, stay as they are."""
-    return type(action) in (Throttle, Drive, Actuate)
+    return type(action) in (Throttle, Steer, Drive, Actuate)
 
 
 ENVIRONMENT_FIELDS = {"world", "surface"}
@@ -418,6 +426,11 @@ def _throttle(action: Throttle, target: ActionTarget) -> None:
     thrusts = target.scene.thrusts
     names = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(thrusts)]
     target.throttle(index_of_name(names, action.thrust, "thrust"), action.level)
+
+
+def _steer(action: Steer, target: ActionTarget) -> None:
+    tyres = [tyre.name or default_name("tyre", k) for k, tyre in enumerate(target.scene.tyres)]
+    target.steer(index_of_name(tyres, action.tyre, "tyre"), (action.throttle, action.brake, action.steer))
 
 
 def _drive(action: Drive, target: ActionTarget) -> None:
@@ -527,6 +540,7 @@ _ENGINE_ACTIONS: Mapping[type, Callable[[Any, ActionTarget], None]] = {
     Spawn: _spawn,
     SetParameter: set_parameter,
     Throttle: _throttle,
+    Steer: _steer,
     Reshape: reshape,
     Drive: _drive,
     Actuate: _actuate,

@@ -47,6 +47,8 @@ class BodyStore:
         """(N,) N·m, constant torques by actions"""
         self.throttles: FloatArray = np.asarray([0.0 if t.key else 1.0 for t in scene.thrusts], dtype=np.float64)
         """level of each thrust of the scene, 0 to 1"""
+        self.tyre_levels: FloatArray = np.zeros((len(scene.tyres), 3))
+        """(L, 3) throttle, brake and steering of each tyre of the scene"""
         self.layer: IntArray = bodies.layer.copy()
         """(N,) collision layer of each body, by its index in the scene's `layers`"""
         self.visits: IntArray = bodies.visits.copy()
@@ -146,6 +148,10 @@ class BodyStore:
     def throttle(self, index: int, level: float) -> None:
         """Set the level of a thrust, by its index in the scene: the fraction of its force that acts."""
         self.throttles[index] = level
+
+    def steer(self, index: int, levels: tuple[float, float, float]) -> None:
+        """Set the throttle, brake and steering of a tyre, by its index in the scene."""
+        self.tyre_levels[index] = levels
 
     def drive(self, index: int, level: float) -> None:
         """Set the level of a drive, by its index in the scene."""

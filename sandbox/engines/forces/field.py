@@ -1,4 +1,4 @@
-"""The field of a running scene: attractions, thrusts and liquids, for engines that evaluate forces."""
+"""The field of a running scene: attractions, thrusts, liquids and tyres, for engines that evaluate forces."""
 
 import math
 
@@ -11,6 +11,7 @@ from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.forces.attraction import pull
 from sandbox.engines.forces.liquid import Liquids, Loads
 from sandbox.engines.forces.thrust import ThrustColumns, load
+from sandbox.engines.forces.tyre import TyreLoads, Tyres
 from sandbox.scene.compile.joint_arrays import WORLD
 from sandbox.scene.geometry.shapes import geometry_of
 
@@ -108,7 +109,7 @@ def add_thrusts(
 
 
 class ForceField:
-    """Attractions, thrusts and liquids of a running scene. A call evaluates the attractions and thrusts."""
+    """Attractions, thrusts, liquids and tyres of a running scene. A call evaluates the attractions and thrusts."""
 
     def __init__(self, store: BodyStore) -> None:
         self._store, self._began = store, store.setup.time
@@ -139,6 +140,8 @@ class ForceField:
 
         self.liquids = Liquids(scene) if scene.liquids else None
         """liquids of zones; None without any"""
+        self.tyres = Tyres(scene, bodies) if scene.tyres else None
+        """tyres; None without any"""
 
     @property
     def empty(self) -> bool:
@@ -199,6 +202,19 @@ class ForceField:
         submerged = self._submerged(np.column_stack((store.position, store.angle)))
         rates, inertia = (store.velocity, store.angular_velocity), (store.inverse_mass[:, None], store.inverse_moment)
         return liquids.step_loads(submerged, rates, applied, inertia, store.scene.world.gravity, h)
+
+    def tyre_loads(self, pose: FloatArray, rate: FloatArray, h: float) -> TyreLoads:
+        """Return the mean loads of the tyres in a step of h, s, on their bodies.
+
+        Args:
+            pose: (N, 3) m and rad, of all bodies.
+            rate: (N, 3) m/s and rad/s at the end of the step, without tyres.
+            h: s.
+        """
+        store, tyres = self._store, self.tyres
+        assert tyres is not None
+        inverse = np.column_stack((store.inverse_mass, store.inverse_moment))[tyres.bodies]
+        return tyres.loads(store.tyre_levels, pose[tyres.bodies], rate[tyres.bodies], inverse, h)
 
     def _submerged(self, pose: FloatArray) -> FloatArray:
         """Return the submerged moments (N, L, 4) of bodies at poses (N, 3); liquids act on those that forces move."""

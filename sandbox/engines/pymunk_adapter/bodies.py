@@ -156,18 +156,20 @@ class PymunkBodies(BodyStore):
 
     @property
     def _needs_space(self) -> BoolArray:
-        """(N,) bodies that only the space can move: kinematic ones, those with thrusts, drives or speed limits.
+        """(N,) bodies that only the space can move: kinematic ones, those with thrusts, tyres, drives or speed limits.
 
         All bodies if they attract each other, can fall asleep or there is a liquid.
         """
         space_bodies, scene = self.space_bodies, self.scene
         if space_bodies.field.between_bodies or self._settings.sleeping or scene.liquids:
             return np.ones(len(self.bodies), dtype=np.bool_)
-        if not (scene.thrusts or scene.drives):
+        if not (scene.thrusts or scene.drives or space_bodies.tyres is not None):
             return self.bodies.kinematic | self.bodies.limited
         has_thrust, is_driven = space_bodies.thrusts.acts_on, space_bodies.drives.holds
-        driven = [has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)]
-        return self.bodies.kinematic | self.bodies.limited | np.asarray(driven, np.bool_)
+        acts = np.asarray([has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)], np.bool_)
+        if space_bodies.tyres is not None:
+            acts[space_bodies.tyres.indices] = True
+        return self.bodies.kinematic | self.bodies.limited | acts
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
         """Continue with a changed scene, as `BodyStore.change`.
@@ -305,6 +307,11 @@ class PymunkBodies(BodyStore):
     def throttle(self, index: int, level: float) -> None:
         """Set the level of a thrust, by its index in the scene: the fraction of its force that acts."""
         self.space_bodies.thrusts.set_level(index, level)
+
+    def steer(self, index: int, levels: tuple[float, float, float]) -> None:
+        """Set the throttle, brake and steering of a tyre, by its index in the scene."""
+        assert self.space_bodies.tyres is not None
+        self.space_bodies.tyres.set_levels(index, levels)
 
     def drive(self, index: int, level: float) -> None:
         """Set the level of a drive, by its index in the scene."""

@@ -44,9 +44,9 @@ class AppliedImpulses(NamedTuple):
     weight: FloatArray
     """(N, 2) by gravity and attraction"""
     driven: FloatArray
-    """(N, 2) by constant forces and thrusts"""
+    """(N, 2) by constant forces, thrusts and engines of tyres"""
     angular: FloatArray
-    """(N,) by constant torques and thrusts, N·m·s"""
+    """(N,) by constant torques, thrusts and engines of tyres, N·m·s"""
     drag: FloatArray
     """(N, 2) by air, including its change of other forces, and by damping"""
     angular_drag: FloatArray
@@ -55,6 +55,10 @@ class AppliedImpulses(NamedTuple):
     """(N, 2) by liquids"""
     angular_liquid: FloatArray
     """(N,) by liquids, N·m·s"""
+    tyre: FloatArray
+    """(N, 2) by friction of tyres"""
+    angular_tyre: FloatArray
+    """(N,) by friction of tyres, N·m·s"""
 
 
 def applied_impulses(
@@ -80,6 +84,7 @@ def applied_impulses(
     attraction, (thrust, thrust_torque) = _attraction(store), _loads(store, store.space_bodies.thrusts.loads)
     liquids = store.space_bodies.liquids
     liquid, liquid_torque = _loads(store, {} if liquids is None else liquids.loads)
+    drive, friction = _tyres(store)
     drag, angular_drag = np.zeros_like(before.velocity), np.zeros_like(before.spin)
     air = store.space_bodies.air
     if air.acts_by_force:
@@ -96,11 +101,24 @@ def applied_impulses(
         lost = (damping_factor(world.damping, store.h) - 1.0) * (h / store.h)
         drag = lost * mass * before.velocity
         angular_drag = lost * np.where(included, bodies.moment, 0.0) * before.spin
-    driven = np.where(included[:, None], constant + thrust, 0.0)
-    angular = np.where(included, torque + thrust_torque, 0.0)
+    driven = np.where(included[:, None], constant + thrust + drive[:, :2], 0.0)
+    angular = np.where(included, torque + thrust_torque + drive[:, 2], 0.0)
     weight = mass * (gravity + attraction) * h
     by_liquid = np.where(included[:, None], liquid, 0.0) * h, np.where(included, liquid_torque, 0.0) * h
-    return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag, *by_liquid)
+    by_tyre = np.where(included[:, None], friction[:, :2], 0.0) * h, np.where(included, friction[:, 2], 0.0) * h
+    return AppliedImpulses(weight, driven * h, angular * h, drag, angular_drag, *by_liquid, *by_tyre)
+
+
+def _tyres(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
+    """Return the loads (N, 3) by engines and by friction of tyres on all bodies, N and N·m."""
+    drive, friction, tyres = (
+        np.zeros((len(store.bodies), 3)),
+        np.zeros((len(store.bodies), 3)),
+        store.space_bodies.tyres,
+    )
+    if tyres is not None and tyres.loads is not None:
+        drive[tyres.indices], friction[tyres.indices] = tyres.loads
+    return drive, friction
 
 
 def _constant_forces(store: PymunkBodies) -> tuple[FloatArray, FloatArray]:
@@ -333,6 +351,7 @@ class PymunkEnergyLedger:
         account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
         by_liquids = np.sum(applied.liquid * velocity[:-1]) + applied.angular_liquid @ spin[:-1]
         account.add(Cause.LIQUID, float(by_liquids))
+        account.add(Cause.FRICTION, float(np.sum(applied.tyre * velocity[:-1]) + applied.angular_tyre @ spin[:-1]))
         account.add(Cause.SPEED_LIMITS, by_limits.work(velocity, spin))
         account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
         normal_work, tangential_work, kick_work, surface_work = points.work(velocity, spin)
@@ -452,9 +471,9 @@ class PymunkEnergyLedger:
         p = self._store
         mass, moment = np.where(included, p.bodies.mass, 0.0), np.where(included, p.bodies.moment, 0.0)
         linear = mass[:, None] * (now.velocity - before.velocity) - applied.weight - applied.driven - applied.drag
-        linear -= applied.liquid
+        linear -= applied.liquid + applied.tyre
         angular = moment * (now.spin - before.spin) - applied.angular - applied.angular_drag
-        angular -= applied.angular_liquid
+        angular -= applied.angular_liquid + applied.angular_tyre
         rigid = p.space_bodies.joints.by_kind.rigid
         return ImpulseSums(np.vstack((linear, np.zeros((1, 2)))), np.append(angular, 0.0), np.union1d(rigid.a, rigid.b))
 

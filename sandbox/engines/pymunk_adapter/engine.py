@@ -43,6 +43,7 @@ OWN = frozenset(
         Demand.POLYGONS,
         Demand.ATTRACTION,
         Demand.THRUST,
+        Demand.TYRES,
         Demand.BUOYANCY,
         Demand.LAYERS,
         Demand.CATEGORIES,

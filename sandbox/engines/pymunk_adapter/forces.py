@@ -1,4 +1,4 @@
-"""Air, damping, attraction, thrust, liquids and constant forces on bodies.
+"""Air, damping, attraction, thrust, liquids, tyres and constant forces on bodies.
 
 `AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
 position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
@@ -42,6 +42,7 @@ from sandbox.scene.geometry.shapes import geometry_of
 
 if TYPE_CHECKING:
     from sandbox.engines.forces.liquid import Liquids
+    from sandbox.engines.forces.tyre import TyreLoads, Tyres
 
 
 BodyLoad: TypeAlias = tuple[float, float, float]
@@ -356,6 +357,78 @@ class SpaceLiquids:
         inertia, rates = (1.0 / bodies.mass[:, None], 1.0 / bodies.moment), (states[:, 3:5], states[:, 5])
         loads = np.column_stack(self._liquids.step_loads(submerged, rates, (force, torque), inertia, gravity, h))
         self.loads = {n: (x, y, turn) for n, (x, y, turn) in zip(floating, loads[floating].tolist(), strict=True)}
+
+
+class SpaceTyres:
+    """Friction of the tyres of bodies in the space.
+
+    It is added before a step, when all other forces on the bodies are set, at the poses to which the step moves them.
+    Joints, springs and contacts of the step act after it.
+    """
+
+    def __init__(self, tyres: "Tyres", levels: int, h: float) -> None:
+        self._tyres, self._h = tyres, h
+        self._levels: FloatArray = np.zeros((levels, 3))
+        self._rows = {index: row for row, index in enumerate(tyres.bodies.tolist())}
+        self._in_space: dict[int, pymunk.Body] = {}
+        self.loads: TyreLoads | None = None
+        """loads in the last substep, on `indices`"""
+
+    @classmethod
+    def of(cls, setup: Setup, h: float) -> Self | None:
+        """Return the tyres of a scene, with substeps of h, s; None without any."""
+        if not setup.scene.tyres:
+            return None
+        from sandbox.engines.forces.tyre import Tyres  # compiled: only where it is needed
+
+        return cls(Tyres(setup.scene, setup.bodies), len(setup.scene.tyres), h)
+
+    @property
+    def indices(self) -> IntArray:
+        """(T,) indices of the bodies that have tyres."""
+        return self._tyres.bodies
+
+    def join(self, index: int, body: pymunk.Body) -> None:
+        """Include a body in the space, if it has tyres."""
+        if index in self._rows:
+            self._in_space[index] = body
+
+    def leave(self, index: int) -> None:
+        """Forget a body that leaves the space."""
+        self._in_space.pop(index, None)
+
+    def set_levels(self, index: int, levels: tuple[float, float, float]) -> None:
+        """Set the throttle, brake and steering of a tyre, by its index in the scene."""
+        self._levels[index] = levels
+
+    def apply(self, space: pymunk.Space, resting: AbstractSet[int]) -> None:
+        """Add the forces of the next substep; bodies that zones hold rest."""
+        count, h, kept = len(self._rows), self._h, damping_factor(space.damping, self._h)
+        pose, rate, inverse = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((count, 2))
+        gravity = space.gravity
+        acting = [(self._rows[n], body) for n, body in self._in_space.items() if n not in resting]
+        for row, body in acting:
+            record = body._body
+            position, angle = lib.cpBodyGetPosition(record), lib.cpBodyGetAngle(record)
+            velocity, spin = lib.cpBodyGetVelocity(record), lib.cpBodyGetAngularVelocity(record)
+            force, torque = lib.cpBodyGetForce(record), lib.cpBodyGetTorque(record)
+            by_mass, by_moment = 1.0 / body.mass, 1.0 / body.moment
+            pose[row] = position.x + h * velocity.x, position.y + h * velocity.y, angle + h * spin
+            rate[row] = (
+                kept * velocity.x + h * (gravity.x + by_mass * force.x),
+                kept * velocity.y + h * (gravity.y + by_mass * force.y),
+                kept * spin + h * by_moment * torque,
+            )
+            inverse[row] = by_mass, by_moment
+        self.loads = self._tyres.loads(self._levels, pose, rate, inverse, h)
+        total = self.loads.drive + self.loads.friction
+        for row, body in acting:
+            x, y, turn = total[row].tolist()
+            if x or y or turn:
+                record = body._body
+                force, torque = lib.cpBodyGetForce(record), lib.cpBodyGetTorque(record)
+                lib.cpBodySetForce(record, (force.x + x, force.y + y))
+                lib.cpBodySetTorque(record, torque + turn)
 
 
 class ConstantForces:

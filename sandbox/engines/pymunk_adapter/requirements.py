@@ -25,7 +25,7 @@ def combination_faults(scene: Scene, settings: Settings, wanted: frozenset[Deman
     has_damping, has_kinematic = Demand.DAMPING in wanted, Demand.KINEMATIC in wanted
     if half_kick:
         found += [f"half_kick does not support {demand}" for demand in air]
-    if half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
+    if half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.tyres or scene.drives):
         found.append("half_kick supports gravity only, and the scene has other forces")
     if half_kick and any(zone.moves_bodies for zone in scene.zones):
         found.append("half_kick does not support zones with gravity or a liquid of their own")
@@ -38,6 +38,7 @@ def combination_faults(scene: Scene, settings: Settings, wanted: frozenset[Deman
         *((str(demand), "damping", has_damping) for demand in air if demand is not Demand.DAMPING),
         ("drives", "damping", scene.drives and has_damping),
         ("attraction", "drives", scene.attractions and scene.drives),
+        ("attraction", "tyres", scene.attractions and scene.tyres),
         ("attraction", "kinematic bodies", scene.attractions and has_kinematic),
     ):
         if together:
@@ -54,6 +55,7 @@ def _unsupported_by_sleep(scene: Scene, settings: Settings, wanted: frozenset[De
         *((str(demand), True) for demand in sorted(wanted & AIR - {Demand.DAMPING})),
         ("attraction", scene.attractions),
         ("thrusts", scene.thrusts),
+        ("tyres", scene.tyres),
         ("drives", scene.drives),
         ("zones", scene.zones),
         (str(Demand.ROLLING), Demand.ROLLING in wanted),

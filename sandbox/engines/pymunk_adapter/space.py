@@ -33,6 +33,7 @@ from sandbox.engines.pymunk_adapter.forces import (
     BodyLoads,
     ConstantForces,
     SpaceLiquids,
+    SpaceTyres,
     Thrusts,
     scale_gravity,
     sum_of_loads,
@@ -95,6 +96,8 @@ class SpaceBodies:
         self.field, self.thrusts = AttractionField(setup), Thrusts(setup, settings.h)
         self.liquids = SpaceLiquids.of(scene, settings.h)
         """liquids of zones; None without any"""
+        self.tyres = SpaceTyres.of(setup, settings.h)
+        """tyres of bodies; None without any"""
         self._bodies = setup.bodies
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene.world, self.air))
@@ -285,6 +288,8 @@ class SpaceBodies:
                 self.field.apply_to(name, body, self._by_name)
             if self.thrusts.acts_on(index):
                 self.thrusts.join(index, body)
+            if self.tyres is not None:
+                self.tyres.join(index, body)
             if self._settings.sleeping and bodies.gravity_scale[index] != 1.0:
                 scale_gravity(body, float(bodies.gravity_scale[index]))
             if bodies.limited[index]:
@@ -349,6 +354,8 @@ class SpaceBodies:
             self.thrusts.leave(index)
             if self.liquids is not None:
                 self.liquids.leave(index)
+            if self.tyres is not None:
+                self.tyres.leave(index)
             self.limits.pop(index, None)
         self._reader.invalidate_order()
         self._state = self._needs_check = None
@@ -453,7 +460,7 @@ class SpaceBodies:
                 self.limit_changes.append((index, change * x, change * y, turned - turning))
 
     def _set_forces(self, time: float) -> None:
-        """Set what acts in a substep that starts at a time, s: paths, constant forces, thrusts, liquids and the air."""
+        """Set what acts in a substep that starts at a time, s: paths, forces, thrusts, liquids, the air, and tyres."""
         if self.liquids is None and not self._air_acts:
             for set_forces in self._forces():
                 set_forces(time)
@@ -465,6 +472,12 @@ class SpaceBodies:
             self._apply_liquids(self.liquids, thrusts)
         else:
             self._apply_air(*self._read(), thrusts)
+        if self.tyres is not None:
+            self._apply_tyres(self.tyres)
+
+    def _apply_tyres(self, tyres: SpaceTyres) -> None:
+        """Set the forces of tyres, after all others: they oppose the motion to which these lead."""
+        tyres.apply(self._space, self._resting.keys())
 
     def _forces(self) -> list[Callable[[float], None]]:
         """Return the functions that set forces before a substep, given its start, s; without air and liquids."""
@@ -474,6 +487,9 @@ class SpaceBodies:
         if self.constant_forces:
             forces.append(lambda _: self.constant_forces.apply(self._body))
         forces += self.thrusts.forces(self.constant_forces.total)
+        tyres = self.tyres
+        if tyres is not None:
+            forces.append(lambda _: self._apply_tyres(tyres))
         return forces
 
     def _apply_liquids(self, liquids: SpaceLiquids, thrusts: BodyLoads) -> None:

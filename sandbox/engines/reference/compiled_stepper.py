@@ -141,6 +141,7 @@ class CompiledStepper:
             and world.pipeline.filter is None
             and (world.joints is None or not world.joints.has_forces)
             and not world.field.attracting
+            and world.field.tyres is None
             and world.limits is None
             and settings.broad_phase in BROAD_PHASE_CODES
             and settings.integrator in INTEGRATOR_CODES

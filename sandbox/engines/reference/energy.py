@@ -27,6 +27,7 @@ from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import contact_work
 from sandbox.engines.reference.step import StepRecord, WorldState
+from sandbox.engines.reference.velocity_solver import Motion
 from sandbox.scene.compile.potential import Potential
 
 GAUSS_NODES = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weight in ((-1, 5), (0, 8), (1, 5)))
@@ -160,7 +161,8 @@ class StepEnergyLedger:
         work = self._work(record.time, start, np.stack((after[0] - shift, end)), h)
         for cause in (Cause.DRAG, Cause.LIQUID, Cause.DAMPING, Cause.DRIVES):
             self.account.add(cause, work[cause])
-        forces = (
+        tyres = self._enter_tyres(motion, 0.5 * h * (start[1] + end))
+        forces = tyres + (
             work[Cause.DRAG] + work[Cause.LIQUID] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
         )
 
@@ -195,6 +197,16 @@ class StepEnergyLedger:
         self.account.add(Cause.JOINTS, joints)
         self.account.add(Cause.CORRECTION, correction)
         self.account.add(Cause.INTEGRATOR, drift - forces)
+
+    def _enter_tyres(self, motion: Motion, path: FloatArray) -> float:
+        """Enter the work of tyres along a path (N, 3), m and rad; return the sum, J."""
+        if motion.tyres is None or self._field.tyres is None:
+            return 0.0
+        moved = path[self._field.tyres.bodies]
+        drive, friction = float((motion.tyres.drive * moved).sum()), float((motion.tyres.friction * moved).sum())
+        self.account.add(Cause.DRIVES, drive)
+        self.account.add(Cause.FRICTION, friction)
+        return drive + friction
 
     def _spring_contacts(self, work: dict[Cause, float], start: FloatArray, end: FloatArray) -> float:
         """Enter penalty contacts; return their work, J. Stored energy counts as restitution until it is released."""

@@ -123,6 +123,7 @@ class ReferenceEngine:
         Demand.ROLLING,
         Demand.ATTRACTION,
         Demand.THRUST,
+        Demand.TYRES,
         Demand.BUOYANCY,
         Demand.LAYERS,
         Demand.CATEGORIES,

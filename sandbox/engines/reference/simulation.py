@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Impulse, Spawn, Throttle
+from sandbox.action import Action, ActionError, Impulse, Spawn, Steer, Throttle
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
@@ -308,7 +308,7 @@ class ReferenceSimulation(HasBodyStore, SteppedSimulation):
         """
         with self._lock:
             self._check_running()
-            if isinstance(action, Throttle):  # nothing is derived from the level of a thrust
+            if isinstance(action, (Throttle, Steer)):  # nothing is derived from the levels of thrusts and tyres
                 apply_action(action, self._store)
                 return
             if isinstance(action, Spawn):

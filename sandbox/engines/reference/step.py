@@ -24,7 +24,7 @@ from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suit
 from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
 from sandbox.engines.reference.filtering import CollisionFilter, OneWayColliders
 from sandbox.engines.reference.forces import forces_on
-from sandbox.engines.reference.integrators import INTEGRATORS, State
+from sandbox.engines.reference.integrators import INTEGRATORS, State, transition
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.penalty import DrivenPenaltySolver, PenaltyContacts, PenaltySolver
@@ -135,7 +135,7 @@ class WorldState:
         self.memory = ContactMemory(settings.h)
         self.field = ForceField(store)
         self.joints = self._new_joints()
-        self._posed = self.joints is not None or not self.field.empty
+        self._posed = self.joints is not None or not self.field.empty or self.field.tyres is not None
         self.filter = CollisionFilter(store, settings.slop) if CollisionFilter.is_needed(store) else None
         self.one_way: OneWayColliders | None = None if self.filter is None else self.filter.one_way
         self.pipeline = self._new_pipeline(self.work)
@@ -219,7 +219,7 @@ class WorldState:
         return np.stack((poses, np.column_stack((store.velocity, store.angular_velocity))))
 
     def _turns(self) -> bool:
-        """Return whether states need angles: a body turns, or a joint, drive, attraction or thrust may turn it."""
+        """Return whether states need angles: a body turns, or a joint, drive, attraction, thrust or tyre may."""
         store = self._store
         return bool(self._posed or store.has_driven or store.inverse_moment.any() or store.angular_velocity.any())
 
@@ -288,8 +288,19 @@ class WorldState:
         return INTEGRATORS[self._settings.integrator].fraction
 
     def integrate(self, h: float) -> Motion:
-        """Return the motion of all bodies over h, s, without contact impulses. The present state is not changed."""
-        return self.solver.integrate(self.x, self.forces, self.time, h)
+        """Return the motion of all bodies over h, s, without contact impulses. The present state is not changed.
+
+        Tyres act by their mean loads in the step, which every integrator takes as constant forces.
+        """
+        if self.field.tyres is None:
+            return self.solver.integrate(self.x, self.forces, self.time, h)
+        rate = self.x[1] + h * transition(self.time, self.x, self.forces)[1]
+        loads = self.field.tyre_loads(self.x[0], rate, h)
+        constant, which = self.forces.constant.copy(), self.field.tyres.bodies
+        inverse = np.column_stack((self._store.inverse_mass, self._store.inverse_mass, self._store.inverse_moment))
+        constant[which] += inverse[which] * (loads.drive + loads.friction)
+        motion = self.solver.integrate(self.x, self.forces._replace(constant=constant), self.time, h)
+        return motion._replace(tyres=loads)
 
     def commit(self, motion: Motion, solution: ImpulseSolution, h: float) -> StepRecord:
         """Take a solution at the end of h, s, as the present state."""

@@ -17,6 +17,7 @@ from sandbox.engines.common.kernel import kernel
 from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, segment_fractions
 from sandbox.engines.common.restitution_kernels import compiled_rebound
 from sandbox.engines.contract import Exhaustion
+from sandbox.engines.forces.tyre import TyreLoads
 from sandbox.engines.reference.collision import CollisionPipeline
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, State, Step, transition
 from sandbox.engines.reference.joint_data import select_joints
@@ -177,6 +178,8 @@ class Motion(NamedTuple):
     """(2, N, D) at the end: `free`, shifted, and corrected by joints that are solved by positions"""
     springs: SpringContacts | None = None
     """penalty contacts that acted in the motion; None if contacts are solved by impulses"""
+    tyres: TyreLoads | None = None
+    """mean loads of tyres; None without any"""
 
 
 class Impact(NamedTuple):

@@ -52,8 +52,8 @@ def unsupported_by_steppers(setup: Setup, bodies: Bodies | None = None) -> Itera
     of_bodies = (Demand.GRAVITY_SCALE, bodies.scales_gravity), (Demand.SPEED_LIMITS, bool(bodies.limited.any()))
     for demand in sorted({*air_demands(scene.world, bodies), *(demand for demand, on in of_bodies if on)}):
         yield f"it does not model {demand} on a floor"
-    if len(setup.joints) or scene.attractions or scene.thrusts or scene.drives:
-        yield "it does not model joints, attraction, thrusts or drives on a floor"
+    if len(setup.joints) or scene.attractions or scene.thrusts or scene.tyres or scene.drives:
+        yield "it does not model joints, attraction, thrusts, tyres or drives on a floor"
     if not bodies.round.all():
         yield "it does not model bodies other than balls on a floor"
     if bodies.kinematic.any():

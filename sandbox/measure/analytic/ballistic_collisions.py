@@ -93,14 +93,15 @@ class BallisticCollisions:
 def ballistic_collisions(facts: SceneFacts) -> BallisticCollisions | None:
     """Return the motion of balls that collide only with each other: two balls, or a few that move in one line.
 
-    There are no drag, static objects, joints, attraction, thrusts or drives. Contacts are without friction: its
+    There are no drag, static objects, joints, attraction, thrusts, tyres or drives. Contacts are without friction: its
     coefficient is 0, or the balls collide head on without spin. Three balls do not collide at once, except for equal
     elastic ones in line.
     """
     scene, bodies = facts.scene, facts.bodies
     if not 2 <= len(bodies) <= MAX_BALLS or not bodies.round.all() or bodies.fixed.any() or scene.fixed:
         return None
-    if len(facts.joints) or scene.attractions or scene.thrusts or scene.drives or facts.matrix.moving_surfaces:
+    has_forces = scene.attractions or scene.thrusts or scene.tyres or scene.drives
+    if len(facts.joints) or has_forces or facts.matrix.moving_surfaces:
         return None
     if not facts.has_no_air or scene.world.bounds is not None:
         return None

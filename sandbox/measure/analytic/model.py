@@ -50,7 +50,7 @@ class SceneFacts:
     matrix: ContactMatrix
     joints: JointArrays
     thrust: BoolArray
-    """(N,) whether a thrust or a drive acts on the body, or it is kinematic"""
+    """(N,) whether a thrust, a tyre or a drive acts on the body, or it is kinematic"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
@@ -106,8 +106,8 @@ class SceneFacts:
 
 
 def thrust_on(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return on which bodies a thrust or a drive acts, or which are kinematic, (N,)."""
-    movers = [each.body for each in (*scene.thrusts, *scene.drives)]
+    """Return on which bodies a thrust, a tyre or a drive acts, or which are kinematic, (N,)."""
+    movers = [each.body for each in (*scene.thrusts, *scene.tyres, *scene.drives)]
     return bodies.kinematic | np.isin(bodies.names, movers) if movers else bodies.kinematic
 
 

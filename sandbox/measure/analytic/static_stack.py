@@ -82,7 +82,7 @@ def static_stack(facts: SceneFacts) -> StaticStack | None:
     """Return the rest of upright boxes whose centres each lie well inside their supports; None if it does not apply.
 
     The only static object is a plane perpendicular to gravity. There are no drag, static bodies, joints, attraction,
-    thrusts or drives, and no two boxes overlap.
+    thrusts, tyres or drives, and no two boxes overlap.
     """
     scene, bodies, plane = facts.scene, facts.bodies, facts.only_plane()
     if plane is None or bodies.velocity.any() or bodies.angular_velocity.any() or len(bodies) > MAX_BOXES:
@@ -93,7 +93,7 @@ def static_stack(facts: SceneFacts) -> StaticStack | None:
         return None
     if facts.matrix.moving_surfaces:
         return None
-    if len(facts.joints) or scene.attractions or scene.thrusts or scene.drives or not facts.has_no_air:
+    if len(facts.joints) or scene.attractions or scene.thrusts or scene.tyres or scene.drives or not facts.has_no_air:
         return None
     normal = normal_of(plane)
     if not parallel(facts.gravity, normal) or float(facts.gravity @ normal) >= 0.0:

@@ -75,7 +75,16 @@ METHODS: tuple[dict[str, object], ...] = (
 CHOICES = ("integrator", "detection", "joints", "half_kick")
 """Settings by which two methods of one engine differ."""
 SOURCES = frozenset(
-    {Demand.THRUST, Demand.MOTORS, Demand.DRIVES, Demand.KINEMATIC, Demand.KICKS, Demand.ZONES, Demand.EVENTS}
+    {
+        Demand.THRUST,
+        Demand.TYRES,
+        Demand.MOTORS,
+        Demand.DRIVES,
+        Demand.KINEMATIC,
+        Demand.KICKS,
+        Demand.ZONES,
+        Demand.EVENTS,
+    }
 )
 """Demands that can add energy to a scene, besides wind and emitted bodies."""
 

@@ -113,12 +113,13 @@ class EvaluationContext:
 def times_of_leaving(scene: Scene, run: Trajectory, down: FloatArray) -> FloatArray:
     """Return the time from which on each body is below all walls, posts, fixed and driven bodies, (N,) s; else inf.
 
-    Bodies that joints or attraction hold do not leave, nor those of a scene with a plane, with a liquid, or without any
-    such obstacle.
+    Bodies that joints or attraction hold do not leave, nor those of a scene with a plane, a liquid or tyres, or without
+    any such obstacle.
     """
     bodies = scene.bodies
     left = np.full(len(bodies), np.inf)
-    if scene.planes or scene.attractions or scene.liquids or not (scene.walls or scene.posts or bodies.immovable.any()):
+    has_obstacles = scene.walls or scene.posts or bodies.immovable.any()
+    if scene.planes or scene.attractions or scene.liquids or scene.tyres or not has_obstacles:
         return left
     depths = [float((np.asarray(each.points) @ down).max()) + each.thickness / 2.0 for each in scene.walls]
     depths += [float(np.asarray(each.position) @ down) + each.radius for each in scene.posts]

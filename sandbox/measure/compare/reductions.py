@@ -16,7 +16,9 @@ TableKey = tuple[str, int]
 """Table of a document: its heading and its index."""
 
 FIXED_KINDS = ("plane", "wall", "post")
-CONNECTIONS = ("joint", "attraction", "thrust", "drive", "sensor")
+WITHOUT_SHAPE = ("material", "pair", "joint", "attraction", "thrust", "tyre", "drive")
+"""Table headings of elements that are neither bodies nor static objects"""
+CONNECTIONS = ("joint", "attraction", "thrust", "tyre", "drive", "sensor")
 SURFACE_KEYS = (
     "material", "restitution", "restitution_falloff", "friction", "colour", "mass", "density", "collides", "layer",
 )  # fmt: skip
@@ -181,7 +183,7 @@ def optional_keys(document: JsonObject) -> list[ValueKey]:
     """Return the keys of a document that are optional."""
     keys: list[ValueKey] = [("world", -1, key) for key in document.get("world", {}) if key != "duration"]
     for kind, tables in document.items():
-        if isinstance(tables, list) and kind not in ("material", "pair", "joint", "attraction", "thrust", "drive"):
+        if isinstance(tables, list) and kind not in WITHOUT_SHAPE:
             keys += [(kind, k, key) for k, table in enumerate(tables) for key in OPTIONAL_KEYS if key in table]
     return keys
 
@@ -272,7 +274,7 @@ def _round_up(value: float, digits: int) -> float:
 def _tables(document: JsonObject) -> Iterator[tuple[str, JsonObject]]:
     """Yield the tables of bodies and static objects, and of the parts of bodies."""
     for kind, tables in document.items():
-        if not isinstance(tables, list) or kind in ("material", "pair", "joint", "attraction", "thrust", "drive"):
+        if not isinstance(tables, list) or kind in WITHOUT_SHAPE:
             continue
         for table in tables:
             yield kind, table

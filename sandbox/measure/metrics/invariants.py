@@ -68,11 +68,11 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
 def conserves_energy(scene: Scene) -> bool:
     """Return whether a scene conserves energy.
 
-    It has no drag, lift, damping, limit of speed, friction, damper, thrust, drive, liquid, event, motor or kinematic
-    body, no joint that gives way or that jerks a body when it becomes taut, and elastic contacts.
+    It has no drag, lift, damping, limit of speed, friction, damper, thrust, tyre, drive, liquid, event, motor or
+    kinematic body, no joint that gives way or that jerks a body when it becomes taut, and elastic contacts.
     """
     acts = scene.thrusts or scene.drives or scene.events
-    if demands(scene) & (AIR | {Demand.SPEED_LIMITS, Demand.BUOYANCY}) or acts:
+    if demands(scene) & (AIR | {Demand.SPEED_LIMITS, Demand.BUOYANCY, Demand.TYRES}) or acts:
         return False
     if scene.bodies.kinematic.any():
         return False
@@ -98,7 +98,7 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     joints = scene.joint_arrays
     if scene.thrusts or scene.drives or scene.events or any(scene.world.wind) or len(joints.of(*MOTORS)):
         return 0.0
-    if scene.bodies.kinematic.any():
+    if scene.bodies.kinematic.any() or any(tyre.drive > 0.0 for tyre in scene.tyres):
         return 0.0
     matrix = contact_matrix(scene)
     if matrix.surfaces.kicks.any() or matrix.moving_surfaces:
@@ -142,14 +142,14 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
     """Return the unexplained momentum at the end as a fraction of the largest Σ|m v| of any frame.
 
     Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
-    between moving bodies conserve momentum. None with drag, lift, damping, speed limits, thrusts, drives, events,
-    joints or attraction between moving and static bodies, or zones that stop or lift bodies, whose impulses are not
-    recorded; if a body was retired with its momentum; with kinematic bodies; or if the run did not reach its end.
+    between moving bodies conserve momentum. None with drag, lift, damping, speed limits, thrusts, tyres, drives,
+    events, joints or attraction between moving and static bodies, or zones that stop or lift bodies, whose impulses are
+    not recorded; if a body was retired with its momentum; with kinematic bodies; or if the run did not reach its end.
     """
     bodies, world = scene.bodies, scene.world
     if run.status != "ok" or np.isfinite(run.retired_time).any():
         return None
-    if demands(scene) & (AIR | {Demand.SPEED_LIMITS, Demand.EVENTS}):
+    if demands(scene) & (AIR | {Demand.SPEED_LIMITS, Demand.EVENTS, Demand.TYRES}):
         return None
     if scene.thrusts or scene.drives or _acts_on_static(scene):
         return None

@@ -181,7 +181,8 @@ def lyapunov_time(scene: Scene) -> float | None:
         or scene.attractions
     ):
         return None
-    if any(world.gravity) or demands(scene) & (AIR | OWN_MOTION | {Demand.BUOYANCY}) or bodies.kinematic.any():
+    forces = AIR | OWN_MOTION | {Demand.BUOYANCY, Demand.TYRES}
+    if any(world.gravity) or demands(scene) & forces or bodies.kinematic.any():
         return None
     area = _area(scene)
     if area is None:

@@ -115,6 +115,8 @@ class SpeedBounds:
             found.append("events")
         if any(thrust.key is not None for thrust in scene.thrusts):
             found.append("thrusts on keys")
+        if any(tyre.keys and tyre.drive > 0.0 for tyre in scene.tyres):
+            found.append("tyres on keys")
         if bodies.lift.any() and any(scene.world.wind):  # it keeps the speed through the air, which walls do not
             found.append("lift in wind")
         return tuple(found)

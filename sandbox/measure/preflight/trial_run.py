@@ -62,7 +62,7 @@ def _stack_of(setup: Setup) -> StackedBodies | None:
         return None
     if bodies.scales_gravity or bodies.kinematic.any() or len(scene.joint_arrays):
         return None
-    if scene.thrusts or scene.drives or scene.attractions or scene.liquids:
+    if scene.thrusts or scene.tyres or scene.drives or scene.attractions or scene.liquids:
         return None
     close = initial_contacts(scene)
     stacked = np.unique(np.concatenate((close.first, close.second)))

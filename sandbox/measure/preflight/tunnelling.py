@@ -226,7 +226,7 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     reach = half[:, None] + half
     only_two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
     closing = unstruck[:, None] + unstruck
-    has_forces = scene.attractions or scene.thrusts or scene.liquids or is_driven(scene, bodies).any()
+    has_forces = scene.attractions or scene.thrusts or scene.tyres or scene.liquids or is_driven(scene, bodies).any()
     if only_two and not len(scene.joint_arrays) and not has_forces:
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))

@@ -31,6 +31,8 @@ COST_WEIGHTS: Mapping[str, Mapping[str, float]] = {
         "springs": 4.2e-7,
         "on_floor": 1.4e-4,
         "zoned": 2.4e-5,
+        "tyred": 5e-6,
+        "tyres": 3.4e-6,
         "liquids": 1.4e-4,
         "immersed": 1.2e-6,
         "contact_iterations": 1.6e-7,
@@ -43,6 +45,8 @@ COST_WEIGHTS: Mapping[str, Mapping[str, float]] = {
         "attracted": 3.9e-4,
         "driven": 3e-5,
         "springs": 1.2e-3,
+        "tyred": 1.2e-4,
+        "tyres": 2.2e-6,
         "liquids": 1.5e-4,
         "immersed": 2.7e-6,
     },
@@ -58,6 +62,8 @@ COST_WEIGHTS: Mapping[str, Mapping[str, float]] = {
         "joined": 1.3e-7,
         "springs": 1.7e-4,
         "on_floor": 2.2e-4,
+        "tyred": 1.1e-4,
+        "tyres": 1.8e-6,
         "liquids": 7.6e-5,
         "immersed": 4e-7,
         "broad_tests": 4.8e-8,
@@ -70,7 +76,8 @@ COST_WEIGHTS: Mapping[str, Mapping[str, float]] = {
 """s per unit of each amount (`_amounts`), by engine. Fitted to 210 runs of the shipped scenes up to 3,000 bodies, by
 relative error, on two shared x86-64 cores: within a factor of 2.5 of the measured time in all but 18. Other engines
 have the weights of reference. `zoned` on pymunk is that of `overpass`, whose substeps are observed one by one.
-`liquids` and `immersed` follow from 300 steps with 1 and 200 boxes afloat, less those without the liquid.
+`liquids` and `immersed` follow from 300 steps with 1 and 200 boxes afloat, less those without the liquid,
+`tyred` and `tyres` from 300 steps with 1 and 50 cars on four tyres each, less those without tyres.
 """
 
 
@@ -155,6 +162,8 @@ def _amounts(setup: Setup, settings: Settings, steps: int, work: Mapping[str, in
         "springs": substeps * len(setup.joints.of(JointKind.SPRING, JointKind.ROTARY_SPRING)),
         "on_floor": substeps * (scene.surface is not None),
         "zoned": substeps * bool(scene.zones),
+        "tyred": substeps * bool(scene.tyres),
+        "tyres": substeps * len(scene.tyres),
         "liquids": substeps * bool(scene.liquids),
         "immersed": substeps * bodies * len(scene.liquids),
     }

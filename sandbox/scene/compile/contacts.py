@@ -228,7 +228,7 @@ class ContactMatrix:
     """(N,) can enter a zone; driven bodies are not detected"""
     turnable: BoolArray
     """(N,) can change its spin: by friction or rolling resistance; for other shapes than balls by any contact; by
-    joints, thrusts, drives, damping of its own or a liquid"""
+    joints, thrusts, tyres, drives, damping of its own or a liquid"""
     mutual: bool
     """whether two bodies can touch"""
     ball_ball: bool
@@ -487,11 +487,12 @@ def _any_of(body: IntArray | None, pieces: BoolArray, count: int) -> BoolArray:
 
 
 def _thrust_turned(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return which bodies have a thrust that does not act through their centre of mass."""
+    """Return which bodies have a tyre, or a thrust that does not act through their centre of mass."""
     found = np.zeros(len(bodies), dtype=np.bool_)
     for thrust in scene.thrusts:
         if thrust.body in bodies.number_of:
             index = bodies.number_of[thrust.body]
             x, y = geometry_of(bodies.elements[bodies.element[index]]).centre
             found[index] |= (thrust.point[0] - x) * thrust.force[1] != (thrust.point[1] - y) * thrust.force[0]
+    found[[bodies.number_of[tyre.body] for tyre in scene.tyres if tyre.body in bodies.number_of]] = True
     return found

@@ -67,6 +67,7 @@ class Demand(StrEnum):
     JOINT_BIAS = "bias of joints"
     ATTRACTION = "attraction"
     THRUST = "thrust"
+    TYRES = "tyres"
     BUOYANCY = "buoyancy"
     DRIVES = "drives"
     BOUNDS = "bounds"
@@ -344,6 +345,7 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     for demand, elements in (
         (Demand.ATTRACTION, scene.attractions),
         (Demand.THRUST, scene.thrusts),
+        (Demand.TYRES, scene.tyres),
         (Demand.DRIVES, scene.drives),
     ):
         yield demand, bool(elements), f"{len(elements):,}" if elements else "none"

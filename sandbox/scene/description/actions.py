@@ -32,8 +32,8 @@ Amount = Annotated[float, Field(ge=-1e42, le=1e42)]
 Level = Annotated[float, Field(ge=0, le=1)]
 """Fraction of a thrust, or level of a drive."""
 
-MotorLevel = Annotated[float, Field(ge=-1, le=1)]
-"""Fraction of the largest torque of a motor; negative: in the opposite direction."""
+SignedLevel = Annotated[float, Field(ge=-1, le=1)]
+"""Throttle or steering of a tyre, or level of a motor."""
 
 Value = float | int | bool | str | None
 """Value of a setting."""
@@ -225,6 +225,20 @@ class Throttle(Timed):
     """fraction of the force of the thrust"""
 
 
+class Steer(Timed):
+    """Set the throttle, brake and steering of a tyre of the scene. They act until the next such action."""
+
+    kind: Literal["steer"] = default_kind("steer")
+    tyre: Name
+    """name of the tyre"""
+    throttle: SignedLevel = 0.0
+    """fraction of the force that drives it; negative values drive backwards"""
+    brake: Level = 0.0
+    """fraction of the force of its brake"""
+    steer: SignedLevel = 0.0
+    """fraction of its steering angle; negative values steer to the right"""
+
+
 class Reshape(Timed):
     """Replace the points of a wall, for example to dig a crater into terrain or to raise it.
 
@@ -257,7 +271,7 @@ class Actuate(Timed):
     """
 
     kind: Literal["actuate"] = default_kind("actuate")
-    levels: Annotated[dict[Name, MotorLevel], Field(min_length=1)]
+    levels: Annotated[dict[Name, SignedLevel], Field(min_length=1)]
     """level of each motor that changes, −1 to 1, by the name of its joint"""
 
 
@@ -331,6 +345,7 @@ _AnyEvent: TypeAlias = (
     | SetParameter
     | Launch
     | Throttle
+    | Steer
     | Drive
     | Actuate
     | Toggle

@@ -1,4 +1,4 @@
-"""Attraction, thrusts and drives (flippers, diverters, plungers).
+"""Attraction, thrusts, tyres and drives (flippers, diverters, plungers).
 
 A drive prescribes the motion of its body. With a torque drive, gravity and collisions act on the body too, air drag and
 damping do not. With a stroke or plunger drive, no load stops the body: it pushes free bodies, and passes through static
@@ -10,7 +10,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.scene.description.base import Accepts, Moment, Name, Part, Point, PointField, Vector, default, default_kind
+from sandbox.scene.description.base import (
+    Accepts,
+    Angle,
+    Moment,
+    Name,
+    Part,
+    Point,
+    PointField,
+    Vector,
+    default,
+    default_kind,
+)
 
 DriveKey = Literal[
     "up", "down", "left", "right", "space", "left shift", "right shift", "z", "slash", "return"
@@ -136,3 +147,38 @@ class Thrust(Part):
     """end, s; default: unlimited"""
     key: ThrustKey | None = None
     """Acts only while this key is held or a `throttle` action has switched it on."""
+
+
+Positive = Annotated[float, Field(gt=0, le=1e30)]
+NotNegative = Annotated[float, Field(ge=0, le=1e30)]
+
+
+class Tyre(Part):
+    """Friction of a body on the ground, seen from above: it rolls freely along one direction and grips across it.
+
+    A tyre of a car, an ice skate, a runner of a sledge. The force on the body is at most `grip` in any direction: a
+    tyre that is driven or braked has less of it left for cornering, and beyond it the tyre skids. Gravity is usually 0.
+    """
+
+    name: Name | None = None
+    """without a name, it is called by its kind and its number in the file, such as `tyre-1`"""
+    body: Name
+    """name of the body"""
+    point: PointField = default((0.0, 0.0))
+    """where it touches the ground, in the frame of the body, m"""
+    angle: Angle = 0.0
+    """rolling direction in the frame of the body, rad; at 0 it rolls along the x axis"""
+    grip: Positive
+    """largest force, N: coefficient of friction times load"""
+    slip: NotNegative = 0.0
+    """speed at which it slides per force that it exerts, below its grip, m/(N·s); 0: it does not slide there"""
+    rolling_drag: NotNegative = 0.0
+    """force that opposes rolling, N; from `grip` on it does not roll, and slides alike in all directions"""
+    drive: NotNegative = 0.0
+    """force of the engine at level 1, forwards, N"""
+    brake: NotNegative = 0.0
+    """largest force of the brake at level 1, N; from `grip` on it locks the wheel"""
+    steer: Angle = 0.0
+    """angle by which steering at level 1 turns it to the left, rad"""
+    keys: bool = False
+    """Whether keys control it: Up and Down drive forwards and backwards, Left and Right steer, Space brakes."""

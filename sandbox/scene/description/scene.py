@@ -15,7 +15,7 @@ from sandbox.scene.description.base import GROUND, BodySource, Collider, HasMate
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone
-from sandbox.scene.description.forces import AnyDrive, Attraction, Thrust
+from sandbox.scene.description.forces import AnyDrive, Attraction, Thrust, Tyre
 from sandbox.scene.description.game_tables import with_game_tables
 from sandbox.scene.description.generators import Cloth, Ragdoll, Rope, Stack
 from sandbox.scene.description.joints import Joint
@@ -73,6 +73,7 @@ class SceneDescription(_Header):
     rotary_spring, pulley, ratchet."""
     attractions: Items[Attraction] = default((), alias="attraction")
     thrusts: Items[Thrust] = default((), alias="thrust")
+    tyres: Items[Tyre] = default((), alias="tyre")
     drives: Items[AnyDrive] = default((), alias="drive")
     """Drive that moves a body between two positions: torque, stroke or plunger."""
     sensors: Items[Sensor] = default((), alias="sensor")

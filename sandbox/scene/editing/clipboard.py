@@ -38,12 +38,12 @@ class CopiedElement:
 
 
 def copy_elements(scene: Scene, keys: Collection[ElementKey]) -> tuple[CopiedElement, ...]:
-    """Return copies of elements, and of the joints, thrusts, drives and sensors of their bodies only."""
+    """Return copies of elements, and of the joints, thrusts, tyres, drives and sensors of their bodies only."""
     names = {name for key in keys for name in body_names(scene, key)}
     chosen = dict.fromkeys(sorted(keys))
     for key, element in all_elements(scene):
         referred = bodies_referred_to(element)
-        if key.table in ("joint", "thrust", "drive", "sensor") and referred and set(referred) <= names:
+        if key.table in ("joint", "thrust", "tyre", "drive", "sensor") and referred and set(referred) <= names:
             chosen[key] = None
     return tuple(
         CopiedElement(

@@ -170,10 +170,8 @@ def _kind(schema: dict[str, Any]) -> tuple[FieldKind, tuple[str, ...]]:
 
 
 _BASE_UNIT = r"(?:(?:kg|m|s|N|J|W|rad|Hz|Pa)[²³⁴]?)"
-_UNIT = re.compile(
-    rf"(?:^|, )((?:1|{_BASE_UNIT}(?:·{_BASE_UNIT})*)/{_BASE_UNIT}(?:·{_BASE_UNIT})*|{_BASE_UNIT}(?:·{_BASE_UNIT})*)"
-    r"(?=$|[,;:.]| \(| from )"
-)
+_PRODUCT = rf"{_BASE_UNIT}(?:·{_BASE_UNIT})*"
+_UNIT = re.compile(rf"(?:^|, )((?:1|{_PRODUCT})/(?:\({_PRODUCT}\)|{_PRODUCT})|{_PRODUCT})(?=$|[,;:.]| \(| from )")
 
 
 def unit_of(description: str) -> str:

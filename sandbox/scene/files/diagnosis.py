@@ -295,6 +295,7 @@ _FAST = (
 _SENSOR = "a [[sensor]] detects the shapes that overlap it; its key `body` names the body that it moves with"
 _PATH = "a body with kinematic = true moves along a `path`, such as { points = [[0, 0], [4, 0]], period = 4.0 }"
 _LIQUID = "a [[zone]] with `points` can have a `liquid`, such as { density = 1000.0, linear_drag = 500.0 }"
+_TYRE = "a [[tyre]] gives a body seen from above a rolling direction and a `grip`, the largest force of its friction, N"
 _ELSEWHERE = {
     "bullet": _FAST,
     "ccd": _FAST,
@@ -303,6 +304,7 @@ _ELSEWHERE = {
     "trigger": _SENSOR,
     "area": _SENSOR,
     **dict.fromkeys(("buoyancy", "buoyancycontroller", "water", "fluid", "fluiddensity", "liquid"), _LIQUID),
+    **dict.fromkeys(("tire", "tyre", "grip", "lateralfriction", "sidewaysfriction", "anisotropicfriction"), _TYRE),
     "elevation": "a cue is level; state `velocity` and `spin`, [x, y, z] in rad/s, that the ball has after the stroke",
     **dict.fromkeys(("waypoints", "patrol", "patrolpoints", "tween", "keyframes", "movingplatform"), _PATH),
     **dict.fromkeys(("boundaryleft", "boundaryright", "boundarytop", "boundarybottom", "changex", "changey"), _PATH),
@@ -371,7 +373,7 @@ _TABLES = {field.alias or name for name, field in Scene.model_fields.items()} - 
 _COMMON_LOCATIONS = {("world",), ("solver",), ("play",)}
 """Tables that every scene has: one that is no table at all is taken as left out."""
 
-REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("drive",), ("shot",), ("sensor",)}
+REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("tyre",), ("drive",), ("shot",), ("sensor",)}
 """Tables that refer to bodies, and to which nothing refers: faulty ones are omitted."""
 
 PARTS = ("ball", "box", "capsule", "polygon")

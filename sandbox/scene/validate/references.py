@@ -11,7 +11,7 @@ from sandbox.scene.description.actions import SETTABLE, Join, SetParameter, Spaw
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive
+from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive, Tyre
 from sandbox.scene.description.joints import (
     Gear,
     Groove,
@@ -46,10 +46,11 @@ ONE_BODY_TWICE = "names one body twice; name two bodies, or one to attach it to 
 
 
 def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
-    """Return the faults of joints, thrusts, attractions and drives, and of the bodies of sensors."""
+    """Return the faults of joints, thrusts, tyres, attractions and drives, and of the bodies of sensors."""
     return [
         *_check_joints(scene, bodies),
-        *_check_thrusts(scene, bodies),
+        *_check_pushed("thrust", scene.thrusts, bodies),
+        *_check_pushed("tyre", scene.tyres, bodies),
         *_check_attractions(scene, bodies),
         *_check_drives(scene, bodies),
         *_check_sensor_bodies(scene, bodies),
@@ -75,6 +76,7 @@ def check_events(scene: Scene, bodies: Bodies, are_others_valid: bool) -> Iterat
         "body": {*bodies.names, *spawned},
         "thing": set(scene.fixed_names),
         "thrust": {thrust.name or default_name("thrust", k) for k, thrust in enumerate(scene.thrusts)},
+        "tyre": {tyre.name or default_name("tyre", k) for k, tyre in enumerate(scene.tyres)},
         "drive": {drive.name or default_name("drive", k) for k, drive in enumerate(scene.drives)},
         "generator": {name for name, _, _ in generators(scene)},
     }
@@ -150,7 +152,9 @@ def check_joints(joints: Sequence[Joint], scene: SceneDescription, bodies: Bodie
             yield ("joint", k, key), message
 
 
-def _check_names(kind: str, elements: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[LocatedMessage]:
+def _check_names(
+    kind: str, elements: Sequence[Joint | Thrust | Tyre | Attraction | Driven]
+) -> Iterator[LocatedMessage]:
     """Yield the elements whose name, stated or by default, is used twice within their kind."""
     seen: set[str] = set()
     for k, each in enumerate(elements):
@@ -217,17 +221,18 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
             pass
 
 
-def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
-    yield from _check_names("thrust", scene.thrusts)
-    for k, thrust in enumerate(scene.thrusts):
-        if thrust.body not in bodies.number_of:
-            yield ("thrust", k, "body"), f"no body is named {thrust.body!r}; {_known(bodies)}"
-        elif bodies.fixed[bodies.number_of[thrust.body]]:
-            yield ("thrust", k, "body"), f"{thrust.body!r} is fixed and cannot move"
-        elif bodies.kinematic[bodies.number_of[thrust.body]]:
-            yield ("thrust", k, "body"), f"{thrust.body!r} is kinematic; no force changes its motion"
-        if thrust.end is not None and thrust.end <= thrust.begin:
-            yield ("thrust", k, "end"), "must be later than `begin`"
+def _check_pushed(table: str, elements: Sequence[Thrust | Tyre], bodies: Bodies) -> Iterator[LocatedMessage]:
+    """Yield the faults of thrusts or tyres: their names, bodies that no force moves, and times."""
+    yield from _check_names(table, elements)
+    for k, each in enumerate(elements):
+        if each.body not in bodies.number_of:
+            yield (table, k, "body"), f"no body is named {each.body!r}; {_known(bodies)}"
+        elif bodies.fixed[bodies.number_of[each.body]]:
+            yield (table, k, "body"), f"{each.body!r} is fixed and cannot move"
+        elif bodies.kinematic[bodies.number_of[each.body]]:
+            yield (table, k, "body"), f"{each.body!r} is kinematic; no force changes its motion"
+        if isinstance(each, Thrust) and each.end is not None and each.end <= each.begin:
+            yield (table, k, "end"), "must be later than `begin`"
 
 
 def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
@@ -284,6 +289,8 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
             yield "body", f"{drive.body!r} has `{key}`, which has no effect on a driven body; remove it"
     if any(thrust.body == drive.body for thrust in scene.thrusts):
         yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
+    if any(tyre.body == drive.body for tyre in scene.tyres):
+        yield "body", f"{drive.body!r} has a tyre; only its drive can move a driven body"
 
 
 def _check_drive_values(drive: AnyDrive, single: BodySpec, bodies: Bodies) -> Iterator[tuple[str, str]]:

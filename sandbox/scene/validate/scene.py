@@ -84,7 +84,7 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         found += check_play(scene, bodies)
     if _has_surface_keys(scene):
         found += check_surface(scene, bodies)
-    if scene.joints or scene.thrusts or scene.attractions or scene.drives or scene.sensors:
+    if scene.joints or scene.thrusts or scene.tyres or scene.attractions or scene.drives or scene.sensors:
         found += check_attachments(scene, bodies)
     if scene.ropes:
         found += check_rope_ties(scene, bodies)

@@ -33,7 +33,7 @@ MAX_VERTICES = 200
 """Corners of an element that have handles"""
 FRAME_MARGIN = 7.0
 """px at UI scale 1 between the box of the selection and the frame with its handles"""
-WITHOUT_BOX = ("joint", "thrust", "attraction", "drive")
+WITHOUT_BOX = ("joint", "thrust", "tyre", "attraction", "drive")
 """Elements that are neither scaled nor rotated by themselves"""
 
 

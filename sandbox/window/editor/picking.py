@@ -9,7 +9,7 @@ from sandbox.arrays import FloatArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Part, Point
 from sandbox.scene.description.fixed import Plane, Post, Sensor, Wall, Zone
-from sandbox.scene.description.forces import Attraction, Thrust
+from sandbox.scene.description.forces import Attraction, Thrust, Tyre
 from sandbox.scene.description.joints import Anchored, Groove, Joined, OnAxis, Pivot, Pulley, Weld
 from sandbox.scene.description.surface import Pocket
 from sandbox.scene.editing.elements import (
@@ -230,14 +230,14 @@ def to_body(scene: Scene, name: str, point: Point) -> Point:
 
 
 def _attached_elements(scene: Scene) -> Iterator[tuple[ElementKey, Part]]:
-    """Yield joints, thrusts and attractions, the last first."""
-    for table in ("joint", "thrust", "attraction"):
+    """Yield joints, thrusts, tyres and attractions, the last first."""
+    for table in ("joint", "thrust", "tyre", "attraction"):
         for index, element in reversed(list(enumerate(elements_of_table(scene, table)))):
             yield ElementKey(table, index), element
 
 
 def attachment_lines(scene: Scene, element: Part) -> list[tuple[Point, Point]]:
-    """Return the lines that show a joint, thrust or attraction, m; a point is a line without length."""
+    """Return the lines that show a joint, thrust, tyre or attraction, m; a point is a line without length."""
     match element:
         case Pulley():
             ends = [to_world(scene, n, a) for n, a in zip(element.between, element.anchors, strict=True)]
@@ -258,7 +258,7 @@ def attachment_lines(scene: Scene, element: Part) -> list[tuple[Point, Point]]:
             return [] if at is None else [_axis_line(scene, element, at) if isinstance(element, OnAxis) else (at, at)]
         case Joined():
             return _line(*_ends(scene, element.between, ((0.0, 0.0), (0.0, 0.0)), is_to_world=False))
-        case Thrust():
+        case Thrust() | Tyre():
             end = to_world(scene, element.body, element.point)
             return [] if end is None else [(end, end)]
         case Attraction() if not isinstance(element.toward, str):

@@ -1,15 +1,16 @@
-"""Key bindings of a scene: arrow keys and Space of `[play]`, keys of thrusters and drives, and the controls of a game.
+"""Key bindings of a scene: arrow keys and Space of `[play]`, keys of thrusters, drives and tyres, controls of a game.
 
 They are computed once per session. A key bound by the scene loses its window command.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 import pygame
 
-from sandbox.action import Action, Drive, Throttle
+from sandbox.action import Action, Drive, Steer, Throttle
 from sandbox.games.contract import Control
 from sandbox.scene.compile.drives import names_of
 from sandbox.scene.compile.scene import Scene
@@ -161,6 +162,12 @@ def key_bindings(
         pressed[key] = partial(_apply, live, on_press, pressed.get(key))
         released[key] = partial(_apply, live, on_release, released.get(key))
         rows.append((name.capitalize(), verb))
+    bodies = sorted({tyre.body for tyre in scene.tyres if tyre.keys})
+    if bodies and host is None:
+        own_pressed, own_released = tyre_keys(live, pressed, released)
+        pressed |= own_pressed
+        released |= own_released
+        rows += [("Arrows", f"drive and steer {', '.join(bodies)}"), ("Space", f"brake {', '.join(bodies)}")]
     if controls is not None:
         own = controls.bindings()
         pressed |= own.pressed
@@ -185,6 +192,42 @@ def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Acti
         if drive.key is not None:
             on, off = (Drive(time=0.0, drive=name, level=level) for level in (1.0, 0.0))
             yield drive.key, f"drive {name}", on, off
+
+
+TYRE_KEYS = {
+    "up": (1.0, 0.0, 0.0),
+    "down": (-1.0, 0.0, 0.0),
+    "left": (0.0, 0.0, 1.0),
+    "right": (0.0, 0.0, -1.0),
+    "space": (0.0, 1.0, 0.0),
+}
+"""Keys of tyres: what each adds to the throttle, brake and steering while it is held"""
+
+
+def tyre_keys(
+    live: LiveView, pressed: Mapping[int, KeyHandler], released: Mapping[int, KeyHandler]
+) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
+    """Return the handlers of presses and of releases of the keys that control tyres.
+
+    Args:
+        live: the view.
+        pressed: other handlers of keys, which run first.
+        released: likewise.
+    """
+    names = [tyre.name or default_name("tyre", k) for k, tyre in enumerate(live.scene.tyres) if tyre.keys]
+    held: set[str] = set()
+
+    def change(key: str, is_held: bool, first: KeyHandler | None) -> None:
+        if first is not None:
+            first()
+        (held.add if is_held else held.discard)(key)
+        throttle, brake, steer = np.sum([(0.0, 0.0, 0.0), *(TYRE_KEYS[each] for each in held)], axis=0).tolist()
+        for name in names:
+            live.apply(Steer(time=0.0, tyre=name, throttle=throttle, brake=brake, steer=steer))
+
+    on_press = {KEYS[key]: partial(change, key, True, pressed.get(KEYS[key])) for key in TYRE_KEYS}
+    on_release = {KEYS[key]: partial(change, key, False, released.get(KEYS[key])) for key in TYRE_KEYS}
+    return dict(on_press), dict(on_release)
 
 
 def _apply(live: LiveView, action: Action, first: KeyHandler | None) -> None:

@@ -218,6 +218,7 @@ class LiveView:
             flames=active_thrusters(session.scene, self.bodies, session.simulation.throttles, session.time)
             if present and session.scene.thrusts
             else (),
+            steering={name: each.steer for name, each in session.simulation.steering.items()} if present else {},
             setup=session.simulation.setup if scene is session.scene else None,
         )
 

@@ -118,6 +118,8 @@ class Snapshot:
     """px at the top left covered by text"""
     flames: tuple[ThrusterFlame, ...] = ()
     """flames of the active thrusters"""
+    steering: Mapping[str, float] = field(default_factory=dict)
+    """level of the steering of tyres that are steered, by their names"""
     setup: Setup | None = None
     """setup of the running session; None if `bodies` are those of the scene or of a stored run"""
 

@@ -7,6 +7,8 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.description.scene import default_name
+from sandbox.scene.geometry.shapes import geometry_of
 from sandbox.scene.geometry.vectors import rotate
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.annotations import (
@@ -46,6 +48,34 @@ INNER_FLAME = 0.55
 """Size of the inner flame as a fraction of the outer."""
 MIN_FLAME = 2.0
 """px, length of the shortest flame that is drawn"""
+
+
+TYRE_LENGTH, TYRE_WIDTH = 0.4, 0.2
+"""Size of a tyre, in bounding radii of its body"""
+
+
+def draw_tyres(view: DrawContext) -> None:
+    """Draw the tyres that have a rolling direction, turned by their steering."""
+    snapshot, camera = view.snapshot, view.camera
+    frame, bodies = snapshot.frame, snapshot.bodies
+    for k, tyre in enumerate(snapshot.scene.tyres):
+        number = bodies.number_of.get(tyre.body)
+        if tyre.rolling_drag >= tyre.grip or number is None or not frame.present[number]:
+            continue
+        angle, (x, y) = float(frame.angle[number]), frame.position[number].tolist()
+        if not math.isfinite(x + y + angle):
+            continue
+        cx, cy = geometry_of(bodies.elements[bodies.element[number]]).centre
+        px, py = rotate(tyre.point[0] - cx, tyre.point[1] - cy, math.cos(angle), math.sin(angle))
+        heading = angle + tyre.angle + tyre.steer * snapshot.steering.get(tyre.name or default_name("tyre", k), 0.0)
+        cos, sin, radius = math.cos(heading), math.sin(heading), float(bodies.radius[number])
+        a, b = 0.5 * TYRE_LENGTH * radius, 0.5 * TYRE_WIDTH * radius
+        corners = [rotate(dx, dy, cos, sin) for dx, dy in ((a, b), (-a, b), (-a, -b), (a, -b))]
+        pixels = camera.to_screen(np.add(corners, (x + px, y + py))).tolist()
+        if max(abs(each) for pixel in pixels for each in pixel) < SDL_COORDINATE_LIMIT:
+            pygame.draw.polygon(view.surface, BACKGROUND, pixels)
+            for begin, end in zip(pixels, (*pixels[1:], pixels[0]), strict=True):
+                draw_line(view.surface, begin, end, FAINT, view.ui_scale)
 
 
 def draw_flames(view: DrawContext) -> None:
@@ -180,6 +210,7 @@ class OverlayRenderer:
             draw_hinges(view, self._discs)
         if "shapes" in overlays:
             draw_moving_surfaces(view)
+            draw_tyres(view)
             _draw_one_way_bodies(view)
         if view.snapshot.ghost is not None:
             self._draw_ghost(view)

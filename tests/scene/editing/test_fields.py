@@ -14,7 +14,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball, Emitter, Grid
 from sandbox.scene.description.fixed import Wall, Zone
-from sandbox.scene.description.forces import Attraction, PlungerDrive
+from sandbox.scene.description.forces import Attraction, PlungerDrive, Tyre
 from sandbox.scene.description.generators import Cloth, Rope
 from sandbox.scene.description.joints import Rod, RotarySpring
 from sandbox.scene.description.play import Play
@@ -107,7 +107,8 @@ def test_length_choices_default_and_range() -> None:
         (Ball, "radius", "m"), (Ball, "density", "kg/m²"), (Ball, "angle", "rad"), (Ball, "angular_velocity", "rad/s"),
         (Ball, "restitution", ""), (Ball, "restitution_falloff", "s/m"), (Ball, "surface_speed", "m/s"),
         (World, "linear_drag", "1/s"), (World, "quadratic_drag", "1/m"), (Attraction, "strength", "m³/s²"),
-        (RotarySpring, "damping", "N·m·s/rad"), (Kick, "profile", ""), (Settings, "dt", "s"),
+        (RotarySpring, "damping", "N·m·s/rad"), (Kick, "profile", ""), (Settings, "dt", "s"), (Tyre, "slip", "m/(N·s)"),
+        (Tyre, "brake", "N"), (Tyre, "steer", "rad"),
     ],
 )  # fmt: skip
 def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
@@ -115,12 +116,12 @@ def test_unit(model: type[BaseModel], key: str, unit: str) -> None:
 
 
 DIMENSIONLESS = {
-    "axis", "ball_restitution", "bias", "bot", "bounce", "curl", "cushion_friction", "cushion_restitution", "damping",
-    "direction", "error", "facing", "friction", "gravity_scale", "height", "hold_ratio", "level", "lift", "normal",
-    "one_way", "ratio", "restitution", "return_ratio", "rolling_friction", "rolling_resistance", "roughness", "side",
-    "sliding_friction", "spinning_friction", "stretch",
+    "axis", "ball_restitution", "bias", "bot", "bounce", "brake", "curl", "cushion_friction", "cushion_restitution",
+    "damping", "direction", "error", "facing", "friction", "gravity_scale", "height", "hold_ratio", "level", "lift",
+    "normal", "one_way", "ratio", "restitution", "return_ratio", "rolling_friction", "rolling_resistance", "roughness",
+    "side", "sliding_friction", "spinning_friction", "steer", "stretch", "throttle",
 }  # fmt: skip
-"""keys of the numbers without a unit, checked by eye"""
+"""keys of the numbers without a unit, checked by eye; `brake` and `steer` are levels in events"""
 
 
 def test_every_number_with_a_dimension_has_a_unit() -> None:

@@ -74,6 +74,7 @@ material = "steel"
         toml("joint", kind="wheel", between=["c"], axis=[0, 1], at=[1, 3], travel=[-1, 1], stiffness=9.0, rate=1.0),
         toml("event", time=9.0, kind="explosion", position=[0, 1], radius=2.0, impulse=0.1),
         toml("event", time=9.0, kind="set", path="world.gravity", value=[0, -1]),
+        toml("tyre", name="skid", body="ship", point=[0.0, -0.3], grip=5.0, drive=2.0, steer=0.3, keys=True),
         toml("thrust", name="engine", body="ship", force=[0.0, 5.0], point=[0.0, -0.3], key="up"),
         toml("drive", name="flip", kind="stroke", body="bat", pivot=[7.5, 3.0], stops=[0.0, 1.0], rate=1.0, key="left"),
         toml("drive", name="plunger", kind="plunger", body="pin", direction=[0, 1], travel=1.0, speed=1.0, key="space"),
