@@ -1,4 +1,4 @@
-"""Rows of Gymnasium environments, against LunarLander-v3."""
+"""Rows of Gymnasium environments, against LunarLander-v3 and BipedalWalker-v3."""
 
 import importlib
 import importlib.util
@@ -74,6 +74,17 @@ ENVIRONMENTS = (
             missing=missing,
         )
         for name, target in (("Landing", 2.0), ("PinballFull", None))
+    ),
+    *(
+        Bench(
+            f"env-{name.lower()}",
+            f"{STEPS} steps of sandbox/{name}-v3 with random actions / of Gymnasium's {name}-v3",
+            lambda name=name: env_steps(f"sandbox/{name}-v3"),
+            lambda name=name: env_steps(f"{name}-v3"),
+            1.5,
+            missing=missing,
+        )
+        for name in ("LunarLander", "BipedalWalker")
     ),
     Bench(
         "env-landing-vector",
