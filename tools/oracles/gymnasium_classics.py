@@ -2,12 +2,10 @@
 
     pip install "gymnasium[box2d]"
     python -m tools.oracles.gymnasium_classics LunarLander
-    python -m tools.oracles.gymnasium_classics LunarLander --train
 
-The first command prints the tables of docs/results/gymnasium.md. Each policy plays the same number of episodes in both
-environments, with different seeds, so that the samples are independent. A second sample of Gymnasium's own environment
-shows what chance alone makes of it. The second command trains the policy again, in Gymnasium's environment, and writes
-its weights.
+The tables of docs/results/gymnasium.md. Each policy plays the same number of episodes in both environments, with
+different seeds, so that the samples are independent. A second sample of Gymnasium's own environment shows what chance
+alone makes of it. `train_classics` trains the policies that are played.
 """
 
 import argparse
@@ -29,8 +27,6 @@ Policy = Callable[[FloatArray], Any]
 POLICIES = "random", "heuristic", "trained"
 CHUNK = 25
 """episodes of a task of a worker"""
-GENERATIONS, POPULATION, ELITE, EPISODES = 80, 100, 20, 5
-"""of the training: generations, policies of each, those that form the next, and episodes of each"""
 
 
 class Episode(NamedTuple):
@@ -186,35 +182,6 @@ def _print_transfer(peer: Sequence[Episode], own: Sequence[Episode]) -> None:
     print(f"\nreturn carried over: {second.mean() / first.mean():.1%} ({low:.1%} to {high:.1%})")
 
 
-def mean_return(name: str, weights: Sequence[float], seeds: Sequence[int]) -> float:
-    """Return the mean return of a policy in Gymnasium's environment."""
-    env = make(name, True)
-    policy = Linear(weights, env)
-    total = math.fsum(play(env, policy, seed).total for seed in seeds)
-    env.close()
-    return total / len(seeds)
-
-
-def train(name: str, workers: int, seed: int = 1) -> None:
-    """Train a policy by the cross-entropy method in Gymnasium's environment, and write its weights."""
-    env = make(name, True)
-    size = (inputs_of(env) + 1) * outputs_of(env)
-    rng = np.random.default_rng(seed)
-    mean, spread = np.zeros(size), np.ones(size)
-    with ProcessPoolExecutor(workers) as pool:
-        for generation in range(GENERATIONS):
-            policies = mean + spread * rng.normal(size=(POPULATION, size))
-            seeds = rng.integers(10**6, 10**7, EPISODES).tolist()  # none of the certificate
-            tasks = [pool.submit(mean_return, name, weights.tolist(), seeds) for weights in policies]
-            returns = np.asarray([task.result() for task in tasks])
-            best = policies[np.argsort(returns)[-ELITE:]]
-            mean = best.mean(axis=0)
-            spread = best.std(axis=0) + max(0.3 * (1.0 - 2.0 * generation / GENERATIONS), 0.0)
-            print(f"generation {generation}: mean {returns.mean():.1f}, best {returns.max():.1f}", flush=True)
-    figures = {"environment": name, "seed": seed, "generations": GENERATIONS}
-    weights_file(name).write_text(json.dumps(figures | {"weights": [round(w, 5) for w in mean.tolist()]}) + "\n")
-
-
 NAMES = "LunarLander", "BipedalWalker"
 """of the environments"""
 
@@ -223,14 +190,10 @@ def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("name", choices=NAMES)
-    parser.add_argument("--train", action="store_true", help="train the policy, and write its weights")
     parser.add_argument("--episodes", type=int, default=1000, help="episodes of each policy and side")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     options = parser.parse_args()
-    if options.train:
-        train(f"{options.name}-v3", options.workers)
-    else:
-        certificate(f"{options.name}-v3", options.episodes, options.workers)
+    certificate(f"{options.name}-v3", options.episodes, options.workers)
 
 
 if __name__ == "__main__":
