@@ -72,7 +72,7 @@ class LunarLander(ClassicEnv):
 
     Start: ground and first impulse are random, and so is the direction of the engines in each step. A seed leads to
     the same random numbers as in Gymnasium's environment; while the lander flies, the observations of both agree within
-    a few thousandths.
+    0.02.
 
     Args:
         render_mode: None, or `rgb_array`.
