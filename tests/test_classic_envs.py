@@ -5,6 +5,7 @@ import importlib
 import math
 import pickle
 import warnings
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -17,6 +18,7 @@ import sandbox.gym
 from sandbox.gym import CLASSICS, BipedalWalker, LunarLander
 from sandbox.measure.run.sessions import rerun
 from sandbox.queries import SceneQueries
+from sandbox.recording import Recording
 
 pytestmark = pytest.mark.fail_slow(60)  # episodes on two engines
 
@@ -177,6 +179,14 @@ def test_recording_of_an_episode_replays_bit_for_bit(name: str) -> None:
     recording = env.recording()
     assert rerun(recording).info["state_hash"] == recording.state_hash
     assert rerun(recording, "reference").status == "ok"
+
+
+def test_recording_of_an_episode_with_arguments_of_numpy_can_be_saved(tmp_path: Path) -> None:
+    env = own("LunarLander-v3", gravity=np.float32(-3.71), enable_wind=True, wind_power=np.float32(20.0))
+    states(env, 5, sampled(env, 20))
+    env.recording().save(tmp_path / "flight.json")
+    recording = Recording.load(tmp_path / "flight.json")
+    assert rerun(recording).info["state_hash"] == env.recording().state_hash
 
 
 def test_lander_that_comes_to_rest_gets_100_points_and_one_that_crashes_loses_as_many() -> None:

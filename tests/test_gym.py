@@ -584,6 +584,7 @@ def total_rewards(environments: dict[str, SandboxEnv], seed: int) -> tuple[dict[
         for key, env in environments.items():
             _, reward, over, late, infos[key] = env.step(action)
             totals[key] += reward
+            assert type(reward) is float
             assert not late
     info = infos.popitem()[1]
     assert all(other == info for other in infos.values())

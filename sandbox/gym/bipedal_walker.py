@@ -29,7 +29,6 @@ GROUND_STEP, GROUND_CORNERS, START_CORNERS, GRASS_CORNERS = 14.0 / SCALE, 200, 2
 GROUND_HEIGHT = HEIGHT / 4.0
 GRASS, STUMP, STAIRS, PIT, STATES = range(5)
 """stretches of the ground, and their number"""
-BOX_FRICTION = 2.5
 CLOUD_NUMBERS = 11 * (GROUND_CORNERS // 20)
 """random numbers that Gymnasium draws for its clouds"""
 MAX_START_IMPULSE = 5.0 / 50.0
@@ -61,7 +60,7 @@ class BipedalWalker(ClassicEnv):
     Action: level of the motors of both hips and knees, −1 to 1: direction, and fraction of the largest torque.
 
     Reward: 130 points per 30 m of the way, less 5 per rad by which the hull is tilted; less the cost of the torques;
-    −100 for a fall. 300 points solve it.
+    −100 for a fall or for x below 0. 300 points solve it.
 
     Episode: it is terminated when the hull touches the ground, and at either end of the ground. `gymnasium.make`
     truncates it after 1,600 steps, or 2,000 with `hardcore`.

@@ -59,8 +59,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
     player by name, and `info["player"]` the one whose turn it is. An episode is terminated when the game is over. It is
     truncated at its `duration`, or if the physics fails; `info["failed"]` then has the reason.
 
-    An environment can be pickled and copied between episodes. During an episode it can be copied (`copy.deepcopy`) on
-    engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for bit.
+    An environment can be pickled and copied before its first reset and after `close`. From reset to `close` it can be
+    copied (`copy.deepcopy`) on engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for
+    bit.
 
     Args:
         scene: scene, path of a scene file, or name of a shipped scene.
@@ -212,7 +213,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         over = rules.game_over is not None
         late = not over and (episode.late or failed is not None)
         self._ended = over or late
-        return self._observation(), self._value(rules, player) - before, over, late, info
+        return self._observation(), float(self._value(rules, player) - before), over, late, info
 
     def _value(self, rules: Any, player: str | None) -> float:
         """Return the quantity whose increase is the reward of a player; None in games of one player."""

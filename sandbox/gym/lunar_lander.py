@@ -72,7 +72,7 @@ class LunarLander(ClassicEnv):
 
     Start: ground and first impulse are random, and so is the direction of the engines in each step. A seed leads to
     the same random numbers as in Gymnasium's environment; while the lander flies, the observations of both agree within
-    a few thousandths.
+    0.02.
 
     Args:
         render_mode: None, or `rgb_array`.
@@ -104,8 +104,8 @@ class LunarLander(ClassicEnv):
         if not -12.0 < gravity < 0.0:
             raise ValueError(f"gravity must be between -12 and 0 m/s², is {gravity!r}")
         self.observed = "x", "y", "vx", "vy", "angle", "ω", "right leg touches", "left leg touches"
-        self.continuous, self.gravity, self.enable_wind = continuous, gravity, enable_wind
-        self.wind_power, self.turbulence_power = wind_power, turbulence_power
+        self.continuous, self.gravity, self.enable_wind = continuous, float(gravity), enable_wind
+        self.wind_power, self.turbulence_power = float(wind_power), float(turbulence_power)
         bound = np.asarray([2.5, 2.5, 10.0, 10.0, 2.0 * math.pi, 10.0, 1.0, 1.0], np.float32)
         self.observation_space = spaces.Box(np.append(-bound[:6], np.zeros(2, np.float32)), bound)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32) if continuous else spaces.Discrete(4)

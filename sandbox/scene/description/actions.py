@@ -266,8 +266,9 @@ class Drive(Timed):
 class Actuate(Timed):
     """Set the levels of motors, also of those of prismatic joints and wheels.
 
-    At a level a the motor aims at its rate, or at the opposite one if a is negative, with at most |a| times its largest
-    torque or force; at 0 it is off. Motors start at level 1. A motor without a largest torque is off or unlimited.
+    At a level a the motor aims at its rate, or at the opposite one if a is negative, with at most `|a|` times its
+    largest torque or force; at 0 it is off. Motors start at level 1. A motor without a largest torque is off or
+    unlimited.
     """
 
     kind: Literal["actuate"] = default_kind("actuate")
