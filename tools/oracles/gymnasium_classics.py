@@ -25,6 +25,8 @@ from sandbox.arrays import FloatArray
 Policy = Callable[[FloatArray], Any]
 
 POLICIES = "random", "heuristic", "trained"
+ACTION_SEEDS = 10**6
+"""added to the seed of an episode for that of random actions, which would else repeat the numbers of its start"""
 CHUNK = 25
 """episodes of a task of a worker"""
 
@@ -77,7 +79,7 @@ def make(name: str, peer: bool) -> gymnasium.Env[Any, Any]:
 def policy_of(kind: str, name: str, env: gymnasium.Env[Any, Any], seed: int) -> Policy:
     """Return a policy for one episode."""
     if kind == "random":
-        env.action_space.seed(seed)
+        env.action_space.seed(seed + ACTION_SEEDS)
         return lambda _: env.action_space.sample()
     if kind == "trained":
         return Linear(json.loads(weights_file(name).read_text())["weights"], env)
@@ -153,11 +155,11 @@ def _row(label: str, peer: FloatArray, own: FloatArray, again: FloatArray) -> st
     return f"| {label} | {sides} | {figures} |"
 
 
-def certificate(name: str, episodes: int, workers: int) -> None:
+def certificate(name: str, policies: Sequence[str], episodes: int, workers: int) -> None:
     """Print the tables of an environment."""
     observed: Sequence[str] = make(name, False).get_wrapper_attr("observed")
     with ProcessPoolExecutor(workers) as pool:
-        for kind in POLICIES:
+        for kind in policies:
             peer = sample(pool, name, True, kind, range(episodes))
             own = sample(pool, name, False, kind, range(episodes, 2 * episodes))
             again = sample(pool, name, True, kind, range(2 * episodes, 3 * episodes))
@@ -190,10 +192,11 @@ def main() -> None:
     """Run from the command line."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("name", choices=NAMES)
+    parser.add_argument("--policies", nargs="+", choices=POLICIES, default=POLICIES, help="default: all")
     parser.add_argument("--episodes", type=int, default=1000, help="episodes of each policy and side")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     options = parser.parse_args()
-    certificate(f"{options.name}-v3", options.episodes, options.workers)
+    certificate(f"{options.name}-v3", options.policies, options.episodes, options.workers)
 
 
 if __name__ == "__main__":
