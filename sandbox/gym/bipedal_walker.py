@@ -13,8 +13,8 @@ from gymnasium import spaces
 
 from sandbox.action import Actuate, Throttle
 from sandbox.arrays import FloatArray
-from sandbox.gym.classic_env import ClassicEnv, below
-from sandbox.gym.game_env import Observation, refuse_options
+from sandbox.gym.classic_env import ClassicEnv, below, checked_numbers
+from sandbox.gym.game_env import Observation
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.bodies import Polygon
@@ -102,23 +102,8 @@ class BipedalWalker(ClassicEnv):
         angles = RAY_ANGLE / RAYS * np.arange(RAYS)
         self._rays: FloatArray = RAY_LENGTH * np.stack((np.sin(angles), -np.cos(angles)), axis=1)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode, and make a first step with the motors off.
-
-        Args:
-            seed: seed of the random numbers; default: they continue, at first from a random seed.
-            options: not supported.
-
-        Returns:
-            The first observation, and an empty info dict.
-
-        Raises:
-            ValueError: options are given.
-        """
-        refuse_options(options)
-        super().reset(seed=seed)
+    def _begin_episode(self) -> None:
+        """Begin an episode on a random ground, with a random push."""
         ground, boxes = self._random_ground()
         self.np_random.uniform(size=CLOUD_NUMBERS)
         push = float(self.np_random.uniform(-MAX_START_IMPULSE, MAX_START_IMPULSE))
@@ -129,8 +114,6 @@ class BipedalWalker(ClassicEnv):
         self._box_edges = np.concatenate(box_edges) if box_edges else None
         self._touching = set[tuple[int, int]]()
         self._foot_contact, self._fallen = [0.0, 0.0], False
-        self._shaping: float | None = None
-        return self.step(np.zeros(4))[0], {}
 
     def _random_ground(self) -> tuple[list[Point], list[list[Point]]]:
         """Return the corners of a random ground, and the corners of each box on it, m."""
@@ -218,7 +201,7 @@ class BipedalWalker(ClassicEnv):
             ValueError: the action is invalid. The environment is left unchanged.
             ResetNeeded: no episode has begun.
         """
-        simulation, levels = self._running, self._levels(action)
+        simulation, levels = self._running, checked_numbers(action, 4)
         actuate = Actuate(time=simulation.time, levels=dict(zip(JOINTS, levels, strict=True)))
         contacts = self._advance([actuate])
         frame = simulation.frame()
@@ -240,25 +223,14 @@ class BipedalWalker(ClassicEnv):
             *(*joints[2], *joints[3], self._foot_contact[1]),
             *self._distances(x, y),
         )
-        shaping = 130.0 * x / SCALE - 5.0 * abs(angle)
-        reward = 0.0 if self._shaping is None else shaping - self._shaping
-        reward -= TORQUE_COST * sum(map(abs, levels))
-        self._shaping = shaping
+        reward = self._gain(130.0 * x / SCALE - 5.0 * abs(angle)) - TORQUE_COST * sum(map(abs, levels))
         is_lost = self._fallen or x < 0.0
         is_over = is_lost or x > (GROUND_CORNERS - GRASS_CORNERS) * GROUND_STEP
         return np.array(values, np.float32), -100.0 if is_lost else reward, is_over, False, {}
 
-    def _levels(self, action: Any) -> list[float]:
-        """Return the levels of the motors.
-
-        Raises:
-            ValueError: the action is invalid.
-        """
-        values = np.asarray(action, np.float64)
-        if values.shape != (4,) or not np.isfinite(values).all():
-            raise ValueError(f"an action is 4 numbers, -1 to 1, not {action!r}")
-        levels: list[float] = values.clip(-1.0, 1.0).tolist()
-        return levels
+    @property
+    def _idle_action(self) -> Any:
+        return np.zeros(4)
 
     def _pose(self, frame: Frame) -> tuple[float, float, float]:
         """Return the position of the hull's origin, m, and its angle, rad."""

@@ -1,15 +1,17 @@
 """Base of the environments that repeat Gymnasium's Box2D environments on a scene and an engine of the sandbox."""
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
+import numpy as np
 
 from sandbox.action import Action, Throttle
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.gym.game_env import Observation
+from sandbox.gym.game_env import Observation, refuse_options
 from sandbox.recording import Recording
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
@@ -28,6 +30,19 @@ def below(ground: Sequence[Point]) -> tuple[Point, ...]:
     """Return the corners that complete those of a ground, m, to the outline of the soil as it is drawn."""
     (left, first), (right, last) = ground[0], ground[-1]
     return (right + FAR, last), (right + FAR, -FAR), (left - FAR, -FAR), (left - FAR, first)
+
+
+def checked_numbers(action: Any, count: int) -> list[float]:
+    """Return the numbers of an action, clipped to −1 to 1.
+
+    Raises:
+        ValueError: they are not so many finite numbers.
+    """
+    values = np.asarray(action, np.float64)
+    if values.shape != (count,) or not np.isfinite(values).all():
+        raise ValueError(f"an action is {count} numbers, -1 to 1, not {action!r}")
+    numbers: list[float] = values.clip(-1.0, 1.0).tolist()
+    return numbers
 
 
 class ClassicEnv(gymnasium.Env[Observation, Any]):
@@ -60,7 +75,43 @@ class ClassicEnv(gymnasium.Env[Observation, Any]):
         self._simulation: SwitchableSimulation | None = None
         self._actions: list[Action] = []
         self._steps = 0
+        self._potential: float | None = None
         self._canvas: Any = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode, and make a first step without engines or motors.
+
+        Args:
+            seed: seed of the random numbers; default: they continue, at first from a random seed.
+            options: not supported.
+
+        Returns:
+            The first observation, and an empty info dict.
+
+        Raises:
+            ValueError: options are given.
+        """
+        refuse_options(options)
+        super().reset(seed=seed)
+        self._potential = None
+        self._begin_episode()
+        return self.step(self._idle_action)[0], {}
+
+    @property
+    @abstractmethod
+    def _idle_action(self) -> Any:
+        """Action that does nothing."""
+
+    @abstractmethod
+    def _begin_episode(self) -> None:
+        """Draw the random numbers of an episode, and start its simulation."""
+
+    def _gain(self, potential: float) -> float:
+        """Return the increase of a potential since the last step; 0 in the first step of an episode."""
+        before, self._potential = self._potential, potential
+        return 0.0 if before is None else potential - before
 
     def _begin(self, scene: Scene) -> SwitchableSimulation:
         """Start the simulation of an episode, and return it."""

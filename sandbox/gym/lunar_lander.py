@@ -12,8 +12,8 @@ import numpy as np
 from gymnasium import spaces
 
 from sandbox.action import Impulse, Throttle
-from sandbox.gym.classic_env import ClassicEnv, below
-from sandbox.gym.game_env import Observation, refuse_options
+from sandbox.gym.classic_env import ClassicEnv, below, checked_numbers
+from sandbox.gym.game_env import Observation
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.trajectory import Frame
@@ -126,33 +126,15 @@ class LunarLander(ClassicEnv):
         """centre of mass in the frame of the lander, whose origin is observed, m"""
         self._throttle_of: dict[str, float] = {}
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode, and make a first step without engines.
-
-        Args:
-            seed: seed of the random numbers; default: they continue, at first from a random seed.
-            options: not supported.
-
-        Returns:
-            The first observation, and an empty info dict.
-
-        Raises:
-            ValueError: options are given.
-        """
-        refuse_options(options)
-        super().reset(seed=seed)
+    def _begin_episode(self) -> None:
+        """Begin an episode on a random ground, with a random impulse."""
         ground = self._random_ground()
-        self._frame = self._begin(
-            self._scene_of(ground, self.np_random.uniform(-MAX_START_IMPULSE, MAX_START_IMPULSE, 2))
-        ).frame()
+        impulse = self.np_random.uniform(-MAX_START_IMPULSE, MAX_START_IMPULSE, 2)
+        self._frame = self._begin(self._scene_of(ground, impulse)).frame()
         self._touching = set[tuple[int, int]](), set[tuple[int, int]]()  # before the last step, and after it
         self._leg_contact, self._crashed, self._rest_time = [0.0, 0.0], False, 0.0
-        self._shaping: float | None = None
         if self.enable_wind:
             self._wind_phase, self._torque_phase = (int(self.np_random.integers(-9999, 9999)) for _ in range(2))
-        return self.step(np.zeros(2) if self.continuous else 0)[0], {}
 
     def _random_ground(self) -> list[Point]:
         """Return the corners of a random ground, m, which is flat between the flags."""
@@ -233,17 +215,20 @@ class LunarLander(ClassicEnv):
             spin / UNITS[4],
             *legs,
         )
-        shaping = 10.0 * (legs[0] + legs[1]) - 100.0 * (
+        potential = 10.0 * (legs[0] + legs[1]) - 100.0 * (
             math.hypot(values[0], values[1]) + math.hypot(values[2], values[3]) + abs(angle)
         )
-        reward = 0.0 if self._shaping is None else shaping - self._shaping - 0.3 * main - 0.03 * abs(side)
-        self._shaping = shaping
+        reward = self._gain(potential) - 0.3 * main - 0.03 * abs(side)
         self._throttle_of = {"main engine": main, "left engine": max(-side, 0.0), "right engine": max(side, 0.0)}
         is_asleep = self._rest_time >= SLEEP_TIME
         is_lost = self._crashed or abs(values[0]) >= 1.0
         if is_asleep or is_lost:
             reward = 100.0 if is_asleep else -100.0
         return np.array(values, np.float32), reward, is_asleep or is_lost, False, {}
+
+    @property
+    def _idle_action(self) -> Any:
+        return np.zeros(2) if self.continuous else 0
 
     def _throttles(self, action: Any) -> tuple[float, float]:
         """Return the throttles of the main engine, 0 to 1, and of the side engines, −1 (left) to 1 (right).
@@ -255,10 +240,7 @@ class LunarLander(ClassicEnv):
             if not self.action_space.contains(action):
                 raise ValueError(f"an action is 0, 1, 2 or 3, not {action!r}")
             return float(action == 2), float(action == 3) - float(action == 1)
-        values = np.asarray(action, np.float64)
-        if values.shape != (2,) or not np.isfinite(values).all():
-            raise ValueError(f"an action is 2 numbers, -1 to 1, not {action!r}")
-        main, side = values.clip(-1.0, 1.0).tolist()
+        main, side = checked_numbers(action, 2)
         return 0.5 * (main + 1.0) if main > 0.0 else 0.0, side if abs(side) > 0.5 else 0.0
 
     def _engine_impulse(self, frame: Frame, main: float, side: float) -> tuple[float, float, float]:
