@@ -131,6 +131,8 @@ def test_scene_with_events_is_written_and_read_again() -> None:
         ('kind="set"\npath="world.seed"\nvalue=1', "event[0].path", "world.gravity"),
         ('kind="throttle"\nthrust="t"\nlevel=1', "event[0].thrust", "none"),
         ('kind="unjoin"\njoint="j"', "event[0].joint", "none"),
+        ('kind="actuate"\nlevels={j=1.0}', "event[0].levels.j", "no motor is named 'j'"),
+        ('kind="actuate"\nlevels={}', "event[0].levels", "table that is not empty"),
         ('kind="join"\njoint={kind="rod", between=["a","q"]}', "event[0].joint.between[1]", "'a'"),
         ('kind="join"\njoint={kind="prismatic", between=["a"], axis=[0,0], travel=[0,1]}', "event[0].joint.axis", "no"),
         ('kind="join"\njoint={kind="weld", between=["a","a"]}', "event[0].joint.between", "twice"),

@@ -81,6 +81,8 @@ def explain(details: Any) -> LocatedMessage:
         expected = "a table, such as { speed = 3.0 }"
     elif location[:1] == ("joint",) and location[-1] == "between":
         expected = 'the name of one body or of two, such as ["a", "b"]'
+    elif kind == "too_short" and isinstance(value, dict):
+        expected = "a table that is not empty"
     elif kind in ("too_short", "too_long") and location[-1] != "points":
         expected = f"an array of {_length(tuple(details['loc']), context)}"
     elif kind in _RANGES:
