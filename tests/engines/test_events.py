@@ -148,6 +148,20 @@ def test_invalid_events_are_refused(event: str, path: str, word: str) -> None:
     assert any(each.path == path and word in each.message for each in faults), faults
 
 
+@pytest.mark.parametrize(
+    ("element", "event"),
+    [
+        ('[[tyre]]\nname="t"\nbody="a"', 'kind="steer"\ntyre="t"'),  # without grip
+        ('[[joint]]\nname="t"\nkind="motor"\nbetween=["a"]', 'kind="actuate"\nlevels={t=1.0}'),  # without rate
+        ('[[joint]]\nname="t"\nkind="motor"\nbetween=["a"]', 'kind="unjoin"\njoint="t"'),
+    ],
+)
+def test_faulty_element_is_the_only_fault_of_a_scene_whose_events_name_it(element: str, event: str) -> None:
+    faults = faults_of(f'[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n{element}\n[[event]]\ntime=1.0\n{event}')
+    assert len(faults) == 1
+    assert faults[0].path.startswith(("tyre.t", "joint.t"))
+
+
 def test_impulse_without_a_time_is_refused() -> None:
     faults = faults_of('[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[event]]\nkind="remove"\nbody="a"')
     assert [each.path for each in faults] == ["event[0].time"]
