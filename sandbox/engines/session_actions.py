@@ -4,7 +4,7 @@ Each function computes what an action changes; `SwitchableSimulation` applies it
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count, takewhile
 from typing import Any
@@ -70,6 +70,10 @@ class PersistentActions:
         """Remove the forces on bodies that have left the scene."""
         for name in removed:
             self._forces.pop(name, None)
+
+    def keep_motors(self, joints: Collection[str]) -> None:
+        """Remove the levels of motors of other joints, which have broken or were removed."""
+        self._motor_levels = {name: level for name, level in self._motor_levels.items() if name in joints}
 
     @property
     def forces(self) -> dict[str, Force]:
@@ -188,7 +192,7 @@ def added_joint(action: Join, setup: Setup, bodies: Bodies, frame: Frame, broken
     if faults:
         listed = (f"{'.'.join(map(str, location[2:]))}: {message}" for location, message in faults)
         raise ActionError(f"joint: {'; '.join(listed)}")
-    taken = _intact_joint_names(setup, broken)
+    taken = intact_joint_names(setup, broken)
     name = action.joint.name or next(each for k in count(1) if (each := f"joined-{k}") not in taken)
     if name in taken:
         raise ActionError(f"a joint is already named {name!r}")
@@ -203,11 +207,11 @@ def removed_joint(action: Unjoin, setup: Setup, broken: Mapping[int, float]) -> 
     """
     found = [k for k, name in enumerate(setup.joints.names) if name == action.joint and k not in broken]
     if not found:
-        raise ActionError(f"no joint is named {action.joint!r}; {listed_names(_intact_joint_names(setup, broken))}")
+        raise ActionError(f"no joint is named {action.joint!r}; {listed_names(intact_joint_names(setup, broken))}")
     return [int(row) for row in setup.joints.whole(np.asarray(found))]
 
 
-def _intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
+def intact_joint_names(setup: Setup, broken: Mapping[int, float]) -> set[str]:
     """Return the names of the joints that are there."""
     first = setup.joints.part_of == setup.joints.number
     return {setup.joints.names[k] for k in np.flatnonzero(first).tolist() if k not in broken}
@@ -241,9 +245,20 @@ def events_from(setup: Setup) -> Iterator[Action]:
     return (event.at(event.time - setup.time) for event in setup.scene.events if event.time >= setup.time)
 
 
-def is_past(event: Action, setup: Setup, bodies: Bodies, frame: Frame, broken: Mapping[int, float]) -> bool:
-    """Return whether a body of an event, or the joint that it removes, has left."""
+def remaining_event(
+    event: Action, setup: Setup, bodies: Bodies, frame: Frame, broken: Mapping[int, float]
+) -> Action | None:
+    """Return an event without the motors that have left; None if its body, its joint or all its motors have left."""
     if isinstance(event, Unjoin):
-        return event.joint in setup.joints.names and event.joint not in _intact_joint_names(setup, broken)
+        has_left = event.joint in setup.joints.names and event.joint not in intact_joint_names(setup, broken)
+        return None if has_left else event
+    if isinstance(event, Actuate):
+        joints, is_present = setup.joints, np.append(frame.present, True)  # index −1, the world, is the last entry
+        both = (is_present[joints.a] & is_present[joints.b]).tolist()
+        remaining = {name for k, name in enumerate(joints.names) if both[k] and k not in broken}
+        left = set(joints.names) - remaining
+        levels = {name: level for name, level in event.levels.items() if name not in left}
+        return event.model_copy(update={"levels": levels}) if levels else None
     named = event.joint.between if isinstance(event, Join) else (getattr(event, "body", None),)
-    return any(name in bodies.names and not frame.present[bodies.names.index(name)] for name in named)
+    has_left = any(name in bodies.names and not frame.present[bodies.names.index(name)] for name in named)
+    return None if has_left else event

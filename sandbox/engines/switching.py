@@ -44,8 +44,9 @@ from sandbox.engines.session_actions import (
     added_joint,
     events_from,
     explosion_impulses,
-    is_past,
+    intact_joint_names,
     launch_state,
+    remaining_event,
     removed_joint,
 )
 from sandbox.frame_table import FrameTable
@@ -428,8 +429,9 @@ class SwitchableSimulation:
         now = self.time + ROUNDING * self.settings.dt  # as for actions
         if self._events.next > now:
             return
-        for event in self._events.due(now):
-            if is_past(event, self.setup, self.bodies, self.frame(), self.broken):
+        for due in self._events.due(now):
+            event = remaining_event(due, self.setup, self.bodies, self.frame(), self.broken)
+            if event is None:
                 continue
             try:
                 self.apply(event)
@@ -507,10 +509,12 @@ class SwitchableSimulation:
             self._segment.watch(self._observer)
 
     def _active_actions(self) -> PersistentActions:
-        """Return the persistent actions, without forces on bodies that have left the scene."""
+        """Return the persistent actions, without those on bodies and motors that have left the scene."""
         if self._persistent.forces:
             present = zip(self.bodies.names, self.frame().present.tolist(), strict=True)
             self._persistent.remove_forces(name for name, is_present in present if not is_present)
+        if self._persistent.motor_levels:
+            self._persistent.keep_motors(intact_joint_names(self.setup, self.broken))
         return self._persistent
 
     def frame(self) -> Frame:

@@ -155,6 +155,60 @@ def test_levels_of_motors_that_have_gone_are_left_out_in_a_switch() -> None:
     assert simulation.frame().angular_velocity[0] == 0.0
 
 
+@pytest.mark.parametrize("engine", MOTORED)
+def test_motor_that_is_joined_under_the_name_of_one_that_has_gone_starts_at_level_1(engine: str) -> None:
+    simulation = sandbox.start(flywheel(), engine)
+    simulation.apply(sandbox.Actuate(time=0.0, levels={"engine": 0.0}))
+    simulation.apply(sandbox.Unjoin(time=0.0, joint="engine"))
+    motor = sandbox.Motor(name="engine", between=("disc",), rate=50.0, max_torque=TORQUE)
+    simulation.apply(sandbox.Join(time=0.0, joint=motor))
+    for _ in range(10):
+        simulation.step()
+    expected = 0.1 * TORQUE / INERTIA
+    assert simulation.frame().angular_velocity[0] == pytest.approx(expected, abs=1e-5)  # box2d computes with floats
+
+
+@pytest.mark.parametrize("leaving", ['kind = "unjoin"\njoint = "engine"', 'kind = "remove"\nbody = "disc"'])
+def test_events_pass_over_motors_that_have_gone(leaving: str) -> None:
+    scene = sandbox.loads(
+        sandbox.dumps(flywheel())
+        + f"""
+        [[ball]]
+        name = "other"
+        position = [3.0, 0.0]
+        radius = 0.5
+        mass = 2.0
+        [[joint]]
+        name = "other engine"
+        kind = "motor"
+        between = ["other"]
+        rate = 50.0
+        max_torque = {TORQUE}
+        [[event]]
+        time = 0.0
+        kind = "actuate"
+        levels = {{ "other engine" = 0.0 }}
+        [[event]]
+        time = 0.1
+        {leaving}
+        [[event]]
+        time = 0.5
+        kind = "actuate"
+        levels = {{ engine = 0.5, "other engine" = 0.5 }}
+        """
+    )
+    run = sandbox.run(scene, "pymunk", actions=[sandbox.Switch(time=0.3, engine="reference")])
+    assert run.status == "ok"
+    expected = 0.5 * 0.5 * TORQUE / INERTIA  # in 0.5 s, at half the torque
+    assert run.angular_velocity[-1, 1] == pytest.approx(expected, abs=1e-9)  # rounding of 50 sums
+
+
+def test_event_that_actuates_a_joint_without_a_motor_is_refused() -> None:
+    event = '[[event]]\ntime = 0.0\nkind = "actuate"\nlevels = { joint-1 = 1.0 }'
+    with pytest.raises(sandbox.SceneError, match="'joint-1' has no motor"):
+        sandbox.loads(f"{sandbox.dumps(flywheel())}\n{event}")
+
+
 @pytest.mark.parametrize("levels", [{}, {"engine": 1.5}, {"engine": float("nan")}])
 def test_invalid_levels_are_refused(levels: dict[str, float]) -> None:
     with pytest.raises(PartError, match="levels"):

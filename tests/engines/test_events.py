@@ -131,6 +131,8 @@ def test_scene_with_events_is_written_and_read_again() -> None:
         ('kind="set"\npath="world.seed"\nvalue=1', "event[0].path", "world.gravity"),
         ('kind="throttle"\nthrust="t"\nlevel=1', "event[0].thrust", "none"),
         ('kind="unjoin"\njoint="j"', "event[0].joint", "none"),
+        ('kind="actuate"\nlevels={j=1.0}', "event[0].levels.j", "no motor is named 'j'"),
+        ('kind="actuate"\nlevels={}', "event[0].levels", "table that is not empty"),
         ('kind="join"\njoint={kind="rod", between=["a","q"]}', "event[0].joint.between[1]", "'a'"),
         ('kind="join"\njoint={kind="prismatic", between=["a"], axis=[0,0], travel=[0,1]}', "event[0].joint.axis", "no"),
         ('kind="join"\njoint={kind="weld", between=["a","a"]}', "event[0].joint.between", "twice"),
@@ -144,6 +146,20 @@ def test_invalid_events_are_refused(event: str, path: str, word: str) -> None:
     document = '[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n[[event]]\ntime=1.0\n' + event
     faults = faults_of(document)
     assert any(each.path == path and word in each.message for each in faults), faults
+
+
+@pytest.mark.parametrize(
+    ("element", "event"),
+    [
+        ('[[tyre]]\nname="t"\nbody="a"', 'kind="steer"\ntyre="t"'),  # without grip
+        ('[[joint]]\nname="t"\nkind="motor"\nbetween=["a"]', 'kind="actuate"\nlevels={t=1.0}'),  # without rate
+        ('[[joint]]\nname="t"\nkind="motor"\nbetween=["a"]', 'kind="unjoin"\njoint="t"'),
+    ],
+)
+def test_faulty_element_is_the_only_fault_of_a_scene_whose_events_name_it(element: str, event: str) -> None:
+    faults = faults_of(f'[[ball]]\nname="a"\nposition=[0,0]\nradius=1\n{element}\n[[event]]\ntime=1.0\n{event}')
+    assert len(faults) == 1
+    assert faults[0].path.startswith(("tyre.t", "joint.t"))
 
 
 def test_impulse_without_a_time_is_refused() -> None:

@@ -57,6 +57,13 @@ def test_thrust_with_a_key_is_off_until_a_throttle_action(engine):
 
 
 @every_engine
+def test_thrust_that_a_constant_force_balances_exactly_moves_nothing(engine):
+    simulation = sandbox.start(ship({}), engine)
+    simulation.apply(sandbox.Force(time=0.0, body="ship", force=(-4.0, 0.0)))
+    assert not advance(simulation, 10).frame().velocity.any()
+
+
+@every_engine
 def test_unknown_thrust_is_refused_with_the_known_names(engine):
     simulation = sandbox.start(ship({"name": "main"}, {}), engine)
     with pytest.raises(ActionError, match="no thrust is named 'mian'; known names: main, thrust-2"):

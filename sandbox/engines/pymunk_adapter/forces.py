@@ -189,7 +189,7 @@ class BodyThrusts:
         if constant is not None:
             force, constant_torque = constant
             x, y, torque = x + force[0], y + force[1], torque + constant_torque
-        if x or y or torque:  # pymunk resets them to 0 after each step
+        if x or y or torque or constant is not None:  # pymunk resets them to 0 after each step; constant ones are set
             lib.cpBodySetForce(self._record, (x, y))
             lib.cpBodySetTorque(self._record, torque)
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from sandbox.scene.compile.bodies import Bodies, start_pose
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.actions import Actuate, Timed
 from sandbox.scene.description.base import BodySpec, Part
 from sandbox.scene.description.bodies import Attached, Compound
 from sandbox.scene.description.forces import Attraction
@@ -201,6 +202,27 @@ def bodies_referred_to(element: Part) -> tuple[str, ...]:
     return tuple(name for _, name in body_references(element))
 
 
+_TABLES_OF_REFERENCE = {
+    "joint": ("joint",),
+    "thrust": ("thrust",),
+    "tyre": ("tyre",),
+    "drive": ("drive",),
+    "thing": ("wall", "post"),
+}
+"""Tables of the elements that an event names by a key"""
+
+
+def _event_references(element: Part) -> Iterator[tuple[Location, tuple[str, ...], str]]:
+    """Yield where an event names an element that is no body: path within the event, tables it can be in, and name."""
+    if isinstance(element, Actuate):
+        yield from ((("levels", name), ("joint",), name) for name in element.levels)
+    elif isinstance(element, Timed):
+        for key, tables in _TABLES_OF_REFERENCE.items():
+            name = getattr(element, key, None)
+            if isinstance(name, str):
+                yield (key,), tables, name
+
+
 def _material_references(element: Part) -> Iterator[tuple[Location, str]]:
     """Yield where an element names a material, as `body_references` does."""
     material = getattr(element, "material", None)
@@ -238,8 +260,16 @@ def removal_changes(scene: Scene, keys: Collection[ElementKey]) -> list[Change]:
             break
         gone |= more
         names |= {name for key in more for name in (*body_names(scene, key), name_of(scene, key))}
+    removed, levels = {(key.table, name_of(scene, key)) for key in gone}, list[Change]()
+    for key, element in all_elements(scene):
+        references = list(_event_references(element))
+        lost = [path for path, tables, name in references if any((table, name) in removed for table in tables)]
+        if lost and len(lost) == len(references):
+            gone.add(key)
+        else:  # the other levels of the event remain
+            levels += [RemoveValue((*key.location, *path)) for path in lost]
     roles = [RemoveValue(path[:3]) for path, name in _play_references(scene) if name in names]  # parts, or single keys
-    return [*roles, *_kept_names(scene, gone), *(RemoveElement(key.table, key.index) for key in sorted(gone))]
+    return [*roles, *levels, *_kept_names(scene, gone), *(RemoveElement(key.table, key.index) for key in sorted(gone))]
 
 
 def _kept_names(scene: Scene, gone: Collection[ElementKey]) -> Iterator[Change]:
@@ -249,6 +279,7 @@ def _kept_names(scene: Scene, gone: Collection[ElementKey]) -> Iterator[Change]:
     """
     referred = {name for _, element in all_elements(scene) for name in bodies_referred_to(element)}
     referred |= {name for _, name in _play_references(scene)}
+    referred |= {name for _, element in all_elements(scene) for _, _, name in _event_references(element)}
     for table in {key.table for key in gone}:
         first = min(key.index for key in gone if key.table == table)
         kept = [ElementKey(table, k) for k in range(len(elements_of_table(scene, table)))]
@@ -275,6 +306,13 @@ def renaming_changes(scene: Scene, key: ElementKey, name: str) -> list[Change]:
     for other, element in all_elements(scene):
         found = [(path, renamed[name]) for path, name in references(element) if name in renamed]
         changes += [SetValue((*other.location, *path), new) for path, new in found]
+        for path, tables, each in _event_references(element):
+            if key.table in tables and each == before:
+                where = (*other.location, *path)
+                if isinstance(element, Actuate):  # the name is a key
+                    changes += [RemoveValue(where), SetValue((*where[:-1], name), element.levels[each])]
+                else:
+                    changes.append(SetValue(where, name))
     roles = () if is_material else _play_references(scene)
     return [*changes, *(SetValue(path, renamed[each]) for path, each in roles if each in renamed)]
 

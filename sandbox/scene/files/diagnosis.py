@@ -81,6 +81,8 @@ def explain(details: Any) -> LocatedMessage:
         expected = "a table, such as { speed = 3.0 }"
     elif location[:1] == ("joint",) and location[-1] == "between":
         expected = 'the name of one body or of two, such as ["a", "b"]'
+    elif kind == "too_short" and isinstance(value, dict):
+        expected = "a table that is not empty"
     elif kind in ("too_short", "too_long") and location[-1] != "points":
         expected = f"an array of {_length(tuple(details['loc']), context)}"
     elif kind in _RANGES:
@@ -376,6 +378,9 @@ _COMMON_LOCATIONS = {("world",), ("solver",), ("play",)}
 REFERENCING_TABLES = {("joint",), ("attraction",), ("thrust",), ("tyre",), ("drive",), ("shot",), ("sensor",)}
 """Tables that refer to bodies, and to which nothing refers: faulty ones are omitted."""
 
+_NAMES_IN_EVENTS = ("joint", "levels", "thrust", "tyre", "drive")
+"""Keys with which events name elements of those tables"""
+
 PARTS = ("ball", "box", "capsule", "polygon")
 """Tables of the parts of a body, which needs at least one."""
 
@@ -400,7 +405,11 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
         return _faults_within(document, single)
     if () in wrong or any(location[:1] == (key,) for location in wrong for key in PRESETS):
         return []  # the document, or the preset that makes most of it, cannot be read
+    stated_elements = {key: document[key] for (key,) in REFERENCING_TABLES if key in document}
     kept = _without_faulty(document, wrong)
+    is_complete = all(
+        isinstance(each, list) and len(each) == len(kept.get(key, ())) for key, each in stated_elements.items()
+    )
     for location in wrong:
         if location[:1] in REFERENCING_TABLES:
             continue
@@ -438,6 +447,8 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
     except ValueError:
         return []
     found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or _is_independent(f[0])]
+    if not is_complete:  # events may name what was omitted
+        found = [f for f in found if f[0][0] != "event" or len(f[0]) < 3 or f[0][2] not in _NAMES_IN_EVENTS]
     if document is not stated:
         found = [(stated_location(location, document, stated), message) for location, message in found]
     return [(_original_index(location, kept), message) for location, message in found]

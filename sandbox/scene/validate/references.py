@@ -7,7 +7,7 @@ from sandbox.scene.compile.bodies import MOTION, Bodies
 from sandbox.scene.compile.drives import is_immovable, moment_of_mass, mount_of, single_bodies
 from sandbox.scene.compile.joints import ends_of
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.description.actions import SETTABLE, Join, SetParameter, Spawn, Unjoin, is_settable
+from sandbox.scene.description.actions import SETTABLE, Actuate, Join, SetParameter, Spawn, Unjoin, is_settable
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
@@ -83,6 +83,8 @@ def check_events(scene: Scene, bodies: Bodies, are_others_valid: bool) -> Iterat
     joins = [event.joint for event in scene.events if isinstance(event, Join)]
     own = scene.joint_arrays.names if are_others_valid else ()
     joints = {*own, *(joint.name for joint in joins if joint.name)}
+    joined_motors = {joint.name for joint in joins if joint.name and getattr(joint, "rate", None) is not None}
+    motors = joined_motors | (scene.joint_arrays.motor_rows.keys() if are_others_valid else set())
     for k, event in enumerate(scene.events):
         for key, names in known.items():
             name = getattr(event, key, None)
@@ -90,6 +92,10 @@ def check_events(scene: Scene, bodies: Bodies, are_others_valid: bool) -> Iterat
                 yield ("event", k, key), f"no {key} is named {name!r}; {listed_names(names)}"
         if are_others_valid and isinstance(event, Unjoin) and event.joint not in joints:
             yield ("event", k, "joint"), f"no joint is named {event.joint!r}; {listed_names(joints)}"
+        if are_others_valid and isinstance(event, Actuate):
+            for name in sorted(event.levels.keys() - motors):
+                fault = f"the joint {name!r} has no motor" if name in joints else f"no motor is named {name!r}"
+                yield ("event", k, "levels", name), f"{fault}; {listed_names(motors)}"
         if isinstance(event, Join):
             for side, name in enumerate(event.joint.between):
                 if name not in known["body"]:

@@ -138,6 +138,63 @@ def test_renaming_follows_references(draft: SceneDraft) -> None:
     assert [joint.between[0] for joint in draft.scene.joints] == ['body "one"'] * 2
 
 
+EVENTS = """
+[[ball]]
+name = "car"
+position = [0, 0]
+radius = 1
+[[ball]]
+name = "disc"
+position = [9, 0]
+radius = 1
+[[tyre]]
+name = "rear"
+body = "car"
+grip = 2.0
+[[joint]]
+name = "rear"
+kind = "motor"
+between = ["disc"]
+rate = 1.0
+[[joint]]
+name = "front"
+kind = "motor"
+between = ["car"]
+rate = 1.0
+[[event]]
+time = 0.1
+kind = "steer"
+tyre = "rear"
+throttle = 1.0
+[[event]]
+time = 0.2
+kind = "actuate"
+levels = { rear = 0.5, front = 0.25 }
+[[event]]
+time = 0.3
+kind = "unjoin"
+joint = "front"
+"""
+
+
+def test_removal_takes_the_events_of_tyres_and_joints() -> None:
+    draft = SceneDraft(EVENTS)
+    draft.change(removal_changes(draft.scene, [ElementKey("ball", 0)]), "delete")
+    assert [event.kind for event in draft.scene.events] == ["actuate"]
+    assert getattr(draft.scene.events[0], "levels", None) == {"rear": 0.5}
+    draft.change(removal_changes(draft.scene, [ElementKey("joint", 0)]), "delete")
+    assert not draft.scene.events
+
+
+def test_renaming_a_tyre_or_a_joint_follows_the_events() -> None:
+    draft = SceneDraft(EVENTS)
+    draft.change(renaming_changes(draft.scene, ElementKey("tyre", 0), "driven"), "rename")
+    draft.change(renaming_changes(draft.scene, ElementKey("joint", 1), "engine 1"), "rename")
+    assert draft.text == EVENTS.replace('name = "rear"\nbody', 'name = "driven"\nbody').replace(
+        'tyre = "rear"', 'tyre = "driven"'
+    ).replace('"front"', '"engine 1"').replace("front = 0.25", '"engine 1" = 0.25')
+
+
 def test_material_of_a_part_is_renamed_with_it() -> None:
     draft = SceneDraft(
         '[[material]]\nname = "a"\n[[body]]\nposition = [0, 0]\nball = [{ radius = 1, material = "a" }]\n'
