@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from sandbox.action import Action, ActionError, Switch, actions_from_json, actions_to_json
 from sandbox.atomic_write import atomic_write
 from sandbox.echo import short_repr
+from sandbox.game_inputs import GameInputs, inputs_from_json, inputs_to_json
 from sandbox.jsonable import to_json
 from sandbox.resource_limits import SESSION_SIZE, read_limited
 from sandbox.scene.compile.scene import Scene
@@ -97,6 +98,8 @@ class Recording:
     """score of a game at the end; None if unknown"""
     game: RecordedGame | None = None
     """the program, if the session is that of a game outside the sandbox"""
+    inputs: GameInputs | None = field(default=None, repr=False)
+    """inputs of the program, with which it can run again; None if they are unknown"""
     at: float | None = field(default=None, compare=False)
     """s, time to which the session had been rewound when it was saved; None if it was saved at its end"""
 
@@ -157,6 +160,8 @@ class Recording:
             document |= {"presses": [list(press) for press in self.presses], "score": self.score}
         if self.game is not None:
             document["game"] = to_json(self.game)
+        if self.inputs is not None:
+            document["inputs"] = inputs_to_json(self.inputs)
         if self.at is not None:
             document["at"] = self.at
         return json.dumps(document, indent=1, ensure_ascii=False)
@@ -193,6 +198,7 @@ class Recording:
                 presses=presses_from(_part(document, "presses", list, [])),
                 score=_part(document, "score", (int, float, type(None)), None),
                 game=_game_from(_part(document, "game", (dict, type(None)), None)),
+                inputs=_inputs_from(_part(document, "inputs", (dict, type(None)), None)),
                 at=None if at is None else float(at),
             )
         except ActionError as error:
@@ -266,6 +272,10 @@ def _game_from(value: Mapping[str, Any] | None) -> RecordedGame | None:
     except ValidationError as error:
         first = error.errors()[0]
         raise ValueError(f"`game`: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+
+
+def _inputs_from(value: Mapping[str, Any] | None) -> GameInputs | None:
+    return None if value is None else inputs_from_json(value)
 
 
 def presses_from(values: Sequence[Any]) -> tuple[Press, ...]:

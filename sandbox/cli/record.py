@@ -1,17 +1,18 @@
 """Command `record`: play a game that uses pymunk, and keep the session as a recording."""
 
 import contextlib
+import os
 import runpy
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sandbox.cli.common import exit_with_errors, reasons_not_writable
+from sandbox.cli.common import collect_errors, exit_with_errors, reasons_not_writable
 from sandbox.cli.options import json_option, quiet_option
 from sandbox.cli.progress import progress_bars
 from sandbox.cli.streams import print_json
@@ -24,9 +25,10 @@ from sandbox.scene.errors import Fault
 
 if TYPE_CHECKING:
     from sandbox.pymunk_capture.game_capture import GameCapture
+    from sandbox.rehearsal.input_script import InputScript
 
 
-OWN_OPTIONS = ("--to", "--force", "--steps", "--json", "--quiet")
+OWN_OPTIONS = ("--to", "--force", "--script", "--steps", "--json", "--quiet")
 """Options of this command, which a game after whose name they stand gets instead"""
 
 
@@ -67,6 +69,12 @@ class RecordDocument:
 @click.argument("arguments", nargs=-1, type=click.UNPROCESSED, metavar="[ARGUMENTS]…")
 @click.option("--to", "target", metavar="FILE", help="recording to write; default: GAME.json in the working folder")
 @click.option("--force", is_flag=True, help="replace an existing file")
+@click.option(
+    "--script",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="play without a window, on a virtual clock, with the keys and the mouse of a script of inputs (TOML)",
+)
 @click.option("--steps", type=click.IntRange(min=1), metavar="N", help="end the game after so many steps of its space")
 @json_option
 @quiet_option("print no summary; remarks are printed")
@@ -75,6 +83,7 @@ def record_command(
     arguments: tuple[str, ...],
     target: str | None,
     force: bool,
+    script: Path | None,
     steps: int | None,
     as_json: bool,
     quiet: bool,
@@ -89,9 +98,12 @@ def record_command(
     """
     path = Path(target) if target is not None else Path(f"{Path(game).stem}.json")
     faults = _faults(game, path, force)
+    played: InputScript | None = None
+    with collect_errors(faults):
+        played = None if script is None else _loaded(script)
     if faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game)))
-    from sandbox.pymunk_capture.game_capture import capture
+    from sandbox.pymunk_capture.game_capture import StepLimitReached, capture
     from sandbox.pymunk_capture.space_capture import CaptureError
 
     misplaced = [each for each in arguments if each.partition("=")[0] in OWN_OPTIONS]
@@ -99,13 +111,21 @@ def record_command(
         click.echo(
             f"{game}: {', '.join(misplaced)}: passed to the game; options of this command come before GAME.py", err=True
         )
+    from sandbox.rehearsal.surroundings import InputRecorder, started_as
+
     ended: str | None = None
-    status = 0
-    with capture(max_steps=steps) as captured, _started_as(game, arguments, is_quiet=as_json):
+    status, is_whole = 0, False
+    inputs = InputRecorder(game, arguments, played)
+    output = contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext()
+    # Standard output is for the JSON document then.
+    with capture(max_steps=steps) as captured, inputs.recording(), started_as(game, arguments), output:
         try:
             runpy.run_path(game, run_name="__main__")
+            is_whole = True
+        except StepLimitReached:
+            pass
         except SystemExit:
-            pass  # the usual end of a game
+            is_whole = True  # the usual end of a game
         except KeyboardInterrupt:
             ended, status = "interrupted", 130
         except CaptureError as error:
@@ -118,8 +138,11 @@ def record_command(
     recording: Recording | None = None
     if not faults:
         try:
-            captured.recording.save(path)  # before the replay, which may take as long as the game
+            known = inputs.inputs(is_whole=is_whole)
+            # before the replay, which may take as long as the game
+            replace(captured.recording, inputs=known).save(path)
             recording = _with_title(_checked(captured, as_json or quiet), Path(game).stem)
+            recording = replace(recording, inputs=known)
             recording.save(path)
         except CaptureError as error:
             faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
@@ -200,16 +223,13 @@ def _faults(game: str, path: Path, force: bool) -> list[Fault]:
     return found
 
 
-@contextlib.contextmanager
-def _started_as(game: str, arguments: Sequence[str], *, is_quiet: bool) -> Iterator[None]:
-    """Give a program the arguments and the import path that the interpreter would give it."""
-    before = sys.argv, sys.path[:]
-    folder = Path(game).resolve()
-    sys.argv = [game, *arguments]
-    sys.path.insert(0, str(folder if folder.is_dir() else folder.parent))
-    output = contextlib.redirect_stdout(sys.stderr) if is_quiet else contextlib.nullcontext()
-    try:
-        with output:  # standard output is for the JSON document
-            yield
-    finally:
-        sys.argv, sys.path[:] = before[0], before[1]
+def _loaded(script: Path) -> "InputScript":
+    """Read a script of inputs; the program shows no window then.
+
+    Raises:
+        SceneError: it cannot be read, or has faults.
+    """
+    os.environ |= {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
+    from sandbox.rehearsal.input_script import load_script
+
+    return load_script(script)

@@ -1,0 +1,228 @@
+"""Log of the pymunk spaces of a game: states of all bodies after each frame, and the calls of collision callbacks.
+
+Bodies, shapes and joints have numbers in the order in which the game adds them to its spaces, so that they are found
+again in another run.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+from unittest.mock import patch
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import pymunk
+from pymunk.batch import BodyFields, Buffer, get_space_bodies
+
+from sandbox.arrays import FloatArray, IntArray
+
+PHASES = ("begin", "pre_solve", "post_solve", "separate")
+FIELDS = BodyFields.BODY_ID | BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+WIDTH = 6
+HASH_BYTES = 4
+WORLD = -1
+"""Number of the static body of a space"""
+
+
+class CallbackCall(NamedTuple):
+    """Call of a collision callback of a game."""
+
+    frame: int
+    callback: int
+    """number of the callback"""
+    shapes: tuple[int, int]
+    """numbers of the two shapes, the smaller first"""
+    calls: int
+    """calls of this kind in the frame"""
+
+
+class LoggedFrame(NamedTuple):
+    """States of all bodies at the end of a frame."""
+
+    bodies: IntArray
+    """(N,) numbers of the bodies, ascending"""
+    states: FloatArray
+    """(N, 6) x, y, angle, velocity and angular velocity, in units of the game"""
+
+
+@dataclass(frozen=True)
+class CallbackName:
+    """Callback of a game."""
+
+    function: str
+    """qualified name"""
+    types: tuple[int | None, int | None]
+    """collision types; None for any"""
+    phase: str
+    """`begin`, `pre_solve`, `post_solve` or `separate`"""
+
+
+class SpaceLog:
+    """Log of all spaces of a program.
+
+    Args:
+        keeps_states: whether it keeps the states of each frame, or their hashes only.
+    """
+
+    def __init__(self, *, keeps_states: bool = True) -> None:
+        self.frame = 0
+        self.frames: list[LoggedFrame] = []
+        self.hashes: list[str] = []
+        self.callbacks: dict[CallbackName, int] = {}
+        """number of each callback"""
+        self.calls: dict[tuple[int, int, tuple[int, int]], int] = {}
+        """calls by frame, callback and shapes, in order"""
+        self.steps = 0
+        """calls of `Space.step`"""
+        self._keeps_states = keeps_states
+        self._stepped: dict[pymunk.Space, None] = {}  # since the end of the last frame
+        self.numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()
+        """number of each body, shape and joint"""
+        self._counts = {pymunk.Body: 0, pymunk.Shape: 0, pymunk.Constraint: 0}
+        self._by_id: dict[int, int] = {}
+        self.shape_bodies: list[int] = []
+        """number of the body of each shape; `WORLD` for the static body of a space"""
+        self._buffer = Buffer()
+
+    @property
+    def is_stepped(self) -> bool:
+        """Whether a space has made a step since the end of the last frame."""
+        return bool(self._stepped)
+
+    def has_stepped(self, space: pymunk.Space) -> bool:
+        """Return whether a space has made a step since the end of the last frame."""
+        return space in self._stepped
+
+    def note_step(self, space: pymunk.Space) -> None:
+        """Note that a space makes a step."""
+        self._stepped[space] = None
+        self.steps += 1
+
+    def note_added(self, objects: tuple[Any, ...]) -> None:
+        """Number objects that are added to a space."""
+        for each in objects:
+            if isinstance(each, (list, tuple, set)):
+                self.note_added(tuple(each))
+            else:
+                self._number(each)
+
+    def _number(self, thing: Any) -> int:
+        known = self.numbers.get(thing)
+        if known is not None:
+            return known
+        kind = next((kind for kind in self._counts if isinstance(thing, kind)), None)
+        if kind is None:
+            return -1
+        number = self.numbers[thing] = self._counts[kind]
+        self._counts[kind] += 1
+        if isinstance(thing, pymunk.Body):
+            self._by_id[thing.id] = number
+        elif isinstance(thing, pymunk.Shape):
+            body = thing.body
+            is_world = body is None or body is getattr(body.space, "static_body", None)
+            self.shape_bodies.append(WORLD if is_world or body is None else self._number(body))
+        return number
+
+    def note_call(self, callback: int, arbiter: pymunk.Arbiter) -> None:
+        """Note a call of a callback."""
+        a, b = (self._number(shape) for shape in arbiter.shapes)
+        key = self.frame, callback, (min(a, b), max(a, b))
+        self.calls[key] = self.calls.get(key, 0) + 1
+
+    def end_frame(self) -> None:
+        """Keep the states at the end of the frame, of the spaces that have made a step in it."""
+        rows, numbers = [], []
+        for space in self._stepped:
+            buffer = self._buffer
+            buffer.clear()
+            get_space_bodies(space, FIELDS, buffer)
+            ids = np.frombuffer(buffer.int_buf(), np.uintp)
+            if not len(ids):
+                continue
+            numbers.append(np.array([self._number_of_id(each, space) for each in ids.tolist()]))
+            rows.append(np.frombuffer(buffer.float_buf(), np.float64).reshape(-1, WIDTH).copy())
+        bodies = np.concatenate(numbers) if numbers else np.empty(0, np.int64)
+        states = np.concatenate(rows) if rows else np.empty((0, WIDTH))
+        order = np.argsort(bodies, kind="stable")
+        order = order[bodies[order] != WORLD]
+        found = LoggedFrame(bodies[order], states[order])
+        if self._keeps_states:
+            self.frames.append(found)
+        content = found.bodies.tobytes() + found.states.tobytes()
+        self.hashes.append(hashlib.blake2b(content, digest_size=HASH_BYTES).hexdigest())
+        self.frame += 1
+        self._stepped.clear()
+
+    def _number_of_id(self, identity: int, space: pymunk.Space) -> int:
+        if identity not in self._by_id:  # a body that no call of `Space.add` has added, as in a copy of a space
+            for body in space.bodies:
+                self._by_id[body.id] = self._number(body)
+        return self._by_id.get(identity, WORLD)
+
+
+class LoggedCallback:
+    """Collision callback of a game whose calls are logged. It can be copied and pickled if the callback can."""
+
+    active: ClassVar[SpaceLog | None] = None
+    """log of the running game"""
+
+    def __init__(self, function: Callable[..., Any], number: int) -> None:
+        self._function, self._number = function, number
+
+    def __call__(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: Any) -> Any:
+        """Log the call, and make it."""
+        if LoggedCallback.active is not None:
+            LoggedCallback.active.note_call(self._number, arbiter)
+        return self._function(arbiter, space, data)
+
+
+@contextmanager
+def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) -> Iterator[None]:
+    """Log all pymunk spaces that are stepped within a `with` block.
+
+    Args:
+        log: to which frames and calls are added.
+        before_step: called before each step of the game.
+    """
+    step, add, on_collision = pymunk.Space.step, pymunk.Space.add, pymunk.Space.on_collision
+
+    def stepped(space: pymunk.Space, dt: float) -> None:
+        if dt:  # pymunk makes no step of length 0
+            before_step(space)
+            log.note_step(space)
+        step(space, dt)
+
+    def added(space: pymunk.Space, *objects: Any) -> None:
+        add(space, *objects)
+        log.note_added(objects)
+
+    def registered(
+        space: pymunk.Space,
+        collision_type_a: int | None = None,
+        collision_type_b: int | None = None,
+        begin: Any = None,
+        pre_solve: Any = None,
+        post_solve: Any = None,
+        separate: Any = None,
+        data: Any = None,
+    ) -> None:
+        given = dict(zip(PHASES, (begin, pre_solve, post_solve, separate), strict=True))
+        for phase, function in given.items():
+            if function is None or function is pymunk.empty_callback or isinstance(function, LoggedCallback):
+                continue
+            text = getattr(function, "__qualname__", type(function).__qualname__)
+            name = CallbackName(text.replace("<locals>.", ""), (collision_type_a, collision_type_b), phase)
+            given[phase] = LoggedCallback(function, log.callbacks.setdefault(name, len(log.callbacks)))
+        on_collision(space, collision_type_a, collision_type_b, **given, data=data)
+
+    LoggedCallback.active = log
+    try:
+        with ExitStack() as stack:
+            stack.enter_context(patch.object(pymunk.Space, "step", stepped))
+            stack.enter_context(patch.object(pymunk.Space, "add", added))
+            stack.enter_context(patch.object(pymunk.Space, "on_collision", registered))
+            yield
+    finally:
+        LoggedCallback.active = None
