@@ -88,6 +88,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         # The order of `separate` callbacks within a step follows the addresses of shapes in memory.
         "calls": [[frame, callback, *shapes, count] for (frame, callback, shapes), count in sorted(log.calls.items())],
         "shape_bodies": log.shape_bodies,
+        "changes": log.changes,
+        "body_names": sorted(log.body_names.items()),
         "hashes": log.hashes,
         "steps": log.steps,
         "ended": ended,
