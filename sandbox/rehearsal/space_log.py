@@ -20,6 +20,7 @@ import pymunk
 from pymunk.batch import BodyFields, Buffer, get_space_bodies
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.rehearsal.step_settings import SPACE_ATTRIBUTES
 from sandbox.rehearsal.variable_names import body_names, type_name
 
 PHASES = ("begin", "pre_solve", "post_solve", "separate")
@@ -38,6 +39,29 @@ class Change(NamedTuple):
     is_joint: bool
     number: int
     """number of the body or of the joint"""
+
+
+class ShapeForm(NamedTuple):
+    """Form of a shape, relative to its body."""
+
+    kind: str
+    """`circle`, `segment` or `polygon`"""
+    points: tuple[tuple[float, float], ...]
+    """centre of a circle, ends of a segment, vertices of a polygon"""
+    radius: float
+    is_sensor: bool
+
+    @classmethod
+    def of(cls, shape: pymunk.Shape) -> "ShapeForm":
+        """Return the form of a shape."""
+        if isinstance(shape, pymunk.Circle):
+            kind, points = "circle", [shape.offset]
+        elif isinstance(shape, pymunk.Segment):
+            kind, points = "segment", [shape.a, shape.b]
+        else:
+            assert isinstance(shape, pymunk.Poly)
+            kind, points = "polygon", shape.get_vertices()
+        return cls(kind, tuple((each.x, each.y) for each in points), shape.radius, shape.sensor)
 
 
 class LoggedFrame(NamedTuple):
@@ -82,6 +106,8 @@ class SpaceLog:
         self._stepped: dict[pymunk.Space, None] = {}  # since the end of the last frame
         self.shape_bodies: list[int] = []
         """number of the body of each shape; `WORLD` for the static body of a space"""
+        self.shapes: list[ShapeForm] = []
+        """form of each shape, when the game adds it"""
         self.changes: list[Change] = []
         """bodies and joints that the game adds and removes, in order"""
         self.body_names: dict[int, str] = {}
@@ -90,6 +116,16 @@ class SpaceLog:
         self._counts: Counter[str] = Counter()
         self._by_id: dict[int, int] = {}  # number of a body by its id, which the batch functions of pymunk know
         self._present: WeakSet[Any] = WeakSet()
+        self.dts: list[float] = []
+        """arguments of `Space.step`, s"""
+        self.step_calls: Counter[tuple[str, int]] = Counter()
+        """calls of `Space.step` by file and line"""
+        self.settings: dict[str, float] = {}
+        """settings of the space that makes the first step, by the names of `StepSettings`"""
+        self.impulse_readers: set[int] = set()
+        """numbers of the callbacks that read the impulse or the energy of a contact"""
+        self.running: int | None = None
+        """number of the callback that runs"""
         self._buffer = Buffer()
 
     @property
@@ -101,10 +137,14 @@ class SpaceLog:
         """Return whether a space has made a step since the end of the last frame."""
         return space in self._stepped
 
-    def note_step(self, space: pymunk.Space) -> None:
+    def note_step(self, space: pymunk.Space, dt: float, caller: FrameType) -> None:
         """Note that a space makes a step."""
+        if not self.steps:
+            self._note_start(space, caller)
         self._stepped[space] = None
         self.steps += 1
+        self.dts.append(dt)
+        self.step_calls[caller.f_code.co_filename, caller.f_lineno] += 1
 
     def note_added(self, objects: tuple[Any, ...]) -> None:
         """Number objects that are added to a space, and note those that the game adds later."""
@@ -121,9 +161,12 @@ class SpaceLog:
                 self._present.discard(each)
                 self._note_change(each, is_added=False)
 
-    def note_names(self, frame: FrameType) -> None:
-        """Note the names of bodies in the code that makes the first step."""
-        for body, name in body_names(frame):
+    def _note_start(self, space: pymunk.Space, caller: FrameType) -> None:
+        """Note settings, and the names of bodies in the code that makes the first step."""
+        self.settings = {name: getattr(space, attribute) for name, attribute in SPACE_ATTRIBUTES.items()}
+        if space.constraints:
+            self.settings["joint_bias"] = max(joint.error_bias for joint in space.constraints)
+        for body, name in body_names(caller):
             self.body_names.setdefault(self._number(body), name)
 
     def _note_change(self, thing: pymunk.Body | pymunk.Constraint, *, is_added: bool) -> None:
@@ -145,6 +188,7 @@ class SpaceLog:
             body = thing.body
             is_world = body is None or (body.space is not None and body is body.space.static_body)
             self.shape_bodies.append(WORLD if is_world or body is None else self._number(body))
+            self.shapes.append(ShapeForm.of(thing))
         return number
 
     def note_call(self, callback: int, arbiter: pymunk.Arbiter) -> None:
@@ -199,9 +243,15 @@ class LoggedCallback:
 
     def __call__(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: Any) -> Any:
         """Log the call, and make it."""
-        if LoggedCallback.active is not None:
-            LoggedCallback.active.note_call(self._number, arbiter)
-        return self._function(arbiter, space, data)
+        log = LoggedCallback.active
+        if log is None:
+            return self._function(arbiter, space, data)
+        log.note_call(self._number, arbiter)
+        log.running = self._number
+        try:
+            return self._function(arbiter, space, data)
+        finally:
+            log.running = None
 
 
 @contextmanager
@@ -217,10 +267,8 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
 
     def stepped(space: pymunk.Space, dt: float) -> None:
         if dt:  # pymunk makes no step of length 0
-            if not log.steps:
-                log.note_names(sys._getframe(1))
             before_step(space)
-            log.note_step(space)
+            log.note_step(space, dt, sys._getframe(1))
         step(space, dt)
 
     def added(space: pymunk.Space, *objects: Any) -> None:
@@ -252,9 +300,22 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
             given[phase] = LoggedCallback(function, log.callbacks.setdefault(name, len(log.callbacks)))
         on_collision(space, collision_type_a, collision_type_b, **given, data=data)
 
+    def noting(own: property) -> property:
+        assert own.fget is not None
+        read = own.fget
+
+        def value(arbiter: pymunk.Arbiter) -> Any:
+            if log.running is not None:
+                log.impulse_readers.add(log.running)
+            return read(arbiter)
+
+        return property(value)
+
     LoggedCallback.active = log
     try:
         with ExitStack() as stack:
+            for name in ("total_impulse", "total_ke"):
+                stack.enter_context(patch.object(pymunk.Arbiter, name, noting(getattr(pymunk.Arbiter, name))))
             stack.enter_context(patch.object(pymunk.Space, "step", stepped))
             stack.enter_context(patch.object(pymunk.Space, "add", added))
             stack.enter_context(patch.object(pymunk.Space, "remove", removed))
