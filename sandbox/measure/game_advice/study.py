@@ -5,7 +5,7 @@ All runs are rehearsals, each in a process of its own, as many at a time as the 
 
 import os
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -269,7 +269,7 @@ class GameStudy:
         return tuple(SettingChange(names[_key(each.changed)], each) for each in measured)
 
     def _tried(self, own: Rehearsal, changes: Sequence[SettingChange], truth: Truth) -> list[GameSetting]:
-        """Return settings with more substeps, up to a few that are within the tolerance, and those with other iterations."""
+        """Return settings with more substeps, until a few are within the tolerance, and with other iterations."""
         iterations = int(own.own_settings.get("iterations", 10))
         cores = os.cpu_count() or 1
         tried: list[GameSetting] = []
@@ -295,7 +295,7 @@ class GameStudy:
         highest = max((_cost(each.substeps, each.iterations / iterations) for each in within), default=float("inf"))
         costs = {each: _cost(each[0], each[1] / iterations) for each in counts}
         left_counts = sorted((each for each in costs if costs[each] < highest), key=costs.__getitem__)
-        while left_counts and self._time_left > SEARCH * self._time_limit:
+        while left_counts and self._time_left > end:
             batch, left_counts = left_counts[:cores], left_counts[cores:]
             tried += self._settings([StepSettings(substeps=n, iterations=k) for n, k in batch], truth)
         return tried
