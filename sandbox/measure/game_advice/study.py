@@ -277,9 +277,8 @@ class GameStudy:
         known = {each.setting.substeps for each in changes if each.setting.changed.keys() == {"substeps"}}
         left = [each for each in SUBSTEPS if each not in known and each < truth.run.settings.substeps]
         self._report("substeps")
-        while (
-            left and sum(each.substeps > 1 for each in within) < ENOUGH and self._time_left > SEARCH * self._time_limit
-        ):
+        end = SEARCH * self._time_limit
+        while left and sum(each.substeps > 1 for each in within) < ENOUGH and self._time_left > end:
             found = self._settings([StepSettings(substeps=each) for each in left[:cores]], truth)
             left = left[cores:]
             tried += found
