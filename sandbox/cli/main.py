@@ -36,6 +36,7 @@ COMMANDS = {
     "extremes": ("extremes:extremes_command", "find the limits of each engine: mass ratio, speed, stack height, …"),
     "report": ("report:report_command", "compare many scenes and write one HTML page: errors, costs, replays"),
     "record": ("record:record_command", "play a game that uses pymunk, and keep the session as a recording"),
+    "rehearse": ("rehearse:rehearse_command", "run a recorded pymunk game again, with other settings of its physics"),
     "import": ("import_level:import_command", "convert a level (.svg of Inkscape, .tmx of Tiled) to a scene file"),
     "check": ("check:check_command", "validate scenes and predict numerical problems before a run"),
     "warm": ("warm:warm_command", "compile all functions in advance, so that nothing waits for it later"),

@@ -119,7 +119,7 @@ class Rehearsal:
     seconds: float
     """wall-clock time of the run, s"""
     step_seconds: float
-    """part of it in `Space.step`, with the callbacks of the game, s"""
+    """processor time of `Space.step`, with the callbacks of the game, s"""
     output: str = field(repr=False)
     """what the game printed"""
     notes: tuple[str, ...] = ()

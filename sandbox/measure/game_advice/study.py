@@ -128,8 +128,7 @@ class GameStudy:
             changes = self._changes(own, truth)
             tried = self._tried(own, changes, truth)
             candidates = [present, *(each.setting for each in changes), *tried]
-            recommended, plays = self._recommended(own, candidates, truth)
-            best = recommended or min(candidates, key=lambda each: (each.lost, _error(each)))
+            recommended, best, plays = self._recommended(own, candidates, truth)
             self.shown = {"truth": truth.run, "present": own}
             if best.changed:
                 name = "most accurate" if recommended is None else "recommended"
@@ -301,12 +300,14 @@ class GameStudy:
 
     def _recommended(
         self, own: Rehearsal, candidates: Sequence[GameSetting], truth: Truth
-    ) -> tuple[GameSetting | None, PlaysHeld | None]:
-        """Return the cheapest setting that keeps to the tolerance, also in plays that differ a little, and its odds."""
+    ) -> tuple[GameSetting | None, GameSetting, PlaysHeld]:
+        """Return the cheapest setting that keeps to the tolerance, also in plays that differ a little.
+
+        Returns:
+            It, or None; the setting to choose, which without it is the most accurate one; the odds of the latter.
+        """
         iterations = int(own.own_settings.get("iterations", 10))
         plays = self._plays(truth)
-        if not plays:
-            return None, None
         present = sum(self._held(StepSettings(), plays))
         within = sorted(
             {_key(each.changed): each for each in candidates if each.is_within}.values(),
@@ -316,11 +317,15 @@ class GameStudy:
         for each in within:
             held = sum(self._held(StepSettings(**_given(each)), plays))
             if held >= HELD * len(plays):
-                return each, self._odds(present, held, plays)
-            best = best or (held, each)
+                return each, each, self._odds(present, held, plays)
+            if best is None or held > best[0]:
+                best = held, each
             if self._time_left <= 0.0:
                 break
-        return None, self._odds(present, None, plays)
+        if best is None:
+            most_accurate = min(candidates, key=lambda each: (each.lost, _error(each)))
+            return None, most_accurate, self._odds(present, None, plays)
+        return None, best[1], self._odds(present, best[0], plays)
 
     def _odds(self, present: int, held: int | None, plays: Sequence[tuple[_Play, Truth]]) -> PlaysHeld:
         return PlaysHeld(
@@ -362,7 +367,7 @@ class GameStudy:
         recommended: GameSetting | None,
         best: GameSetting,
         changes: tuple[SettingChange, ...],
-        plays: PlaysHeld | None,
+        plays: PlaysHeld,
         tried: Sequence[GameSetting],
     ) -> GameAdvice:
         self._report("timing")
