@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sandbox.cli.common import exit_with_errors, reasons_not_writable
-from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.options import json_option, pymunk6_option, quiet_option
 from sandbox.cli.progress import progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from sandbox.pymunk_capture.game_capture import GameCapture
 
 
-OWN_OPTIONS = ("--to", "--force", "--steps", "--json", "--quiet")
+OWN_OPTIONS = ("--to", "--force", "--steps", "--pymunk6", "--json", "--quiet")
 """Options of this command, which a game after whose name they stand gets instead"""
 
 
@@ -68,6 +68,7 @@ class RecordDocument:
 @click.option("--to", "target", metavar="FILE", help="recording to write; default: GAME.json in the working folder")
 @click.option("--force", is_flag=True, help="replace an existing file")
 @click.option("--steps", type=click.IntRange(min=1), metavar="N", help="end the game after so many steps of its space")
+@pymunk6_option
 @json_option
 @quiet_option("print no summary; remarks are printed")
 def record_command(
@@ -76,6 +77,7 @@ def record_command(
     target: str | None,
     force: bool,
     steps: int | None,
+    pymunk6: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -92,6 +94,8 @@ def record_command(
     if faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game)))
     from sandbox.pymunk_capture.game_capture import capture
+    from sandbox.pymunk_capture.pymunk6 import pymunk6_names
+    from sandbox.pymunk_capture.removed_names import removed_name
     from sandbox.pymunk_capture.space_capture import CaptureError
 
     misplaced = [each for each in arguments if each.partition("=")[0] in OWN_OPTIONS]
@@ -100,8 +104,10 @@ def record_command(
             f"{game}: {', '.join(misplaced)}: passed to the game; options of this command come before GAME.py", err=True
         )
     ended: str | None = None
+    removed: Fault | None = None  # a name that pymunk 7 lacks, where the game uses it
     status = 0
-    with capture(max_steps=steps) as captured, _started_as(game, arguments, is_quiet=as_json):
+    names = pymunk6_names() if pymunk6 else contextlib.nullcontext()
+    with names, capture(max_steps=steps) as captured, _started_as(game, arguments, is_quiet=as_json):
         try:
             runpy.run_path(game, run_name="__main__")
         except SystemExit:
@@ -113,7 +119,13 @@ def record_command(
         except Exception as error:  # noqa: BLE001, of the user's program
             traceback.print_exc()
             ended, status = f"{type(error).__name__}: {error}", 1
-    if not captured.spaces and not faults:
+            found = removed_name(error)
+            if found is not None:
+                removed = Fault(_file_name(found.file, game), found.line, "", found.sentence)
+                ended = str(removed)
+    if not captured.spaces and not faults and removed is not None:
+        faults = [removed]
+    elif not captured.spaces and not faults:
         faults = [Fault.of(game, "no pymunk space made a step, so that there is nothing to record")]
     recording: Recording | None = None
     if not faults:
@@ -155,7 +167,17 @@ def record_command(
             click.echo(replay_sentence(recording.scene, check))
     for each in document.remarks:
         click.echo(f"{game}: {each}", err=True)
+    if removed is not None:
+        click.echo(str(removed), err=True)
     return status
+
+
+def _file_name(file: str, game: str) -> str:
+    """Return the name of a file of a program: the game as the user named it, others from the working folder."""
+    path = Path(file).resolve()
+    if path == Path(game).resolve():
+        return game
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
 
 
 def _checked(captured: "GameCapture", is_silent: bool) -> Recording:
