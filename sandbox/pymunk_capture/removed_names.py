@@ -99,7 +99,7 @@ def _missing_list(error: BaseException, file: str, line: int) -> str | None:
     found = VIEWS.search(linecache.getline(file, line))
     if found is None or not (is_view or changes):
         return None
-    return f"{found[0]} is a view of the space in pymunk 7; add {OPTION}, or use list({found[0]})"
+    return f"it uses {found[0]} as a list or set, which is a view in pymunk 7; add {OPTION}, or use list({found[0]})"
 
 
 def _dropped(name: str, successor: str) -> str:

@@ -4,13 +4,13 @@
     python -m tools.oracles.pymunk6 FOLDER [--games 300] [--write]
 
 A game of a seed has discs, boxes, sensors and a kinematic body of four collision types in a box, and random handlers:
-for pairs of types, wildcards, default, each with some of the four phases. Their callbacks note the shapes and the normal that
-they see, and answer True, False, nothing or with an exception. The game removes and adds bodies, also in callbacks. It
-runs in a process with pymunk 6, and here with the names of pymunk 6; all notes and states have to be equal, bit for bit.
+for pairs of types, wildcards, default, each with some of the four phases. Their callbacks note the shapes and the
+normal that they see, and answer True, False, nothing or with an exception. The game removes and adds bodies, also in
+callbacks. It runs in a process with pymunk 6, and here with the names of pymunk 6. All notes and states have to be
+equal, bit for bit, in the same order; only the calls of `separate` within a step have none, as it follows addresses.
 """
 
 import argparse
-import contextlib
 import hashlib
 import json
 import os
@@ -150,21 +150,19 @@ class Game:
 
 def play(seed: int) -> list[Note]:
     """Play the game of a seed; its warnings and the exceptions of its callbacks are not printed."""
-    with warnings.catch_warnings(), open_null_device():
-        warnings.simplefilter("ignore")
-        return Game(seed).play()
-
-
-@contextlib.contextmanager
-def open_null_device() -> Any:
-    """Discard standard error, on which cffi prints the exceptions of callbacks."""
-    with Path(os.devnull).open("w") as null, contextlib.redirect_stderr(null):
-        yield
+    hook = sys.unraisablehook
+    sys.unraisablehook = lambda _: None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return Game(seed).play()
+    finally:
+        sys.unraisablehook = hook
 
 
 def case_of(seed: int, notes: list[Note]) -> dict[str, Any]:
-    """Return the stored figures of a game: its calls by phase, and the digest of their order, without numbers."""
-    calls = [note[:7] for note in notes if len(note) > 1 and note[1] in PHASES]
+    """Return the stored figures of a game: its calls by phase, and the digest of their sequence, without normals."""
+    calls = [note[:6] for note in notes if len(note) > 1 and note[1] in PHASES]
     digest = hashlib.sha256(json.dumps(calls).encode()).hexdigest()
     return {"seed": seed, "calls": dict(sorted(Counter(note[1] for note in calls).items())), "sha256": digest}
 
