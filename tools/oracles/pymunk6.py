@@ -11,6 +11,7 @@ equal, bit for bit, in the same order; only the calls of `separate` within a ste
 """
 
 import argparse
+import gc
 import hashlib
 import json
 import os
@@ -176,8 +177,9 @@ def main() -> int:
     parser.add_argument("--play", action="store_true", help="print the notes; for the process with pymunk 6")
     asked = parser.parse_args()
     if asked.play:
-        print(json.dumps([pymunk.version, [play(seed) for seed in range(asked.games)]]))
-        return 0
+        gc.disable()  # pymunk 6 may crash when its spaces are deleted
+        print(json.dumps([pymunk.version, [play(seed) for seed in range(asked.games)]]), flush=True)
+        os._exit(0)
     command = [sys.executable, __file__, asked.folder, "--play", "--games", str(asked.games)]
     environment = os.environ | {"PYTHONPATH": asked.folder}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
