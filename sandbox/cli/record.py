@@ -118,11 +118,8 @@ def record_command(
             faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
         except Exception as error:  # noqa: BLE001, of the user's program
             traceback.print_exc()
-            ended, status = f"{type(error).__name__}: {error}", 1
-            found = removed_name(error)
-            if found is not None:
-                removed = Fault(_file_name(found.file, game), found.line, "", found.sentence)
-                ended = str(removed)
+            removed = removed_name(error, game)
+            ended, status = f"{type(error).__name__}: {error}" if removed is None else str(removed), 1
     if not captured.spaces and not faults and removed is not None:
         faults = [removed]
     elif not captured.spaces and not faults:
@@ -170,14 +167,6 @@ def record_command(
     if removed is not None:
         click.echo(str(removed), err=True)
     return status
-
-
-def _file_name(file: str, game: str) -> str:
-    """Return the name of a file of a program: the game as the user named it, others from the working folder."""
-    path = Path(file).resolve()
-    if path == Path(game).resolve():
-        return game
-    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else file
 
 
 def _checked(captured: "GameCapture", is_silent: bool) -> Recording:

@@ -124,62 +124,59 @@ class CollisionHandlers:
         space.on_collision(*((None, None) if is_for_all else handler.types), **callback)
 
     def _begin(self, arbiter: Any, space: pymunk.Space, is_for_all: bool) -> None:
-        if self._has_own(arbiter, "begin") == is_for_all:
-            return
-        is_processed = False
+        accepted: bool | None = False  # if a callback raises an exception
         try:
-            is_processed = self._call(arbiter, space, "begin")
+            accepted = self._call("begin", arbiter, space, is_for_all)
         finally:
-            if not is_processed:
+            if accepted is False:
                 arbiter._arbiter.state = lib.CP_ARBITER_STATE_IGNORE
 
     def _pre_solve(self, arbiter: Any, space: pymunk.Space, is_for_all: bool) -> None:
-        is_ignored = arbiter._arbiter.state == lib.CP_ARBITER_STATE_IGNORE
-        if is_ignored or self._has_own(arbiter, "pre_solve") == is_for_all:
+        if arbiter._arbiter.state == lib.CP_ARBITER_STATE_IGNORE:
             return
-        arbiter.process_collision = False  # if a callback raises an exception
-        arbiter.process_collision = self._call(arbiter, space, "pre_solve")
+        accepted: bool | None = False
+        try:
+            accepted = self._call("pre_solve", arbiter, space, is_for_all)
+        finally:
+            if accepted is not None:
+                arbiter.process_collision = accepted
 
     def _post_solve(self, arbiter: Any, space: pymunk.Space, is_for_all: bool) -> None:
-        if self._has_own(arbiter, "post_solve") != is_for_all:
-            self._call(arbiter, space, "post_solve")
+        self._call("post_solve", arbiter, space, is_for_all)
 
     def _separate(self, arbiter: Any, space: pymunk.Space, is_for_all: bool) -> None:
-        if self._has_own(arbiter, "separate") != is_for_all:
-            self._call(arbiter, space, "separate")
+        self._call("separate", arbiter, space, is_for_all)
 
-    def _pair_handler(self, arbiter: pymunk.Arbiter) -> CollisionHandler | None:
-        a, b = (shape.collision_type for shape in arbiter.shapes)
-        return self._handlers.get((min(a, b), max(a, b)))
+    def _call(self, phase: str, arbiter: Any, space: pymunk.Space, is_for_all: bool) -> bool | None:
+        """Call the callbacks of a phase, and return whether all accept the collision.
 
-    def _has_own(self, arbiter: pymunk.Arbiter, phase: str) -> bool:
-        """Return whether a handler for the types of the two shapes sets a phase, so that it is registered for them."""
-        handler = self._pair_handler(arbiter)
-        return handler is not None and phase in handler.callbacks
-
-    def _call(self, arbiter: Any, space: pymunk.Space, phase: str) -> bool:
-        """Call the callbacks of a phase, and return whether all have accepted the collision."""
+        Returns:
+            None if the other registration acts: that for the two types if their handler sets the phase, else that for
+            all collisions.
+        """
         contact = arbiter._arbiter
         was_swapped, contact.swapped = contact.swapped, False
         try:
-            types = [shape.collision_type for shape in arbiter.shapes]
-            pair = self._pair_handler(arbiter)
-            if pair is not None and pair.types[0] != types[0]:
+            a, b = (shape.collision_type for shape in arbiter.shapes)
+            pair = self._handlers.get((min(a, b), max(a, b)))
+            if (pair is not None and phase in pair.callbacks) == is_for_all:
+                return None
+            if pair is not None and pair.types[0] != a:
                 contact.swapped = True  # `arbiter.shapes` has the order of the handler
-                types.reverse()
+                a, b = b, a
             handler = self._handlers.get(None) if pair is None else pair
             if handler is not None and phase in handler.callbacks:
                 return _is_accepted(handler, phase, arbiter, space)
             try:
-                accepted = self._call_wildcard(types[0], arbiter, space, phase)
+                accepted = self._call_wildcard(a, phase, arbiter, space)
             finally:  # the second is called even if the first rejects the collision or raises an exception
                 contact.swapped = not contact.swapped  # its shape comes first
-                also_accepted = self._call_wildcard(types[1], arbiter, space, phase)
+                also_accepted = self._call_wildcard(b, phase, arbiter, space)
             return accepted and also_accepted
         finally:
             contact.swapped = was_swapped
 
-    def _call_wildcard(self, collision_type: int, arbiter: pymunk.Arbiter, space: pymunk.Space, phase: str) -> bool:
+    def _call_wildcard(self, collision_type: int, phase: str, arbiter: pymunk.Arbiter, space: pymunk.Space) -> bool:
         handler = self._handlers.get(collision_type)
         return handler is None or phase not in handler.callbacks or _is_accepted(handler, phase, arbiter, space)
 

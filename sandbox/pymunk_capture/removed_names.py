@@ -4,9 +4,11 @@ import linecache
 import re
 import traceback
 from collections.abc import KeysView
-from dataclasses import dataclass
+from pathlib import Path
 
 import pymunk
+
+from sandbox.scene.errors import Fault
 
 OPTION = "--pymunk6"
 """Option of commands that run a game, which gives it the names of pymunk 6"""
@@ -30,30 +32,31 @@ OLDER_MODULE_NAMES = {"inf": 'float("inf")', "constraint": "pymunk.constraints"}
 """As above, of the module"""
 
 
-@dataclass(frozen=True)
-class RemovedName:
-    """A name that pymunk 7 lacks, where a program uses it."""
+def removed_name(error: BaseException, game: str) -> Fault | None:
+    """Return where and why a program has failed because of a name of an earlier pymunk; None if it has not.
 
-    file: str
-    """of the program, as Python names it"""
-    line: int
-    sentence: str
-    """what is used there, and what to do"""
+    Args:
+        error: the exception that ended the program.
+        game: file of the program, as the user named it.
 
-
-def removed_name(error: BaseException) -> RemovedName | None:
-    """Return the name of an earlier pymunk because of which a program has failed; None if there is none."""
+    Returns:
+        The line that uses the name, and what to do. Other files than the game are named from the working folder.
+    """
     frames = traceback.extract_tb(error.__traceback__)
+    if isinstance(error, ImportError):  # the innermost frames are those of the import system
+        frames = [each for each in frames if not each.filename.startswith("<frozen")]  # type: ignore[assignment]
     if not frames:
         return None
     file, line = frames[-1].filename, frames[-1].lineno or 0
     sentence = _missing_attribute(error) or _missing_import(error) or _missing_list(error, file, line)
     if sentence is None:
         return None
-    if isinstance(error, ImportError):  # the innermost frames are those of the import system
-        own = [each for each in frames if not each.filename.startswith("<frozen")]
-        file, line = own[-1].filename, own[-1].lineno or 0
-    return RemovedName(file, line, sentence)
+    path, folder = Path(file).resolve(), Path.cwd()
+    if path == Path(game).resolve():
+        file = game
+    elif path.is_relative_to(folder):
+        file = str(path.relative_to(folder))
+    return Fault(file, line, "", sentence)
 
 
 def _missing_attribute(error: BaseException) -> str | None:

@@ -332,11 +332,11 @@ def test_other_errors_are_no_removed_names(error: Exception) -> None:
     try:
         raise error
     except type(error) as caught:
-        assert removed_name(caught) is None
+        assert removed_name(caught, "game.py") is None
     try:
         Space().add_collision_handler  # type: ignore[attr-defined]  # noqa: B018
     except AttributeError as caught:
-        assert removed_name(caught) is None
+        assert removed_name(caught, "game.py") is None
 
 
 @pytest.mark.fail_slow(60)  # it is recorded and replayed
