@@ -31,6 +31,21 @@ OLDER_VECTOR_NAMES = {
 OLDER_MODULE_NAMES = {"inf": 'float("inf")', "constraint": "pymunk.constraints"}
 """As above, of the module"""
 
+_CHANGES_VECTOR = "it changes a Vec2d, as before pymunk 6; make another in its place"
+_PASSES_CALLBACKS = (
+    "it passes callbacks to Space.add_collision_handler, which takes two types in pymunk 6; set the callbacks of the "
+    "handler that it returns"
+)
+OLDER_USES = {
+    "Vec2d.__new__() missing": "it makes a Vec2d of one value or none, as before pymunk 6; use Vec2d(x, y)",
+    "'Vec2d' object has no setter": _CHANGES_VECTOR,
+    "'Vec2d' object does not support item assignment": _CHANGES_VECTOR,
+    "Unsupported type  <class 'list'>": "it adds or removes a list, as before pymunk 6; use space.add(*objects)",
+    "add_collision_handler() got an unexpected keyword": _PASSES_CALLBACKS,
+    "add_collision_handler() takes 3 positional": _PASSES_CALLBACKS,
+}
+"""Parts of the messages of errors that uses from before pymunk 6 cause, and what the program does"""
+
 
 def removed_name(error: BaseException, game: str) -> Fault | None:
     """Return where and why a program has failed because of a name of an earlier pymunk; None if it has not.
@@ -42,13 +57,13 @@ def removed_name(error: BaseException, game: str) -> Fault | None:
     Returns:
         The line that uses the name, and what to do. Other files than the game are named from the working folder.
     """
-    frames = traceback.extract_tb(error.__traceback__)
-    if isinstance(error, ImportError):  # the innermost frames are those of the import system
-        frames = [each for each in frames if not each.filename.startswith("<frozen")]  # type: ignore[assignment]
+    others = ("<frozen", str(Path(pymunk.__file__).parent), str(Path(__file__).parent))  # the import system, pymunk
+    frames = [each for each in traceback.extract_tb(error.__traceback__) if not each.filename.startswith(others)]
     if not frames:
         return None
     file, line = frames[-1].filename, frames[-1].lineno or 0
-    sentence = _missing_attribute(error) or _missing_import(error) or _missing_list(error, file, line)
+    sentence = _missing_attribute(error) or _missing_import(error) or _older_use(error)
+    sentence = sentence or _missing_list(error, file, line)
     if sentence is None:
         return None
     path, folder = Path(file).resolve(), Path.cwd()
@@ -87,6 +102,14 @@ def _missing_import(error: BaseException) -> str | None:
         return _dropped("pymunk.CollisionHandler", "Space.on_collision")
     if error.name == "pymunk.constraint" or (error.name == "pymunk" and "'constraint'" in str(error)):
         return _older("pymunk.constraint", OLDER_MODULE_NAMES["constraint"])
+    return None
+
+
+def _older_use(error: BaseException) -> str | None:
+    text = str(error)
+    for begin, sentence in OLDER_USES.items():
+        if begin in text:
+            return sentence
     return None
 
 
