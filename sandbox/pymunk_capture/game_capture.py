@@ -387,15 +387,22 @@ class GameCapture:
 
     def __init__(self) -> None:
         self._captures: dict[pymunk.Space, SpaceCapture] = {}
+        self._refused: dict[pymunk.Space, CaptureError] = {}
+        self._steps: dict[pymunk.Space, int] = {}
         self.form_changes = 0
         """changes of what a space is, besides the motion of its bodies, in all spaces"""
 
-    def step(self, space: pymunk.Space, dt: float) -> SpaceCapture:
-        """Note the changes before a step of a space."""
-        if space not in self._captures:
-            self._captures[space] = SpaceCapture(space, lambda: self.form_changes)
-        found = self._captures[space]
-        found.before_step(dt)
+    def step(self, space: pymunk.Space, dt: float) -> SpaceCapture | None:
+        """Note the changes before a step of a space; None for a space that cannot be a scene."""
+        self._steps[space] = self._steps.get(space, 0) + 1
+        if space not in self._captures and space not in self._refused:
+            try:
+                self._captures[space] = SpaceCapture(space, lambda: self.form_changes)
+            except CaptureError as error:
+                self._refused[space] = error
+        found = self._captures.get(space)
+        if found is not None:
+            found.before_step(dt)
         return found
 
     def note_physics_end(self, space: pymunk.Space, has_additions: bool) -> None:
@@ -432,7 +439,7 @@ class GameCapture:
     @property
     def steps(self) -> int:
         """Largest number of steps of a space."""
-        return max((each.steps for each in self._captures.values()), default=0)
+        return max(self._steps.values(), default=0)
 
     @property
     def recording(self) -> Recording:
@@ -440,6 +447,7 @@ class GameCapture:
 
         Raises:
             ValueError: no space has made a step.
+            CaptureError: that space cannot be a scene.
         """
         return self._longest.recording()
 
@@ -470,9 +478,12 @@ class GameCapture:
 
     @property
     def _longest(self) -> SpaceCapture:
-        if not self._captures:
+        if not self._steps:
             raise ValueError("no pymunk space has made a step")
-        return max(self._captures.values(), key=lambda each: each.steps)
+        space = max(self._steps, key=self._steps.__getitem__)
+        if space in self._refused:
+            raise self._refused[space]
+        return self._captures[space]
 
 
 class StepLimitReached(SystemExit):
@@ -509,7 +520,8 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
             raise StepLimitReached(0)
         found = game.step(space, dt)
         step(space, dt)
-        found.after_step()
+        if found is not None:
+            found.after_step()
 
     def added(space: pymunk.Space, *objects: Any) -> None:
         # pymunk calls it after the physics of a step, before it removes bodies and calls post-step callbacks

@@ -32,11 +32,14 @@ class InputRecorder:
     Args:
         program: path of the program.
         arguments: of the program.
+        pymunk6: whether the program uses names of pymunk 6.
         script: of inputs that replace keyboard, mouse and clock; None for those of the user.
     """
 
-    def __init__(self, program: str, arguments: Sequence[str], script: InputScript | None = None) -> None:
-        self._program, self._arguments = program, tuple(arguments)
+    def __init__(
+        self, program: str, arguments: Sequence[str], script: InputScript | None = None, *, pymunk6: bool = False
+    ) -> None:
+        self._program, self._arguments, self._pymunk6 = program, tuple(arguments), pymunk6
         resolved = Path(program).resolve()
         self._own_folder = resolved if resolved.is_dir() else resolved.parent
         self._digests: dict[str, str] = {}
@@ -122,6 +125,7 @@ class InputRecorder:
             program=self._program,
             folder=str(Path.cwd()),
             arguments=self._arguments,
+            pymunk6=self._pymunk6,
             seed=self._seed,
             hash_seed=os.environ.get("PYTHONHASHSEED"),
             started=self._started,

@@ -37,6 +37,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     import numpy as np
 
     from sandbox.game_inputs import jittered, load_inputs
+    from sandbox.pymunk_capture.pymunk6 import pymunk6_names
     from sandbox.rehearsal.guard import deny_changes, mirror_folders
     from sandbox.rehearsal.space_log import SpaceLog
     from sandbox.rehearsal.step_settings import Nudge, StepSettings, steps_with
@@ -61,6 +62,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     nudge = None if request["nudge"] is None else Nudge(**request["nudge"])
     with Path(os.devnull).open() as nothing, ExitStack() as stack:
         stack.enter_context(patch.object(sys, "stdin", nothing))
+        if inputs.pymunk6:
+            stack.enter_context(pymunk6_names())
         steps = stack.enter_context(steps_with(StepSettings(**request["settings"]), nudge=nudge))
         tape = stack.enter_context(replayed(inputs, log))
         stack.enter_context(started_as(name, inputs.arguments))
