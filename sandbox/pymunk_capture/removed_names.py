@@ -57,7 +57,7 @@ def removed_name(error: BaseException, game: str) -> Fault | None:
     Returns:
         The line that uses the name, and what to do. Other files than the game are named from the working folder.
     """
-    others = ("<frozen", str(Path(pymunk.__file__).parent), str(Path(__file__).parent))  # the import system, pymunk
+    others = ("<frozen", str(Path(pymunk.__file__).parent), str(Path(__file__).parents[1]))  # the import system
     frames = [each for each in traceback.extract_tb(error.__traceback__) if not each.filename.startswith(others)]
     if not frames:
         return None

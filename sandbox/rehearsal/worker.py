@@ -52,8 +52,9 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         Path(os.path.normpath(own_folder / name)): None if content is None else base64.b64decode(content)
         for name, content in inputs.saved_files.items()
     }
+    kept = [own_folder, Path.cwd()]
     if saved:
-        mirrors = mirror_folders([own_folder, Path.cwd()], saved, scratch / "files")
+        mirrors = mirror_folders(kept, saved, scratch / "files")
         program = mirrors[own_folder] / program.relative_to(own_folder)
         os.chdir(mirrors[Path.cwd()])
     name = str(program)
@@ -69,7 +70,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         stack.enter_context(started_as(name, inputs.arguments))
         if not request["draws"]:
             _leave_out_drawing(stack)
-        deny_changes([scratch], lambda remark: notes.setdefault(remark))
+        deny_changes(scratch, kept, lambda remark: notes.setdefault(remark))
         start = time.perf_counter()
         try:
             runpy.run_path(name, run_name="__main__")
