@@ -278,7 +278,7 @@ def _program(options: _Options) -> str | None:
         return None
 
 
-SCENE_ONLY = ("engine", "overrides", "fps", "margin", "starts", "spread", "effort", "repeats")
+SCENE_ONLY = frozenset({"engine", "overrides", "fps", "margin", "spread", "effort", "repeats"})
 """Options that have no effect on a game itself"""
 
 
@@ -286,11 +286,9 @@ def _advise_game(options: _Options, program: str) -> int:
     from sandbox.cli.advise_game import advise_game, is_game
 
     context = click.get_current_context()
-    given = [
-        each.opts[0]
-        for each in context.command.params
-        if each.name in SCENE_ONLY and context.get_parameter_source(each.name) == ParameterSource.COMMANDLINE
-    ]
+    sources = {each.name: context.get_parameter_source(each.name or "") for each in context.command.params}
+    typed = {name for name, source in sources.items() if source == ParameterSource.COMMANDLINE}
+    given = [each.opts[0] for each in context.command.params if each.name in typed & SCENE_ONLY]
     if given:
         remedy = "" if is_game(options.scene) else "; add --scene to advise on the scene of the recording"
         faults = [Fault.of(each, f"has no effect on a game itself{remedy}") for each in given]
@@ -301,6 +299,7 @@ def _advise_game(options: _Options, program: str) -> int:
         tolerance=options.tolerance,
         zoom=PIXELS if options.pixels else options.given_zoom,
         budget_ms=options.budget_ms,
+        plays=None if "starts" not in typed else 0 if options.starts == 1 else options.starts,
         time_limit=options.time_limit,
         out=options.out,
         as_json=options.as_json,

@@ -14,6 +14,7 @@ from sandbox.formatting import format_number, format_plural
 from sandbox.game_inputs import GameInputs
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting
 from sandbox.measure.game_advice.study import (
+    DEFAULT_PLAYS,
     DEFAULT_TIME_LIMIT,
     GameFailedError,
     GameStudy,
@@ -74,6 +75,7 @@ def advise_game(
     tolerance: tuple[float, str],
     zoom: float | None,
     budget_ms: float | None,
+    plays: int | None,
     time_limit: float | None,
     out: Path | None,
     as_json: bool,
@@ -87,6 +89,7 @@ def advise_game(
         tolerance: accepted error and its unit, px or a length.
         zoom: px per unit of length of the game; None if it was not given.
         budget_ms: time of the physics in a frame that is available, ms.
+        plays: number of plays that differ a little from the recorded one; None for the default.
         time_limit: of the advice, s.
         out: page to write.
         as_json: print one JSON document.
@@ -111,13 +114,15 @@ def advise_game(
                 inputs,
                 tolerance_px=pixels,
                 zoom=known_zoom,
+                plays=DEFAULT_PLAYS if plays is None else plays,
                 time_limit=time_limit or DEFAULT_TIME_LIMIT,
                 on_progress=progress,
             )
             advice = study.advise()
     except (NotRepeatableError, GameFailedError, RehearsalError) as error:
         faults = [Fault.of(game, line) for line in str(error).splitlines()]
-        return max(1, exit_with_errors(faults, as_json, scene=game))
+        exit_with_errors(faults, as_json, scene=game)
+        return 1
     except KeyboardInterrupt:
         click.echo("interrupted: nothing is advised", err=True)
         return 130
@@ -163,7 +168,8 @@ def print_game_advice(advice: GameAdvice, budget_ms: float | None) -> None:
         print_item(sentence, "")
     _print_heading(f"1. Present setting: {setting_text(advice.present)}")
     _print_setting(advice, advice.present, budget_ms)
-    print_item(present_odds_text(advice), INDENT)
+    if advice.plays.present.trials:
+        print_item(present_odds_text(advice), INDENT)
     chosen = advice.chosen
     assert chosen is not None
     if chosen.changed:

@@ -50,7 +50,7 @@ SLOP_PX = 0.01
 """px, slop that is tried"""
 STIFF_JOINT = 0.5
 """Fraction of the error of a joint that is left after a step, in a setting that is tried"""
-PLAYS = 10
+DEFAULT_PLAYS = 10
 """Plays that differ a little from the recorded one"""
 DISPLACEMENT = 0.1
 """px, displacement of all bodies at the start of such a play"""
@@ -88,6 +88,7 @@ class GameStudy:
         inputs: recorded inputs.
         tolerance_px: accepted error, px.
         zoom: px per unit of length of the game.
+        plays: number of plays that differ a little from the recorded one.
         time_limit: s after which no further settings and plays are tried.
         on_progress: progress callback.
     """
@@ -99,13 +100,14 @@ class GameStudy:
         *,
         tolerance_px: float = DEFAULT_TOLERANCE_PX,
         zoom: float = 1.0,
+        plays: int = DEFAULT_PLAYS,
         time_limit: float = DEFAULT_TIME_LIMIT,
         on_progress: ProgressCallback | None = None,
     ) -> None:
         self._program, self._inputs = program, inputs
         self._tolerance_px, self._zoom = tolerance_px, zoom
         self._tolerance = tolerance_px / zoom
-        self._time_limit, self._on_progress = time_limit, on_progress
+        self._plays_wanted, self._time_limit, self._on_progress = plays, time_limit, on_progress
         self._start = time.monotonic()
         self._draws = True
         self.shown: dict[str, Rehearsal] = {}
@@ -340,8 +342,8 @@ class GameStudy:
         """Return plays that differ a little from the recorded one, each with its truth, as many as the time allows."""
         fine = truth.run.settings.substeps
         plays: list[tuple[_Play, Truth]] = []
-        for seed in range(2, 2 + PLAYS):
-            self._report(f"plays that differ a little: {len(plays)} of {PLAYS}")
+        for seed in range(2, 2 + self._plays_wanted):
+            self._report(f"plays that differ a little: {len(plays)} of {self._plays_wanted}")
             nudge = Nudge(DISPLACEMENT / self._zoom, seed)
             play = _Play(settings=StepSettings(), nudge=nudge, jitter_seed=seed)
             runs = [self._run(replace(play, settings=StepSettings(substeps=each))) for each in (fine // 2, fine)]

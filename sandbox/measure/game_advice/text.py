@@ -70,7 +70,7 @@ def callback_text(difference: CallbackDifference, advice: GameAdvice) -> str:
 def recommended_head(advice: GameAdvice) -> str:
     """Return the head of the recommended setting."""
     tried = f"of {format_plural(advice.tried, 'setting')} tried"
-    odds = advice.plays.chosen
+    odds = advice.plays.chosen if advice.plays.present.trials else None
     held = "" if odds is None else f"; within it in {odds.hits} of {odds.trials} plays that differ a little"
     if advice.recommended is not None:
         interval = "" if odds is None else f" {odds.interval_text}"
