@@ -59,13 +59,12 @@ def program_of(recording: str, inputs: GameInputs) -> str | None:
     return None
 
 
-def guessed_zoom(inputs: str) -> float | None:
-    """Return 1 px per unit of length if the bodies of a recording have the sizes of pixel graphics; None if unknown."""
+def _recording_of(inputs: str) -> Recording | None:
+    """Return the recording in a file of inputs; None if it has no scene, because the space cannot be one."""
     try:
-        recording = Recording.load(inputs)
-    except SceneError:  # inputs of a game whose space cannot be a scene
+        return Recording.load(inputs)
+    except SceneError:
         return None
-    return 1.0 if is_in_pixels(recording.scene) else None
 
 
 def advise_game(
@@ -100,7 +99,8 @@ def advise_game(
     except SceneError as error:
         return exit_with_errors(error.faults, as_json, scene=game)
     recording = inputs_file or f"{Path(game).stem}.json"
-    known_zoom = zoom or guessed_zoom(recording)
+    recorded = _recording_of(recording)
+    known_zoom = zoom or (1.0 if recorded is not None and is_in_pixels(recorded.scene) else None)
     remarks = remarks_on_inputs(game, inputs)
     if known_zoom is None:
         known_zoom = DEFAULT_ZOOM
@@ -130,6 +130,8 @@ def advise_game(
         print_json(advice.document() | ({"remarks_on_inputs": remarks} if remarks else {}))
     elif not quiet:
         print_game_advice(advice, budget_ms)
+        if recorded is not None:
+            print_item(f"Other engines run the captured scene only: sandbox advise {recording} --scene", "")
     for each in remarks:
         click.echo(f"{game}: {each}", err=True)
     status = 0 if advice.is_met and not _is_over(advice.recommended, budget_ms) else 1

@@ -108,8 +108,6 @@ class GameAdvice:
     """number of runs of the game"""
     seconds: float
     """s, time of the advice"""
-    interrupted: bool
-    """whether Ctrl-C ended the advice; what was measured before is kept"""
     machine: Mapping[str, Any]
     """description of the machine"""
     versions: Mapping[str, str]

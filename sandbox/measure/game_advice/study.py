@@ -21,7 +21,7 @@ from sandbox.measure.game_advice.step_code import step_code
 from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
-from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, rehearse
+from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, kill_rehearsals, rehearse
 from sandbox.rehearsal.step_settings import Nudge, StepSettings
 
 FIRST_TRUTH = 16
@@ -136,6 +136,10 @@ class GameStudy:
                 name = "most accurate" if recommended is None else "recommended"
                 self.shown[name] = self._run(_Play(settings=StepSettings(**_given(best)))).result()
             return self._advice(own, truth, truth_error, present, recommended, best, changes, plays, tried)
+        except BaseException:  # such as Ctrl-C
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            kill_rehearsals()
+            raise
         finally:
             self._pool.shutdown(cancel_futures=True)
 
@@ -406,7 +410,6 @@ class GameStudy:
             tried=1 + len(changes) + len(tried),
             runs=self._count,
             seconds=time.monotonic() - self._start,
-            interrupted=False,
             machine=machine(),
             versions=versions(),
         )
