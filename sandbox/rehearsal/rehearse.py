@@ -120,9 +120,9 @@ class Rehearsal:
     failure: str | None
     """exception that ended it; None if none did"""
     seconds: float
-    """wall-clock time of the run, s"""
+    """processor time of the run, without the start of the process, s"""
     step_seconds: float
-    """processor time of `Space.step`, with the callbacks of the game, s"""
+    """part of it in `Space.step`, with the callbacks of the game, s"""
     output: str = field(repr=False)
     """what the game printed"""
     notes: tuple[str, ...] = ()
