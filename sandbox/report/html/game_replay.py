@@ -35,7 +35,7 @@ INSIDE = 0.8
 """Fraction of the positions within the window from which on the window is what the replay shows"""
 TYPICAL = 2.0
 """Positions left out at each side otherwise, percent: bodies that fall out of the game"""
-Piece = list[float]
+_Piece = list[float]
 """radius, and centre, ends or corners"""
 
 
@@ -204,7 +204,7 @@ class _Forms:
 
     def __init__(self, sides: FloatArray) -> None:
         self._sides = sides
-        self.pieces: list[list[Piece]] = []
+        self.pieces: list[list[_Piece]] = []
         self._numbers: dict[str, int] = {}
 
     def numbers(self, run: Rehearsal, bodies: IntArray) -> list[int]:
@@ -214,7 +214,7 @@ class _Forms:
             by_body.setdefault(body, []).append(shape)
         return [self._number(by_body.get(body, [])) for body in bodies.tolist()]
 
-    def piece(self, shape: GameShape) -> Piece:
+    def piece(self, shape: GameShape) -> _Piece:
         """Return a shape as radius and points."""
         radius = abs(float(self._sides[0])) * shape.radius
         points = (np.asarray(shape.points) * self._sides).reshape(-1).tolist()
