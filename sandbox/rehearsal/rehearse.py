@@ -103,6 +103,10 @@ class Rehearsal:
     """names of bodies by number, as far as the game has variables for them"""
     own_settings: Mapping[str, float]
     """settings of the space that makes the first step, by the names of `StepSettings`"""
+    gravity: tuple[float, float]
+    """gravity of that space, in units of the game per s²"""
+    window: tuple[int, int] | None
+    """size of the window at the first step, px; None without a window"""
     dts: tuple[float, float, float]
     """least, median and largest argument of `Space.step`, s"""
     step_calls: tuple[tuple[str, int], ...]
@@ -224,6 +228,8 @@ def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, out
             tuple(GameChange(*each) for each in answer["changes"]),
             dict(answer["body_names"]),
             answer["own_settings"],
+            tuple(answer["gravity"]),
+            None if answer["window"] is None else tuple(answer["window"]),
             tuple(answer["dts"]),
             tuple((file, line) for file, line in answer["step_calls"]),
             answer["has_forces"],

@@ -122,6 +122,10 @@ class SpaceLog:
         """calls of `Space.step` by file and line"""
         self.settings: dict[str, float] = {}
         """settings of the space that makes the first step, by the names of `StepSettings`"""
+        self.gravity = 0.0, 0.0
+        """gravity of that space, in units of the game per s²"""
+        self.window: tuple[int, int] | None = None
+        """size of the window at the first step, px; None without a window"""
         self.impulse_readers: set[int] = set()
         """numbers of the callbacks that read the impulse or the energy of a contact"""
         self.running: int | None = None
@@ -162,8 +166,10 @@ class SpaceLog:
                 self._note_change(each, is_added=False)
 
     def _note_start(self, space: pymunk.Space, caller: FrameType) -> None:
-        """Note settings, and the names of bodies in the code that makes the first step."""
+        """Note settings and window, and the names of bodies in the code that makes the first step."""
         self.settings = {name: getattr(space, attribute) for name, attribute in SPACE_ATTRIBUTES.items()}
+        self.gravity = space.gravity.x, space.gravity.y
+        self.window = _window_size()
         if space.constraints:
             self.settings["joint_bias"] = max(joint.error_bias for joint in space.constraints)
         for body, name in body_names(caller):
@@ -226,6 +232,12 @@ class SpaceLog:
             for body in space.bodies:
                 self._by_id[body.id] = self._number(body)
         return self._by_id.get(identity, WORLD)
+
+
+def _window_size() -> tuple[int, int] | None:
+    pygame = sys.modules.get("pygame")  # a program without a window may lack pygame
+    surface = None if pygame is None else pygame.display.get_surface()
+    return None if surface is None else surface.get_size()
 
 
 def _kind(thing: object) -> str:

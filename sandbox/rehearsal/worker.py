@@ -98,6 +98,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "body_names": sorted(log.body_names.items()),
         "hashes": log.hashes,
         "own_settings": log.settings,
+        "gravity": log.gravity,
+        "window": log.window,
         "dts": [min(log.dts), median_low(log.dts), max(log.dts)] if log.dts else [0.0, 0.0, 0.0],
         "step_calls": [[file, line] for (file, line), _ in log.step_calls.most_common()],
         "has_forces": steps.has_forces,

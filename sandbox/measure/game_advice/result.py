@@ -34,6 +34,8 @@ class GameSetting:
     """why the game failed with this setting; None if it did not"""
     is_within: bool = False
     """whether the error is within the tolerance and no contact is missed, late or extra"""
+    errors_px: tuple[float, ...] = field(default=(), metadata=in_json(omit=True))
+    """px, largest distance of a body from the truth in each frame, as long as it is known"""
 
     @property
     def lost(self) -> int:

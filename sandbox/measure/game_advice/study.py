@@ -230,6 +230,7 @@ class GameStudy:
             physics_ms=1e3 * run.step_seconds / max(run.frames, 1),
             failure=run.failure,
             is_within=is_within,
+            errors_px=tuple((self._zoom * difference.by_frame).tolist()),
         )
 
     def _time_of(self, frame: int) -> float:
