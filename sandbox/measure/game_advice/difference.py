@@ -75,6 +75,8 @@ class GameDifference:
     """first frame with an error of more than the tolerance; None if there is none"""
     by_frame: FloatArray
     """(F,) largest distance in each frame"""
+    missing_frames: int
+    """frames that one of the runs has and the other one lacks, because the game ends earlier"""
     callbacks: tuple[CallbackDifference, ...]
     """of each callback that is called in one of the runs"""
 
@@ -179,6 +181,7 @@ def difference_from(truth: Truth, run: Rehearsal, tolerance: float) -> GameDiffe
         None if worst is None else worst[2],
         int(beyond[0]) if len(beyond) else None,
         by_frame,
+        abs(truth.run.frames - run.frames),
         tuple(_callback_differences(truth, run, frames)),
     )
 
