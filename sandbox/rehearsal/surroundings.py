@@ -11,6 +11,7 @@ from pathlib import Path
 
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 
+import pygame
 import pymunk
 
 from sandbox.game_inputs import GameInputs, file_digest
@@ -32,11 +33,14 @@ class InputRecorder:
     Args:
         program: path of the program.
         arguments: of the program.
+        pymunk6: whether the program uses names of pymunk 6.
         script: of inputs that replace keyboard, mouse and clock; None for those of the user.
     """
 
-    def __init__(self, program: str, arguments: Sequence[str], script: InputScript | None = None) -> None:
-        self._program, self._arguments = program, tuple(arguments)
+    def __init__(
+        self, program: str, arguments: Sequence[str], script: InputScript | None = None, *, pymunk6: bool = False
+    ) -> None:
+        self._program, self._arguments, self._pymunk6 = program, tuple(arguments), pymunk6
         resolved = Path(program).resolve()
         self._own_folder = resolved if resolved.is_dir() else resolved.parent
         self._digests: dict[str, str] = {}
@@ -122,6 +126,7 @@ class InputRecorder:
             program=self._program,
             folder=str(Path.cwd()),
             arguments=self._arguments,
+            pymunk6=self._pymunk6,
             seed=self._seed,
             hash_seed=os.environ.get("PYTHONHASHSEED"),
             started=self._started,
@@ -208,20 +213,14 @@ def surroundings(
         note: called with a remark on what the tape cannot have.
         max_steps: calls of `Space.step` after which the next one raises `EndOfTape`; default: unlimited.
     """
-    has_window = False
 
     def finish_frame() -> None:
         log.end_frame()
         end_frame()
 
-    def show() -> None:
-        nonlocal has_window
-        has_window = True
-        finish_frame()
-
     def before_step(space: pymunk.Space) -> None:
         # A program without a window has a frame for each step.
-        if not has_window and log.has_stepped(space):
+        if log.has_stepped(space) and pygame.display.get_surface() is None:
             finish_frame()
         if max_steps is not None and log.steps >= max_steps:
             raise EndOfTape(0)
@@ -229,7 +228,7 @@ def surroundings(
     with ExitStack() as stack:
         stack.enter_context(seeded(seed))
         stack.enter_context(spaces_logged(log, before_step))
-        stack.enter_context(pygame_inputs_from(tape, device, end_frame=show, note=note))
+        stack.enter_context(pygame_inputs_from(tape, device, end_frame=finish_frame, note=note))
         stack.enter_context(clock_from(tape, sleep=sleep, now=now))
         try:
             yield
