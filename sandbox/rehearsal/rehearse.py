@@ -99,6 +99,8 @@ class Rehearsal:
     """form of each shape, when the game adds it"""
     changes: tuple[GameChange, ...]
     """bodies and joints that the game adds and removes, in order"""
+    shape_changes: tuple[tuple[int, bool, int], ...]
+    """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
     body_names: Mapping[int, str]
     """names of bodies by number, as far as the game has variables for them"""
     own_settings: Mapping[str, float]
@@ -226,6 +228,7 @@ def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, out
             tuple(answer["shape_bodies"]),
             tuple(GameShape(kind, tuple(map(tuple, points)), *rest) for kind, points, *rest in answer["shapes"]),
             tuple(GameChange(*each) for each in answer["changes"]),
+            tuple((frame, is_added, number) for frame, is_added, number in answer["shape_changes"]),
             dict(answer["body_names"]),
             answer["own_settings"],
             tuple(answer["gravity"]),

@@ -110,6 +110,8 @@ class SpaceLog:
         """form of each shape, when the game adds it"""
         self.changes: list[Change] = []
         """bodies and joints that the game adds and removes, in order"""
+        self.shape_changes: list[tuple[int, bool, int]] = []
+        """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
         self.body_names: dict[int, str] = {}
         """names of bodies by number, as far as the program has variables for them"""
         self._numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()  # of each body, shape and joint
@@ -154,6 +156,8 @@ class SpaceLog:
         """Number objects that are added to a space, and note those that the game adds later."""
         for each in objects:
             self._number(each)
+            if isinstance(each, pymunk.Shape):
+                self._note_shape(each, is_added=True)
             if not isinstance(each, pymunk.Shape) and each not in self._present:
                 self._present.add(each)
                 self._note_change(each, is_added=True)
@@ -161,6 +165,8 @@ class SpaceLog:
     def note_removed(self, objects: tuple[Any, ...]) -> None:
         """Note objects that are removed from a space."""
         for each in objects:
+            if isinstance(each, pymunk.Shape):
+                self._note_shape(each, is_added=False)
             if each in self._present:
                 self._present.discard(each)
                 self._note_change(each, is_added=False)
@@ -179,6 +185,10 @@ class SpaceLog:
         if self.steps:
             is_joint = isinstance(thing, pymunk.Constraint)
             self.changes.append(Change(self.frame, is_added, is_joint, self._number(thing)))
+
+    def _note_shape(self, shape: pymunk.Shape, *, is_added: bool) -> None:
+        if self.steps:
+            self.shape_changes.append((self.frame, is_added, self._number(shape)))
 
     def _number(self, thing: pymunk.Body | pymunk.Shape | pymunk.Constraint) -> int:
         """Return the number of an object; a new one the first time."""

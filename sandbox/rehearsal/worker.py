@@ -95,6 +95,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "shape_bodies": log.shape_bodies,
         "shapes": log.shapes,
         "changes": log.changes,
+        "shape_changes": log.shape_changes,
         "body_names": sorted(log.body_names.items()),
         "hashes": log.hashes,
         "own_settings": log.settings,

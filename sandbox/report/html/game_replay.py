@@ -111,6 +111,7 @@ def game_replay_document(
                 "breaks": {},
                 "value": None,
                 "shape": None if shape == shapes[0] else shape,
+                "absent": _absent_times(track.run, times),
                 "marks": _marks(track, pose, poses[0], times, origin),
             }
             for track, text, shape, pose in zip(tracks, codes, shapes, poses, strict=True)
@@ -232,15 +233,31 @@ class _Forms:
 def _geometry(
     truth: Rehearsal, poses: FloatArray, is_still: BoolArray, forms: _Forms, origin: FloatArray
 ) -> dict[str, Any]:
-    """Return the shapes of static bodies, and of others that never move, with position and angle."""
+    """Return the shapes of static bodies, and of others that never move, with position, angle, and number."""
     kinds: dict[bool, list[list[Any]]] = {False: [], True: []}
-    for body, shape in zip(truth.shape_bodies, truth.shapes, strict=True):
+    for number, (body, shape) in enumerate(zip(truth.shape_bodies, truth.shapes, strict=True)):
         if body >= len(is_still) or (body >= 0 and not is_still[body]):
             continue
         x, y, angle = (0.0, 0.0, 0.0) if body < 0 else poses[0, body].tolist()
-        kinds[shape.is_sensor].append([_short(x - origin[0]), _short(y - origin[1]), _short(angle), forms.piece(shape)])
+        at = [_short(x - origin[0]), _short(y - origin[1]), _short(angle)]
+        kinds[shape.is_sensor].append([*at, forms.piece(shape), number])
     unused = ("planes", "walls", "posts", "pockets", "attractions", "joints")
     return {**{name: [] for name in unused}, "solids": kinds[False], "sensors": kinds[True]}
+
+
+def _absent_times(run: Rehearsal, times: FloatArray) -> dict[str, list[list[float | None]]]:
+    """Return the times, from and until, s, in which each shape is absent, by its number; until None for the rest."""
+    found: dict[str, list[list[float | None]]] = {}
+    for frame, is_added, number in run.shape_changes:
+        spans, time = found.setdefault(str(number), []), float(f"{times[min(frame, len(times) - 1)]:.6g}")
+        is_absent = bool(spans) and spans[-1][1] is None
+        if not is_added and not is_absent:  # pymunk removes what a callback removes again after the step
+            spans.append([time, None])
+        elif is_added and is_absent:
+            spans[-1][1] = time
+        elif is_added and not spans:
+            spans.append([0.0, time])
+    return found
 
 
 def _errors_at(errors: Sequence[float], frames: IntArray) -> list[float | None]:

@@ -97,6 +97,7 @@ def replay_document(
                 "breaks": _breaks(track.run, scene),
                 "value": track.value,
                 "shape": None,
+                "absent": {},
                 "marks": [],
             }
             for track, text in zip(tracks, texts, strict=True)

@@ -24,6 +24,8 @@ WINDOW = 400, 300
 BALL, BULLET, POST = 0, 1, 2
 FIRED, HIT = 30, 59
 """Frames in which the game adds the bullet, and in which it hits the wall"""
+TAKEN = 90
+"""Frame in which the game removes the coin"""
 LAG = 6.0
 """Units by which the ball of the present setting is off in the end"""
 WALL, COIN, BALL_SHAPE, POST_SHAPE, BULLET_SHAPE = range(5)
@@ -66,6 +68,7 @@ def rehearsal(
             GameShape("circle", ((0.0, 0.0),), 2.0, False),
         ),
         changes=(),
+        shape_changes=((FIRED, True, BULLET_SHAPE), (TAKEN, False, COIN)),
         body_names={BALL: f"{HOSTILE} ball"},
         own_settings={"iterations": 10.0, "slop": 0.1},
         gravity=(0.0, gravity),

@@ -17,11 +17,14 @@ from sandbox.report.html.game_replay import GameTrack, game_replay_document
 from sandbox.report.html.replay_data import ABSENT, decompress
 from tests.report.html.game_advice_documents import (
     BALL,
+    BULLET_SHAPE,
+    COIN,
     DURATION,
     FIRED,
     FRAMES,
     HIT,
     LAG,
+    TAKEN,
     WINDOW,
     ZOOM,
     game_advice,
@@ -192,10 +195,16 @@ def test_window_is_the_view_and_y_follows_gravity() -> None:
 
 def test_geometry_has_static_bodies_sensors_and_bodies_at_rest() -> None:
     geometry = document()["geometry"]
-    assert sorted(len(piece) for _, _, _, piece in geometry["solids"]) == [5, 9]  # the wall; the post with 4 corners
-    ((_, _, angle, coin),) = geometry["sensors"]
+    assert sorted(len(piece) for _, _, _, piece, _ in geometry["solids"]) == [5, 9]  # the wall; the post with 4 corners
+    ((_, _, angle, coin, number),) = geometry["sensors"]
+    assert number == COIN
     assert (angle, coin) == (0.0, [ZOOM * 9.0, ZOOM * 200.0, -ZOOM * 100.0])
     assert geometry["shapes"][geometry["shape"][BALL]] == [[ZOOM * 20.0, 0.0, 0.0]]
+
+
+def test_removed_shapes_are_absent_from_then_on_and_added_ones_before() -> None:
+    absent = document()["tracks"][0]["absent"]
+    assert absent == {str(COIN): [[TAKEN / 60, None]], str(BULLET_SHAPE): [[0.0, FIRED / 60]]}
 
 
 def test_run_that_ends_early_has_no_bodies_afterwards() -> None:

@@ -61,8 +61,9 @@ class Renderer {
     this.unit = unit;
   }
 
-  /* The background: a grid, static geometry, and a scale bar. */
-  drawGeometry(geometry) {
+  /* The background: a grid, static geometry, and a scale bar. `absent` has times, from and until, in which a solid or
+     a sensor with a number is absent. */
+  drawGeometry(geometry, absent = {}, time = 0) {
     const { context, camera, colours } = this;
     context.lineCap = context.lineJoin = "round";
     context.fillStyle = colours.sheet;
@@ -84,7 +85,9 @@ class Renderer {
       context.fill();
       context.stroke();
     }
-    for (const [x, y, angle, piece] of geometry.solids) {
+    const isPresent = (number) => !(absent[number] || []).some(([from, until]) => from <= time && (until === null || time < until));
+    for (const [x, y, angle, piece, number] of geometry.solids) {
+      if (!isPresent(number)) continue;
       context.beginPath();
       this.addPiece(piece, x, y, Math.cos(angle), Math.sin(angle));
       context.fill();
@@ -93,7 +96,8 @@ class Renderer {
     context.strokeStyle = colours.soft;
     context.lineWidth = 1;
     context.setLineDash([2, 3]);
-    for (const [x, y, angle, piece] of geometry.sensors) {
+    for (const [x, y, angle, piece, number] of geometry.sensors) {
+      if (!isPresent(number)) continue;
       context.beginPath();
       this.addPiece(piece, x, y, Math.cos(angle), Math.sin(angle));
       context.stroke();

@@ -328,8 +328,10 @@ class Replay {
     colours.edge = style.getPropertyValue("--solid-edge").trim();
     const shown = scene.tracks.filter((track) => !this.hidden.has(track.name));
     for (const [k, canvas] of this.canvases.entries()) {
-      const names = scene.panes === null ? null : scene.panes[k];
-      this.paintPane(canvas, { ...colours }, names === null ? shown : shown.filter((track) => names.includes(track.name)));
+      const names = scene.panes === null ? scene.tracks.map((track) => track.name) : scene.panes[k];
+      const own = scene.tracks.find((track) => track.name === names[0]);
+      const visible = shown.filter((track) => names.includes(track.name));
+      this.paintPane(canvas, { ...colours }, visible, own ? own.absent : {});
     }
     const late = scene.trusted_until !== null && clock.time > scene.trusted_until;
     figure.querySelector(".status").textContent = late ? "the truth is not trusted at this time" : "";
@@ -338,12 +340,12 @@ class Replay {
   }
 
   /* Draw tracks on a canvas. The truth is dashed above other tracks, and solid where it is the only one. */
-  paintPane(canvas, colours, shown) {
+  paintPane(canvas, colours, shown, absent) {
     const { scene, camera, clock } = this;
     const context = canvas.getContext("2d");
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
     const renderer = new Renderer(context, camera, colours, scene.unit);
-    renderer.drawGeometry(scene.geometry);
+    renderer.drawGeometry(scene.geometry, absent, clock.time);
     const [before, fraction] = this.between(clock.time);
     const isAlone = scene.panes !== null && shown.length === 1;
     const first = Math.max(0, WIDTHS.length - scene.tracks.filter((track) => track.css_class !== "truth").length);
@@ -399,14 +401,16 @@ class Replay {
     const { scene, camera } = this;
     const { context } = renderer;
     if (!shown.length) return;
-    context.textAlign = "left";
     for (const [n, name] of scene.geometry.names.entries()) {
       const x = this.pose[3 * n];
       if (Number.isNaN(x) || !name) continue;
       const reach = Math.max(...scene.geometry.shapes[scene.geometry.shape[n]].map((piece) => piece[0])) * camera.scale;
       const aside = Math.max(reach, 3) * 0.75 + 6;
       const text = name.length > 24 ? `${name.slice(0, 23)}…` : name;
-      renderer.write(text, camera.toX(x) + aside, camera.toY(this.pose[3 * n + 1]) - aside);
+      context.font = `12px ${renderer.colours.font}`;
+      const isAtEdge = camera.toX(x) + aside + context.measureText(text).width > camera.width;
+      context.textAlign = isAtEdge ? "right" : "left";
+      renderer.write(text, camera.toX(x) + (isAtEdge ? -aside : aside), camera.toY(this.pose[3 * n + 1]) - aside);
     }
   }
 }
