@@ -7,7 +7,7 @@ import click
 
 from sandbox.cli.common import exit_with_errors
 from sandbox.cli.progress import status_line
-from sandbox.cli.rehearse import changed_files, read_inputs
+from sandbox.cli.rehearse import changed_files, read_inputs, remarks_on_inputs
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, new_table, print_item, print_line, print_table
 from sandbox.formatting import format_number, format_plural
