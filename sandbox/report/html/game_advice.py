@@ -101,21 +101,21 @@ def _answers(advice: GameAdvice) -> Iterator[str]:
     if present.error_px is not None and present.error_px > advice.tolerance_px:
         failures.append(f"{present.body} is up to {_px(present.error_px)} px off at {present.time or 0.0:.3g} s")
     text = "; ".join(failures) or f"the recorded play keeps to {tolerance}, but not enough of those like it"
-    yield f"Present setting ({setting_text(present)}): {text}{_plays_text(None if plays is None else plays.present)}."
+    yield f"Present setting ({setting_text(present)}): {text}{_plays_text(plays.present)}."
     chosen = advice.chosen
     if chosen is None:
         yield f"No setting that was tried keeps to {tolerance}."
         return
     result = f"{_px(chosen.error_px)} px, {format_plural(chosen.lost, 'lost contact')}"
     cost = f"{format_number(chosen.physics_ms)} ms of physics per frame ({_cost_ratio(advice, chosen)})"
+    odds = _plays_text(plays.chosen)
     if advice.recommended is None:
         enough = " in enough plays" if chosen.is_within else ""
         yield (
             f"No setting that was tried keeps to {tolerance}{enough}. The most accurate one "
-            f"({setting_text(chosen)}): {result}, {cost}."
+            f"({setting_text(chosen)}): {result}, {cost}{odds}."
         )
         return
-    odds = _plays_text(None if plays is None else plays.recommended)
     yield f"Recommended setting ({setting_text(chosen)}): {result}, {cost}{odds}."
 
 
@@ -147,18 +147,15 @@ def _measured_by(advice: GameAdvice) -> Markup:
             f"It is known for {100.0 * advice.known_fraction:.3g} % of the positions, and only these count. "
             f"Not known: {bodies}."
         )
-    if advice.plays is not None:
-        displacement = advice.zoom * advice.plays.displacement
-        sentences.append(
-            f"In plays that differ a little, all bodies start up to {displacement:.3g} px off, and each input comes up "
-            "to a frame later."
-        )
+    displacement = advice.zoom * advice.plays.displacement
+    sentences.append(
+        f"In plays that differ a little, all bodies start up to {displacement:.3g} px off, and each input comes up to "
+        "a frame later."
+    )
     sentences.append(
         f"{format_plural(advice.tried, 'setting')} tried in {format_plural(advice.runs, 'run')} of the game, "
         f"{advice.seconds:.0f} s."
     )
-    if advice.interrupted:
-        sentences.append("Interrupted: only what was measured before is shown.")
     return concatenated(*(paragraph(isolated(each)) for each in sentences))
 
 
@@ -171,9 +168,7 @@ def setting_text(setting: GameSetting) -> str:
 
 def _settings_table(advice: GameAdvice, settings: Mapping[str, GameSetting]) -> Markup:
     """Return a row for each setting of `settings`."""
-    odds: dict[str, Proportion | None] = {}
-    if advice.plays is not None:
-        odds = {"present": advice.plays.present, "recommended": advice.plays.recommended}
+    odds = dict.fromkeys(settings, advice.plays.chosen) | {"present": advice.plays.present}
     columns: CellColumns[tuple[str, GameSetting]] = (
         (HtmlColumn("run"), lambda row: engine_name(row[0], CLASSES[row[0]])),
         (HtmlColumn("setting"), lambda row: setting_text(row[1])),

@@ -141,7 +141,6 @@ def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
         tried=7,
         runs=41,
         seconds=12.0,
-        interrupted=False,
         machine={"cpu": "a <processor>"},
         versions={"python": "3"},
     )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sandbox.measure.game_advice.difference import Truth
+from sandbox.measure.proportion import Proportion
 from sandbox.rehearsal.step_settings import StepSettings
 from sandbox.report.html.game_advice import game_advice_page, write_game_advice
 from sandbox.report.html.game_replay import GameTrack, game_replay_document
@@ -133,11 +134,12 @@ def test_page_without_a_recommended_setting_shows_the_most_accurate() -> None:
     shown = runs()
     advice = game_advice(shown)
     best = {**{name: shown[name] for name in ("truth", "present")}, "most accurate": shown["recommended"]}
-    held = None if advice.plays is None else replace(advice.plays, recommended=None)
+    held = replace(advice.plays, chosen=Proportion(8, 10))
     html = game_advice_page(
         replace(advice, recommended=None, most_accurate=advice.recommended, plays=held), best
     ).html()
     assert "No setting that was tried keeps to 1 px in enough plays. The most accurate one (4 substeps" in html
+    assert "8 of 10 plays that differ a little are within the tolerance." in html
     assert [track["name"] for track in data_of(html)["tracks"]] == list(best)
 
 
