@@ -223,6 +223,11 @@ if TYPE_CHECKING:
     from sandbox.pymunk_capture.state_log import (
         StateLog as StateLog,
     )
+    from sandbox.game_inputs import (
+        GameInputs as GameInputs,
+        InputEvent as InputEvent,
+        InputReading as InputReading,
+    )
     from sandbox.recording import (
         Press as Press,
         RecordedGame as RecordedGame,
@@ -412,6 +417,7 @@ _NAMES = {
     "sandbox.pymunk_capture.game_capture": "GameCapture SpaceCapture capture",
     "sandbox.pymunk_capture.space_capture": "CaptureError CaptureWarning from_pymunk",
     "sandbox.pymunk_capture.state_log": "StateLog",
+    "sandbox.game_inputs": "GameInputs InputEvent InputReading",
     "sandbox.recording": "Press RecordedGame Recording ReplayCheck",
     "sandbox.scene.compile.bodies": "Bodies",
     "sandbox.scene.compile.demands": "Demand demands",

@@ -22,18 +22,18 @@ VERSION = 1
 STATES = ("keys", "modifiers", "mouse", "mouse_buttons", "focus")
 """Kinds of readings that are states of keyboard and mouse"""
 
-Value = bool | int | float | str | list[Any] | dict[str, Any] | None
+InputValue = bool | int | float | str | list[Any] | dict[str, Any] | None
 """Value in JSON"""
 
 
-class Reading(NamedTuple):
+class InputReading(NamedTuple):
     """Value of an input as a call of the program saw it."""
 
     frame: int
     """number of the frame, from 0"""
     call: int
     """number of the call of this kind within the frame, from 0"""
-    value: Value
+    value: InputValue
 
 
 class InputEvent(NamedTuple):
@@ -44,7 +44,7 @@ class InputEvent(NamedTuple):
     """number of the call, within the frame, by which the program looks into its queue and finds the event"""
     type: int
     """number of the type in pygame"""
-    values: dict[str, Value]
+    values: dict[str, InputValue]
     """attributes"""
 
 
@@ -68,7 +68,7 @@ class GameInputs:
     """start, s since 1970"""
     frame_times: tuple[float, ...] = ()
     """time at the end of each frame, s since the start"""
-    readings: Mapping[str, tuple[Reading, ...]] = field(default_factory=dict)
+    readings: Mapping[str, tuple[InputReading, ...]] = field(default_factory=dict)
     """by kind: times (`time.perf_counter`, `pygame.time.get_ticks`, `tick`) of each call; states (`keys`, `mouse`)
     whenever they have changed"""
     events: tuple[InputEvent, ...] = ()
@@ -179,7 +179,7 @@ def jittered(inputs: GameInputs, seed: int) -> GameInputs:
         return (frame + 1, 0) if delay[min(frame, inputs.frames)] else (frame, call)
 
     readings = {
-        kind: tuple(Reading(*at(each.frame, each.call), each.value) for each in known) if kind in states else known
+        kind: tuple(InputReading(*at(each.frame, each.call), each.value) for each in known) if kind in states else known
         for kind, known in inputs.readings.items()
     }
     events = tuple(InputEvent(*at(each.frame, each.call), each.type, each.values) for each in inputs.events)

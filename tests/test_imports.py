@@ -96,6 +96,7 @@ IMPORT_STRINGS = {
     "sandbox.games.pinball": "parts of the game", "sandbox.gym": "entry points of environments",
     "sandbox.html_repr": "HTML of values in a notebook",
     "sandbox.measure.extremes.isolation": "module that a subprocess runs", "sandbox.notebook": "pages by type",
+    "sandbox.rehearsal.rehearse": "module that a subprocess runs",
 }  # fmt: skip
 """Modules that contain names of modules of the package as strings, and what for."""
 

@@ -17,7 +17,7 @@ from sandbox.echo import MAX_NAMED, shorten
 from sandbox.formatting import format_number, format_plural
 from sandbox.game_inputs import GameInputs, file_digest, load_inputs
 from sandbox.jsonable import in_json, to_json
-from sandbox.measure.game_advice.difference import CallbackDifference, Truth, contacts, difference_from
+from sandbox.measure.game_advice.difference import CallbackDifference, GameTruth, contacts, difference_from
 from sandbox.measure.game_advice.repeatability import first_mismatch, likely_causes
 from sandbox.progress import Progress
 from sandbox.rehearsal.rehearse import (
@@ -28,7 +28,7 @@ from sandbox.rehearsal.rehearse import (
     first_difference,
     rehearse,
 )
-from sandbox.rehearsal.step_settings import StepSettings
+from sandbox.rehearsal.step_settings import RehearsalSettings
 from sandbox.scene.errors import Fault, SceneError
 
 INDENT = "   "
@@ -236,9 +236,9 @@ def remarks_on_inputs(game: str, inputs: GameInputs) -> list[str]:
     return remarks
 
 
-def _read(options: _Options, faults: list[Fault]) -> tuple[GameInputs | None, StepSettings | None]:
+def _read(options: _Options, faults: list[Fault]) -> tuple[GameInputs | None, RehearsalSettings | None]:
     inputs: GameInputs | None = None
-    settings: StepSettings | None = None
+    settings: RehearsalSettings | None = None
     with collect_errors(faults):
         inputs = read_inputs(options.game, options.inputs)
     values: dict[str, str] = {}
@@ -251,7 +251,7 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[GameInputs | None, St
         if (given := getattr(options, name)) is not None:
             values[name] = str(given)
     with collect_errors(faults, "--set", (ValueError,)):
-        settings = StepSettings.of(values)
+        settings = RehearsalSettings.of(values)
     if options.states is not None:
         name = shorten(str(options.states), MAX_NAMED)
         faults += [Fault.of("--states", f"{name}: {reason}") for reason in reasons_not_writable(options.states)]
@@ -260,7 +260,9 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[GameInputs | None, St
     return inputs, settings
 
 
-def _rehearsed(options: _Options, inputs: GameInputs, settings: StepSettings) -> tuple[RehearsalDocument, Rehearsal]:
+def _rehearsed(
+    options: _Options, inputs: GameInputs, settings: RehearsalSettings
+) -> tuple[RehearsalDocument, Rehearsal]:
     """Run the game twice, and with other settings also with its own.
 
     Raises:
@@ -306,7 +308,7 @@ def _rehearsed(options: _Options, inputs: GameInputs, settings: StepSettings) ->
         differs = differs or (None if frame is None else f"the rehearsal differs from the recorded game: frame {frame}")
     elif mismatch is None:
         own = rehearse(options.game, inputs, **limits)
-        found = difference_from(Truth(own, {}, frozenset()), run, 0.0)
+        found = difference_from(GameTruth(own, {}, frozenset()), run, 0.0)
         lost = [each for each in found.callbacks if not each.is_equal]
         document = replace(
             document, from_own=FromOwn(error=found.error, body=found.body, frame=found.frame, callbacks=lost)

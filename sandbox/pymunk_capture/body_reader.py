@@ -9,14 +9,12 @@ from pymunk.batch import BodyFields, Buffer, get_space_bodies
 
 from sandbox.pymunk_capture.space_form import MotionState
 
-Row = tuple[float, float, float, float, float, float, float, float, float]
-
 FIELDS = BodyFields.ALL
 """Position, angle, velocity, angular velocity, force and torque, in this order"""
 WIDTH = 9
 
 
-class BodyState(NamedTuple):
+class MotionAndForce(NamedTuple):
     """Motion of a body, and the force and the torque on it."""
 
     motion: MotionState
@@ -31,7 +29,7 @@ class BodyReader:
         self._space, self._buffer = space, Buffer()
         self._ids: dict[pymunk.Body, int] = {}
 
-    def read(self, bodies: Iterable[pymunk.Body]) -> dict[pymunk.Body, BodyState]:
+    def read(self, bodies: Iterable[pymunk.Body]) -> dict[pymunk.Body, MotionAndForce]:
         """Return the present states of bodies; those that are not in the space are read one by one."""
         self._buffer.clear()
         get_space_bodies(self._space, FIELDS, self._buffer)
@@ -46,10 +44,10 @@ class BodyReader:
                 identity = ids_of[body] = body.id
             row = known.get(identity)
             if row is None:
-                found[body] = BodyState(MotionState.of(body), (*body.force, body.torque))
+                found[body] = MotionAndForce(MotionState.of(body), (*body.force, body.torque))
             else:
                 x, y, angle, vx, vy, spin, fx, fy, torque = row
-                found[body] = BodyState(MotionState((x, y), (vx, vy), angle, spin), (fx, fy, torque))
+                found[body] = MotionAndForce(MotionState((x, y), (vx, vy), angle, spin), (fx, fy, torque))
         if len(ids_of) > 2 * len(found):  # those of bodies that the game has removed
             self._ids = {body: ids_of[body] for body in found}
         return found

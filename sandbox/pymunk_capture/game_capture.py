@@ -24,7 +24,7 @@ from pydantic import ValidationError
 
 from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
 from sandbox.jsonable import finite
-from sandbox.pymunk_capture.body_reader import BodyReader, BodyState
+from sandbox.pymunk_capture.body_reader import BodyReader, MotionAndForce
 from sandbox.pymunk_capture.space_capture import (
     NOT_TURNED,
     CaptureError,
@@ -170,7 +170,7 @@ class SpaceCapture:
         """The median step, s."""
         return median_low(self._dts)
 
-    def _note_changes(self) -> dict[pymunk.Body, BodyState]:
+    def _note_changes(self) -> dict[pymunk.Body, MotionAndForce]:
         """Note what the game has changed since the physics of the last step, and return the states of all bodies."""
         space = self.space
         if tuple(space.gravity) != self._gravity:
@@ -287,7 +287,7 @@ class SpaceCapture:
             if value != before[key]:
                 self._act(SetParameter, path=f"{path}.{key}", value=value)
 
-    def _note_motion(self, states: Mapping[pymunk.Body, BodyState]) -> None:
+    def _note_motion(self, states: Mapping[pymunk.Body, MotionAndForce]) -> None:
         """Note bodies whose motion is not that after the physics of the last step, or was set within it."""
         for body, name in self._names.items():
             before, now = self._states[body], states[body].motion
@@ -320,7 +320,7 @@ class SpaceCapture:
             self._act(Move, **values)
         self._set_in_step = set()
 
-    def _note_forces(self, states: Mapping[pymunk.Body, BodyState]) -> None:
+    def _note_forces(self, states: Mapping[pymunk.Body, MotionAndForce]) -> None:
         """Note forces that the game applies for the next step, where they differ from those of the last one."""
         for body, name in self._names.items():
             force = states[body].force

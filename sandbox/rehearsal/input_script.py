@@ -17,7 +17,7 @@ MOUSE_BUTTONS = {f"mouse {number}": number for number in range(1, 6)}
 MAX_FRAMES = 1_000_000
 
 
-class ScriptedInput(BaseModel):
+class InputChange(BaseModel):
     """What happens to keys and mouse in one frame."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -53,7 +53,7 @@ class InputScript(BaseModel):
     """frames per second of the virtual clock"""
     seed: Annotated[int, Field(ge=0)] = 0
     """seed of `random` and `numpy.random`"""
-    input: tuple[ScriptedInput, ...] = ()
+    input: tuple[InputChange, ...] = ()
     """in any order"""
 
 
@@ -122,7 +122,7 @@ class ScriptedDevice:
         self._position = self._last_position = (0, 0)
         self._buttons = [False] * len(MOUSE_BUTTONS)
         self._timers: dict[int, _Timer] = {}
-        self._inputs: dict[int, list[ScriptedInput]] = {}
+        self._inputs: dict[int, list[InputChange]] = {}
         for each in script.input:
             self._inputs.setdefault(each.frame, []).append(each)
         self._start_frame()
@@ -148,7 +148,7 @@ class ScriptedDevice:
         if self._frame >= self._script.frames:
             self._pending.append(pygame.event.Event(pygame.QUIT))
 
-    def _happen(self, each: ScriptedInput) -> None:
+    def _happen(self, each: InputChange) -> None:
         if each.mouse is not None:
             moved = (each.mouse[0] - self._position[0], each.mouse[1] - self._position[1])
             self._position = each.mouse

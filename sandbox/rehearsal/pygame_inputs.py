@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import pygame
 
-from sandbox.game_inputs import Value
+from sandbox.game_inputs import InputValue
 from sandbox.rehearsal.tape import Events, InputTape
 
 KEYS = {name.removeprefix("K_").lower(): value for name, value in vars(pygame).items() if name.startswith("K_")}
@@ -120,7 +120,7 @@ class LiveDevice:
         self._set_timer(event, milliseconds, loops)
 
 
-class EventQueue:
+class PygameEventQueue:
     """Queue of events between a device and a program.
 
     Args:
@@ -196,9 +196,9 @@ class EventQueue:
     def _live(self) -> Events:
         return [(event.type, self._values(event)) for event in self._device.events()]
 
-    def _values(self, event: pygame.event.Event) -> dict[str, Value]:
+    def _values(self, event: pygame.event.Event) -> dict[str, InputValue]:
         """Return the attributes of an event that a recording can have."""
-        values: dict[str, Value] = {}
+        values: dict[str, InputValue] = {}
         for name, value in event.__dict__.items():
             if _is_value(value):
                 values[name] = _list(value)
@@ -213,7 +213,7 @@ def _is_value(value: Any) -> bool:
     return value is None or isinstance(value, (bool, int, float, str))
 
 
-def _tuples(values: dict[str, Value]) -> dict[str, Any]:
+def _tuples(values: dict[str, InputValue]) -> dict[str, Any]:
     """Return attributes with tuples, as pygame has them, for lists."""
     return {name: _tuple(value) for name, value in values.items()}
 
@@ -323,7 +323,7 @@ def pygame_inputs_from(
         end_frame: called after each frame that the program shows.
         note: called with a remark on what the tape cannot have.
     """
-    queue = EventQueue(tape, device, note)
+    queue = PygameEventQueue(tape, device, note)
     flip, update = pygame.display.flip, pygame.display.update
     joystick = pygame.joystick.Joystick
 

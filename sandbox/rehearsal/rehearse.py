@@ -12,7 +12,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.game_inputs import GameInputs, inputs_to_json
-from sandbox.rehearsal.step_settings import Nudge, StepSettings
+from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
 from sandbox.worker_process import ProcessEndedError, WorkerProcess, exit_text
 
 DEFAULT_TIME_LIMIT = 300.0
@@ -83,7 +83,7 @@ class CallbackCalls(NamedTuple):
 class Rehearsal:
     """Run of a game with recorded inputs."""
 
-    settings: StepSettings
+    settings: RehearsalSettings
     offsets: IntArray
     """(F + 1,) first row of each frame in `bodies` and `states`"""
     bodies: IntArray
@@ -104,7 +104,7 @@ class Rehearsal:
     body_names: Mapping[int, str]
     """names of bodies by number, as far as the game has variables for them"""
     own_settings: Mapping[str, float]
-    """settings of the space that makes the first step, by the names of `StepSettings`"""
+    """settings of the space that makes the first step, by the names of `RehearsalSettings`"""
     gravity: tuple[float, float]
     """gravity of that space, in units of the game per s²"""
     window: tuple[int, int] | None
@@ -152,7 +152,7 @@ class Rehearsal:
 def rehearse(
     program: str | Path,
     inputs: GameInputs,
-    settings: StepSettings | None = None,
+    settings: RehearsalSettings | None = None,
     *,
     nudge: Nudge | None = None,
     jitter_seed: int | None = None,
@@ -175,7 +175,7 @@ def rehearse(
     Raises:
         RehearsalError: the process has exceeded a limit, or has ended without a result.
     """
-    settings = settings or StepSettings()
+    settings = settings or RehearsalSettings()
     with tempfile.TemporaryDirectory(prefix="rehearsal-") as folder:
         scratch = Path(folder)
         (scratch / "inputs.json").write_text(json.dumps({"inputs": inputs_to_json(inputs)}), encoding="utf-8")
@@ -216,7 +216,7 @@ def kill_rehearsals() -> None:
         process.kill()
 
 
-def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, output: str) -> Rehearsal:
+def _rehearsal(settings: RehearsalSettings, answer: dict[str, Any], states: Path, output: str) -> Rehearsal:
     with np.load(states) as arrays:
         return Rehearsal(
             settings,

@@ -31,7 +31,7 @@ WORLD = -1
 """Number of the static body of a space"""
 
 
-class Change(NamedTuple):
+class SpaceChange(NamedTuple):
     """Body or joint that a game adds to a space, or removes from it, after its first step."""
 
     frame: int
@@ -108,7 +108,7 @@ class SpaceLog:
         """number of the body of each shape; `WORLD` for the static body of a space"""
         self.shapes: list[ShapeForm] = []
         """form of each shape, when the game adds it"""
-        self.changes: list[Change] = []
+        self.changes: list[SpaceChange] = []
         """bodies and joints that the game adds and removes, in order"""
         self.shape_changes: list[tuple[int, bool, int]] = []
         """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
@@ -123,7 +123,7 @@ class SpaceLog:
         self.step_calls: Counter[tuple[str, int]] = Counter()
         """calls of `Space.step` by file and line"""
         self.settings: dict[str, float] = {}
-        """settings of the space that makes the first step, by the names of `StepSettings`"""
+        """settings of the space that makes the first step, by the names of `RehearsalSettings`"""
         self.gravity = 0.0, 0.0
         """gravity of that space, in units of the game per s²"""
         self.window: tuple[int, int] | None = None
@@ -184,7 +184,7 @@ class SpaceLog:
     def _note_change(self, thing: pymunk.Body | pymunk.Constraint, *, is_added: bool) -> None:
         if self.steps:
             is_joint = isinstance(thing, pymunk.Constraint)
-            self.changes.append(Change(self.frame, is_added, is_joint, self._number(thing)))
+            self.changes.append(SpaceChange(self.frame, is_added, is_joint, self._number(thing)))
 
     def _note_shape(self, shape: pymunk.Shape, *, is_added: bool) -> None:
         if self.steps:

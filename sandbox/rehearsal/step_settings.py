@@ -17,7 +17,7 @@ WINDOW = 5
 
 
 @dataclass(frozen=True)
-class StepSettings:
+class RehearsalSettings:
     """Settings that replace those of the game; None keeps its own."""
 
     substeps: int = 1
@@ -135,7 +135,7 @@ class StepClock:
 
 @contextmanager
 def steps_with(
-    settings: StepSettings,
+    settings: RehearsalSettings,
     *,
     nudge: Nudge | None = None,
 ) -> Iterator[StepClock]:

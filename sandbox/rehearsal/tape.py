@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from sandbox.game_inputs import GameInputs, InputEvent, Reading, Value
+from sandbox.game_inputs import GameInputs, InputEvent, InputReading, InputValue
 
 TICK = 1e-5
 """s, by which the clock of a tape moves on with each reading that was not recorded: a program that waits in a loop ends
@@ -24,7 +24,7 @@ class EndOfTape(SystemExit):
     """Ends a program that runs beyond the recorded inputs."""
 
 
-Events = Sequence[tuple[int, dict[str, Value]]]
+Events = Sequence[tuple[int, dict[str, InputValue]]]
 """Types and attributes of events"""
 
 
@@ -34,7 +34,7 @@ class InputTape(Protocol):
     frame: int
     """number of the present frame"""
 
-    def state(self, kind: str, live: Callable[[], Value]) -> Value:
+    def state(self, kind: str, live: Callable[[], InputValue]) -> InputValue:
         """Return a state that holds until it changes, such as the pressed keys.
 
         Args:
@@ -51,7 +51,7 @@ class InputTape(Protocol):
             per_second: units of the reading per second.
         """
 
-    def result(self, kind: str, live: Callable[[], Value], otherwise: Callable[[float], Value]) -> Value:
+    def result(self, kind: str, live: Callable[[], InputValue], otherwise: Callable[[float], InputValue]) -> InputValue:
         """Return the result of a call, such as the movement of the mouse since the last call.
 
         Args:
@@ -89,12 +89,12 @@ class RecordingTape:
         self.frame = 0
         self._now = now
         self._calls: Counter[str] = Counter()
-        self._watched: dict[str, Callable[[], Value]] = {}
-        self.readings: dict[str, list[Reading]] = {}
+        self._watched: dict[str, Callable[[], InputValue]] = {}
+        self.readings: dict[str, list[InputReading]] = {}
         self.recorded_events: list[InputEvent] = []
         self.frame_times: list[float] = []
 
-    def state(self, kind: str, live: Callable[[], Value]) -> Value:
+    def state(self, kind: str, live: Callable[[], InputValue]) -> InputValue:
         """Return the present state of a device, and record it if it has changed."""
         value = live()
         self._watched[kind] = live
@@ -104,13 +104,13 @@ class RecordingTape:
     def time(self, kind: str, live: Callable[[], float], per_second: float = 1.0) -> float:  # noqa: ARG002
         """Return the reading of the real clock, and record it."""
         value = live()
-        self.readings.setdefault(kind, []).append(Reading(self.frame, self._count(kind), value))
+        self.readings.setdefault(kind, []).append(InputReading(self.frame, self._count(kind), value))
         return value
 
-    def result(self, kind: str, live: Callable[[], Value], otherwise: Callable[[float], Value]) -> Value:  # noqa: ARG002
+    def result(self, kind: str, live: Callable[[], InputValue], otherwise: Callable[[float], InputValue]) -> InputValue:  # noqa: ARG002
         """Return the result of a call, and record it."""
         value = live()
-        self.readings.setdefault(kind, []).append(Reading(self.frame, self._count(kind), value))
+        self.readings.setdefault(kind, []).append(InputReading(self.frame, self._count(kind), value))
         return value
 
     def events(self, live: Callable[[], Events]) -> Events:
@@ -131,10 +131,10 @@ class RecordingTape:
         self.frame += 1
         self._calls.clear()
 
-    def _note_state(self, kind: str, value: Value) -> None:
+    def _note_state(self, kind: str, value: InputValue) -> None:
         known, call = self.readings.setdefault(kind, []), self._count(kind)
         if not known or known[-1].value != value:
-            known.append(Reading(self.frame, call, value))
+            known.append(InputReading(self.frame, call, value))
 
     def _count(self, kind: str) -> int:
         self._calls[kind] += 1
@@ -155,7 +155,7 @@ class ReplayTape:
         self._inputs = inputs
         self._calls: Counter[str] = Counter()
         self._states = {kind: _Sequence(readings) for kind, readings in inputs.readings.items()}
-        self._results: Mapping[str, Mapping[tuple[int, int], Value]] = {
+        self._results: Mapping[str, Mapping[tuple[int, int], InputValue]] = {
             kind: {(each.frame, each.call): each.value for each in readings}
             for kind, readings in inputs.readings.items()
         }
@@ -163,7 +163,7 @@ class ReplayTape:
         self._offsets: dict[str, float] = {}
         self._next_event = 0
 
-    def state(self, kind: str, live: Callable[[], Value]) -> Value:
+    def state(self, kind: str, live: Callable[[], InputValue]) -> InputValue:
         """Return the state as the program saw it at this call of this frame; that of the device if it never did."""
         known = self._states.get(kind)
         if known is None:
@@ -182,7 +182,7 @@ class ReplayTape:
         self._last[kind] = value
         return value
 
-    def result(self, kind: str, live: Callable[[], Value], otherwise: Callable[[float], Value]) -> Value:  # noqa: ARG002
+    def result(self, kind: str, live: Callable[[], InputValue], otherwise: Callable[[float], InputValue]) -> InputValue:  # noqa: ARG002
         """Return the recorded result of a call."""
         at = self.frame, self._count(kind)
         known = self._results.get(kind, {})
@@ -254,10 +254,10 @@ class ReplayTape:
 class _Sequence:
     """States in order of time."""
 
-    def __init__(self, readings: Sequence[Reading]) -> None:
+    def __init__(self, readings: Sequence[InputReading]) -> None:
         self._times = [each[:2] for each in readings]
         self._values = [each.value for each in readings]
 
-    def at(self, frame: int, call: int) -> Value:
+    def at(self, frame: int, call: int) -> InputValue:
         """Return the last state at or before a call of a frame; the first one before it."""
         return self._values[max(bisect_right(self._times, (frame, call)) - 1, 0)]

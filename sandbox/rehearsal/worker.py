@@ -10,6 +10,7 @@ import runpy
 import sys
 import time
 import traceback
+from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from statistics import median_low
@@ -40,7 +41,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     from sandbox.pymunk_capture.pymunk6 import pymunk6_names
     from sandbox.rehearsal.guard import deny_changes, mirror_folders
     from sandbox.rehearsal.space_log import SpaceLog
-    from sandbox.rehearsal.step_settings import Nudge, StepSettings, steps_with
+    from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings, steps_with
     from sandbox.rehearsal.surroundings import replayed, started_as
 
     inputs = load_inputs(request["inputs"])
@@ -53,8 +54,10 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         for name, content in inputs.saved_files.items()
     }
     kept = [own_folder, Path.cwd()]
+    originals: dict[str, str] = {}
     if saved:
         mirrors = mirror_folders(kept, saved, scratch / "files")
+        originals = {str(mirror): str(folder) for folder, mirror in mirrors.items()}
         program = mirrors[own_folder] / program.relative_to(own_folder)
         os.chdir(mirrors[Path.cwd()])
     name = str(program)
@@ -65,7 +68,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         stack.enter_context(patch.object(sys, "stdin", nothing))
         if inputs.pymunk6:
             stack.enter_context(pymunk6_names())
-        steps = stack.enter_context(steps_with(StepSettings(**request["settings"]), nudge=nudge))
+        steps = stack.enter_context(steps_with(RehearsalSettings(**request["settings"]), nudge=nudge))
         tape = stack.enter_context(replayed(inputs, log))
         stack.enter_context(started_as(name, inputs.arguments))
         if not request["draws"]:
@@ -102,7 +105,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "gravity": log.gravity,
         "window": log.window,
         "dts": [min(log.dts), median_low(log.dts), max(log.dts)] if log.dts else [0.0, 0.0, 0.0],
-        "step_calls": [[file, line] for (file, line), _ in log.step_calls.most_common()],
+        "step_calls": [[_original(file, originals), line] for (file, line), _ in log.step_calls.most_common()],
         "has_forces": steps.has_forces,
         "impulse_readers": sorted(log.impulse_readers),
         "steps": log.steps,
@@ -112,6 +115,12 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "step_seconds": steps.seconds,
         "notes": [*notes, *(f"readings that the recording has none of: {kind}" for kind in tape.unread)],
     }
+
+
+def _original(file: str, originals: Mapping[str, str]) -> str:
+    """Return the path of a file of the game, which may run in a mirror of its folder."""
+    found = next((mirror for mirror in originals if Path(file).is_relative_to(mirror)), None)
+    return file if found is None else str(Path(originals[found]) / Path(file).relative_to(found))
 
 
 def _leave_out_drawing(stack: ExitStack) -> None:

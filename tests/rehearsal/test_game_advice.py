@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from sandbox.game_inputs import GameInputs, load_inputs
-from sandbox.measure.game_advice.difference import Truth, difference_from
+from sandbox.measure.game_advice.difference import GameTruth, difference_from
 from sandbox.measure.game_advice.result import GameAdvice
 from sandbox.measure.game_advice.step_code import StepCode
 from sandbox.measure.game_advice.study import GameFailedError, GameStudy, NotRepeatableError
 from sandbox.rehearsal.rehearse import Rehearsal, rehearse
-from sandbox.rehearsal.step_settings import StepSettings
+from sandbox.rehearsal.step_settings import RehearsalSettings
 from tests.cli.calling import process
 
 pytestmark = pytest.mark.fail_slow(300)  # each advice runs a game some 60 times, in processes of its own
@@ -90,16 +90,16 @@ def test_printed_lines_remove_the_defect(name: str, least_error: float, record: 
     before, after = (rehearse(each, inputs) for each in (f"{name}.py", game))
     assert after.failure is None
     # The edited game is the game with the setting that was measured, bit for bit.
-    measured = rehearse(f"{name}.py", inputs, StepSettings(**settings_of(advice)))
+    measured = rehearse(f"{name}.py", inputs, RehearsalSettings(**settings_of(advice)))
     assert after.hashes == measured.hashes
     assert after.hashes != before.hashes
     known = {body: round(time * 60) for body, time in horizons(advice, truth).items()}
-    difference = difference_from(Truth(truth, known, frozenset()), after, TOLERANCE)
+    difference = difference_from(GameTruth(truth, known, frozenset()), after, TOLERANCE)
     assert difference.error <= TOLERANCE
 
 
 def settings_of(advice: GameAdvice) -> dict[str, Any]:
-    """Return the chosen setting as arguments of `StepSettings`."""
+    """Return the chosen setting as arguments of `RehearsalSettings`."""
     assert advice.chosen is not None
     whole = ("substeps", "iterations", "persistence")
     return {name: int(value) if name in whole else value for name, value in advice.chosen.changed.items()}

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.rehearsal.input_script import InputScript, ScriptedDevice, load_script
-from sandbox.rehearsal.pygame_inputs import KEYS, EventQueue, PressedKeys, scan_code
+from sandbox.rehearsal.pygame_inputs import KEYS, PressedKeys, PygameEventQueue, scan_code
 from sandbox.rehearsal.tape import RecordingTape
 from sandbox.scene.errors import SceneError
 
@@ -63,7 +63,7 @@ def test_queue_is_that_of_pygame(calls: list[tuple[str, object]], blocked: list[
     pygame.event.clear()
     if blocked:
         pygame.event.set_blocked(blocked)
-    queue = EventQueue(RecordingTape(lambda: 0.0), NoEvents(), lambda _: None)
+    queue = PygameEventQueue(RecordingTape(lambda: 0.0), NoEvents(), lambda _: None)
     for number, (name, argument) in enumerate(calls):
         answers = []
         for owner in (pygame.event, queue):

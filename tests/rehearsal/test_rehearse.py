@@ -9,7 +9,7 @@ import pytest
 
 from sandbox.game_inputs import GameInputs, inputs_from_json, inputs_to_json, jittered, load_inputs
 from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, first_difference, rehearse
-from sandbox.rehearsal.step_settings import Nudge, StepSettings
+from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
 from tests.cli.calling import process
 
 pytestmark = pytest.mark.fail_slow(60)  # each test starts the interpreter several times, with pygame and pymunk
@@ -203,7 +203,7 @@ for k in range(60):
 def test_force_of_a_frame_acts_in_all_substeps(record: Recorder) -> None:
     record_of = record(game_file(FORCED))
     for substeps in (1, 2, 8):
-        run = rehearse("game.py", record_of, StepSettings(substeps=substeps))
+        run = rehearse("game.py", record_of, RehearsalSettings(substeps=substeps))
         _, states = run.frame(run.frames - 1)
         # v = F t / m = 6 N · 1 s / 2 kg, ω = τ t / I = 5 N m · 1 s / 10 kg m², to the rounding of 60 sums
         assert states[0, 3] == pytest.approx(3.0, abs=1e-12)
@@ -229,13 +229,14 @@ def test_settings_are_those_of_pymunk(record: Recorder) -> None:
     """Free fall in n steps, in each of which pymunk moves a body before it accelerates it: y = −g t² (1 − 1/n) / 2."""
     inputs = record(game_file(FALLING))
 
-    def height(settings: StepSettings) -> float:
+    def height(settings: RehearsalSettings) -> float:
         run = rehearse("game.py", inputs, settings)
         return float(run.frame(run.frames - 1)[1][0, 1])
 
-    for settings, steps in ((StepSettings(), 30), (StepSettings(substeps=3), 90), (StepSettings(dt=0.01), 120)):
+    finer = RehearsalSettings(substeps=3), RehearsalSettings(dt=0.01)
+    for settings, steps in zip((RehearsalSettings(), *finer), (30, 90, 120), strict=True):
         assert height(settings) == pytest.approx(-450.0 * (1 - 1 / steps), abs=1e-9)  # rounding of 120 sums
-    settings = StepSettings(iterations=25, slop=0.25, bias=0.5, persistence=7)
+    settings = RehearsalSettings(iterations=25, slop=0.25, bias=0.5, persistence=7)
     assert rehearse("game.py", inputs, settings).output.split() == ["10", "25", "0.25", "0.5", "7"]
 
 
@@ -277,6 +278,7 @@ def test_game_that_saves_has_its_files_of_before_and_changes_none(record: Record
         run = rehearse(game, inputs)
         assert run.failure is None, run.output
         assert run.hashes == inputs.frame_hashes
+        assert run.step_calls[0][0] == str(game.resolve())
     assert {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()} == kept
 
 

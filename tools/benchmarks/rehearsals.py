@@ -62,16 +62,16 @@ def _recorded() -> tuple[float, GameInputs]:
     """Play the game with a recording of its space and its inputs, without waiting."""
     os.environ |= {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
     from sandbox.pymunk_capture.game_capture import capture
-    from sandbox.rehearsal.input_script import InputScript, ScriptedInput
+    from sandbox.rehearsal.input_script import InputChange, InputScript
     from sandbox.rehearsal.surroundings import InputRecorder
 
     throws = [
         each
         for k in range(1, 10)
         for each in (
-            ScriptedInput(frame=60 * k, mouse=(80 * k, 500)),
-            ScriptedInput(frame=60 * k + 1, press="mouse 1"),
-            ScriptedInput(frame=60 * k + 5, release="mouse 1"),
+            InputChange(frame=60 * k, mouse=(80 * k, 500)),
+            InputChange(frame=60 * k + 1, press="mouse 1"),
+            InputChange(frame=60 * k + 5, release="mouse 1"),
         )
     ]
     recorder = InputRecorder(GAME, (), InputScript(frames=FRAMES, fps=FPS, seed=SEED, input=tuple(throws)))

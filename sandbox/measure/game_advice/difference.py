@@ -20,7 +20,7 @@ WINDOW = 30
 STEP_PHASES = ("pre_solve", "post_solve")
 """Callbacks that are called in each step of a contact, and therefore more often with substeps"""
 
-Pair = tuple[GameCallback, tuple[int, int]]
+CallbackPair = tuple[GameCallback, tuple[int, int]]
 """Callback and the numbers of two shapes"""
 
 
@@ -87,16 +87,16 @@ class GameDifference:
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class GameTruth:
     """Run of a game with many substeps, and how far it can be relied on."""
 
     run: Rehearsal
     horizons: Mapping[int, int]
     """first frame from which on the position of a body is not known, by number; bodies that are known to the end have
     none"""
-    uncertain: frozenset[tuple[Pair, int]]
+    uncertain: frozenset[tuple[CallbackPair, int]]
     """contacts, by their first frames, that a finer or a perturbed run does not have"""
-    doubtful: frozenset[tuple[Pair, int]] = frozenset()
+    doubtful: frozenset[tuple[CallbackPair, int]] = frozenset()
     """contacts of these runs that the truth does not have"""
 
     def horizon(self, body: int) -> int:
@@ -153,7 +153,7 @@ def _apart(run: Rehearsal, other: Rehearsal, frame: int) -> tuple[IntArray, Floa
     return shared, np.hypot(difference[:, 0], difference[:, 1]), np.setxor1d(bodies, others, assume_unique=True)
 
 
-def difference_from(truth: Truth, run: Rehearsal, tolerance: float) -> GameDifference:
+def difference_from(truth: GameTruth, run: Rehearsal, tolerance: float) -> GameDifference:
     """Return how far a run is from the truth.
 
     Args:
@@ -186,10 +186,10 @@ def difference_from(truth: Truth, run: Rehearsal, tolerance: float) -> GameDiffe
     )
 
 
-def contacts(run: Rehearsal) -> dict[Pair, list[int]]:
+def contacts(run: Rehearsal) -> dict[CallbackPair, list[int]]:
     """Return the first frames of the contacts for which each callback is called, by callback and shapes."""
-    found: dict[Pair, list[int]] = {}
-    last: dict[Pair, int] = {}
+    found: dict[CallbackPair, list[int]] = {}
+    last: dict[CallbackPair, int] = {}
     for each in run.calls:
         pair = run.callbacks[each.callback], each.shapes
         if each.frame - last.get(pair, -CHATTER - 1) > CHATTER:
@@ -198,7 +198,7 @@ def contacts(run: Rehearsal) -> dict[Pair, list[int]]:
     return found
 
 
-def unmatched(run: Rehearsal, other: Rehearsal) -> frozenset[tuple[Pair, int]]:
+def unmatched(run: Rehearsal, other: Rehearsal) -> frozenset[tuple[CallbackPair, int]]:
     """Return the contacts of a run that another one does not have, or not in time, by their first frames."""
     theirs = contacts(other)
     found = set()
@@ -220,7 +220,7 @@ def _match(frames: list[int], others: list[int]) -> Iterator[tuple[int, int | No
             yield frame, None
 
 
-def _callback_differences(truth: Truth, run: Rehearsal, frames: int) -> Iterator[CallbackDifference]:
+def _callback_differences(truth: GameTruth, run: Rehearsal, frames: int) -> Iterator[CallbackDifference]:
     expected, found = contacts(truth.run), contacts(run)
     for callback in dict.fromkeys([*truth.run.callbacks, *run.callbacks]):
         pairs = [pair for pair in dict.fromkeys([*expected, *found]) if pair[0] == callback]
@@ -265,7 +265,7 @@ def _body_of(truth: Rehearsal, run: Rehearsal, shape: int) -> int:
     return bodies[shape]
 
 
-def _horizon(truth: Truth, run: Rehearsal, shape: int) -> int:
+def _horizon(truth: GameTruth, run: Rehearsal, shape: int) -> int:
     """Return the frame up to which the body of a shape is known."""
     return truth.horizon(_body_of(truth.run, run, shape))
 

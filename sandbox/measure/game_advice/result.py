@@ -47,7 +47,7 @@ class GameSetting:
 
 
 @dataclass(frozen=True)
-class SettingChange:
+class GameSettingChange:
     """Effect of one change of the setting of the game."""
 
     change: str
@@ -101,7 +101,7 @@ class GameAdvice:
     most_accurate: GameSetting | None
     """without a recommended setting: the one that keeps to the tolerance in most of the plays that differ a little, or
     has the fewest lost contacts and the smallest error"""
-    changes: tuple[SettingChange, ...]
+    changes: tuple[GameSettingChange, ...]
     """effect of each single change of the present setting"""
     plays: PlaysHeld
     """odds over plays that differ a little"""

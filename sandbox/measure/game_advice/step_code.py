@@ -37,7 +37,7 @@ def step_code(file: str, line: int, substeps: int, changed: Mapping[str, float],
         file: source of the game.
         line: of the call of `Space.step`.
         substeps: of the step.
-        changed: settings that differ from those of the game, by the names of `StepSettings`.
+        changed: settings that differ from those of the game, by the names of `RehearsalSettings`.
         has_forces: whether the game applies forces for a step.
     """
     text = _source(file)

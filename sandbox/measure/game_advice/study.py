@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 
 from sandbox.game_inputs import GameInputs
-from sandbox.measure.game_advice.difference import IN_TIME, Truth, difference_from, part_frames, unmatched
+from sandbox.measure.game_advice.difference import IN_TIME, GameTruth, difference_from, part_frames, unmatched
 from sandbox.measure.game_advice.repeatability import Mismatch, first_mismatch, likely_causes
-from sandbox.measure.game_advice.result import GameAdvice, GameSetting, PlaysHeld, SettingChange
+from sandbox.measure.game_advice.result import GameAdvice, GameSetting, GameSettingChange, PlaysHeld
 from sandbox.measure.game_advice.step_code import step_code
 from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
 from sandbox.recording_remarks import MIN_PIXELS
 from sandbox.rehearsal.rehearse import GameShape, Rehearsal, RehearsalError, kill_rehearsals, rehearse
-from sandbox.rehearsal.step_settings import Nudge, StepSettings
+from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
 
 FIRST_TRUTH = 16
 """Substeps of the first run that is tried as the truth"""
@@ -76,7 +76,7 @@ class GameFailedError(Exception):
 class _Play:
     """What a rehearsal depends on besides the inputs."""
 
-    settings: StepSettings
+    settings: RehearsalSettings
     nudge: Nudge | None = None
     jitter_seed: int | None = None
 
@@ -138,7 +138,7 @@ class GameStudy:
             self.shown = {"truth": truth.run, "present": own}
             if best.changed:
                 name = "most accurate" if recommended is None else "recommended"
-                self.shown[name] = self._run(_Play(settings=StepSettings(**_given(best)))).result()
+                self.shown[name] = self._run(_Play(settings=RehearsalSettings(**_given(best)))).result()
             return self._advice(own, truth, truth_error, present, recommended, best, changes, plays, tried)
         except BaseException:  # such as Ctrl-C
             self._pool.shutdown(wait=False, cancel_futures=True)
@@ -152,8 +152,8 @@ class GameStudy:
     def _own_run(self) -> Rehearsal:
         """Return the run with the settings of the game, after a check that it can be repeated."""
         self._report("the game with its own settings")
-        drawn = [self._pool.submit(self._rehearse, _Play(settings=StepSettings()), True) for _ in range(2)]
-        plain = self._pool.submit(self._rehearse, _Play(settings=StepSettings()), False)
+        drawn = [self._pool.submit(self._rehearse, _Play(settings=RehearsalSettings()), True) for _ in range(2)]
+        plain = self._pool.submit(self._rehearse, _Play(settings=RehearsalSettings()), False)
         first, second = (each.result() for each in drawn)
         if first.failure is not None:
             raise GameFailedError(f"it fails in a rehearsal: {first.failure}\n{first.output.strip()}")
@@ -187,17 +187,17 @@ class GameStudy:
     def _time_left(self) -> float:
         return self._time_limit - (time.monotonic() - self._start)
 
-    # Truth
+    # GameTruth
 
-    def _truth(self) -> tuple[Truth, float]:
+    def _truth(self) -> tuple[GameTruth, float]:
         """Return the truth, and its distance from the run with half its substeps."""
         limit = TRUTH_FRACTION * self._tolerance
         substeps, best = FIRST_TRUTH, None
-        coarse = self._run(_Play(settings=StepSettings(substeps=substeps // 2)))
+        coarse = self._run(_Play(settings=RehearsalSettings(substeps=substeps // 2)))
         while True:
             self._report(f"truth: {substeps} substeps")
             begun = time.monotonic()
-            fine = self._run(_Play(settings=StepSettings(substeps=substeps)))
+            fine = self._run(_Play(settings=RehearsalSettings(substeps=substeps)))
             found = _truth_of(fine.result(), coarse.result(), limit)
             has_gained = best is None or found.known_fraction > GAIN * best.known_fraction
             best = found if best is None or found.known_fraction >= best.known_fraction else best
@@ -216,7 +216,7 @@ class GameStudy:
 
     # Settings
 
-    def _measured(self, run: Rehearsal, truth: Truth) -> GameSetting:
+    def _measured(self, run: Rehearsal, truth: GameTruth) -> GameSetting:
         """Return the error and the cost of a run."""
         difference = difference_from(truth, run, self._tolerance)
         own = {name: run.own_settings[name] for name in run.own_settings}
@@ -243,7 +243,7 @@ class GameStudy:
         times = self._inputs.frame_times
         return times[min(frame, len(times) - 1)] if times else 0.0
 
-    def _settings(self, settings: Iterable[StepSettings], truth: Truth) -> list[GameSetting]:
+    def _settings(self, settings: Iterable[RehearsalSettings], truth: GameTruth) -> list[GameSetting]:
         """Run settings, and return what was measured of each; those that fail are left out."""
         runs = [self._run(_Play(settings=each)) for each in settings]
         found = []
@@ -254,33 +254,33 @@ class GameStudy:
                 continue
         return found
 
-    def _changes(self, own: Rehearsal, truth: Truth) -> tuple[SettingChange, ...]:
+    def _changes(self, own: Rehearsal, truth: GameTruth) -> tuple[GameSettingChange, ...]:
         """Return the effect of each single change."""
         self._report("one change at a time")
         iterations = int(own.own_settings.get("iterations", 10))
         slop, dt = own.own_settings["slop"], own.dts[1]
         wanted = [
-            ("substeps 1 → 2", StepSettings(substeps=2)),
-            ("substeps 1 → 4", StepSettings(substeps=4)),
-            (f"iterations {iterations} → {2 * iterations}", StepSettings(iterations=2 * iterations)),
-            (f"iterations {iterations} → {4 * iterations}", StepSettings(iterations=4 * iterations)),
+            ("substeps 1 → 2", RehearsalSettings(substeps=2)),
+            ("substeps 1 → 4", RehearsalSettings(substeps=4)),
+            (f"iterations {iterations} → {2 * iterations}", RehearsalSettings(iterations=2 * iterations)),
+            (f"iterations {iterations} → {4 * iterations}", RehearsalSettings(iterations=4 * iterations)),
         ]
         if iterations > 1:
             half = max(iterations // 2, 1)
-            wanted.append((f"iterations {iterations} → {half}", StepSettings(iterations=half)))
+            wanted.append((f"iterations {iterations} → {half}", RehearsalSettings(iterations=half)))
         small = SLOP_PX / self._zoom
         if slop > small:
-            wanted.append((f"collision_slop {slop:.3g} → {small:.3g}", StepSettings(slop=small)))
+            wanted.append((f"collision_slop {slop:.3g} → {small:.3g}", RehearsalSettings(slop=small)))
         if "joint_bias" in own.own_settings:
             stiff = STIFF_JOINT ** (1.0 / dt) if dt else 0.0
             bias = own.own_settings["joint_bias"]
             if stiff < bias:
-                wanted.append((f"error_bias of joints {bias:.3g} → {stiff:.3g}", StepSettings(joint_bias=stiff)))
+                wanted.append((f"error_bias of joints {bias:.3g} → {stiff:.3g}", RehearsalSettings(joint_bias=stiff)))
         measured = self._settings((settings for _, settings in wanted), truth)
         names = {_key(settings.changed): change for change, settings in wanted}
-        return tuple(SettingChange(names[_key(each.changed)], each) for each in measured)
+        return tuple(GameSettingChange(names[_key(each.changed)], each) for each in measured)
 
-    def _tried(self, own: Rehearsal, changes: Sequence[SettingChange], truth: Truth) -> list[GameSetting]:
+    def _tried(self, own: Rehearsal, changes: Sequence[GameSettingChange], truth: GameTruth) -> list[GameSetting]:
         """Return settings with more substeps, until a few are within the tolerance, and with other iterations."""
         iterations = int(own.own_settings.get("iterations", 10))
         cores = os.cpu_count() or 1
@@ -291,7 +291,7 @@ class GameStudy:
         self._report("substeps")
         end = SEARCH * self._time_limit
         while left and sum(each.substeps > 1 for each in within) < ENOUGH and self._time_left > end:
-            found = self._settings([StepSettings(substeps=each) for each in left[:cores]], truth)
+            found = self._settings([RehearsalSettings(substeps=each) for each in left[:cores]], truth)
             left = left[cores:]
             tried += found
             within += [each for each in found if each.is_within]
@@ -308,11 +308,11 @@ class GameStudy:
         left_counts = sorted((each for each in costs if costs[each] < highest), key=costs.__getitem__)
         while left_counts and self._time_left > end:
             batch, left_counts = left_counts[:cores], left_counts[cores:]
-            tried += self._settings([StepSettings(substeps=n, iterations=k) for n, k in batch], truth)
+            tried += self._settings([RehearsalSettings(substeps=n, iterations=k) for n, k in batch], truth)
         return tried
 
     def _recommended(
-        self, own: Rehearsal, candidates: Sequence[GameSetting], truth: Truth
+        self, own: Rehearsal, candidates: Sequence[GameSetting], truth: GameTruth
     ) -> tuple[GameSetting | None, GameSetting, PlaysHeld]:
         """Return the cheapest setting that keeps to the tolerance, also in plays that differ a little.
 
@@ -321,14 +321,14 @@ class GameStudy:
         """
         iterations = int(own.own_settings.get("iterations", 10))
         plays = self._plays(truth)
-        present = sum(self._held(StepSettings(), plays))
+        present = sum(self._held(RehearsalSettings(), plays))
         within = sorted(
             {_key(each.changed): each for each in candidates if each.is_within}.values(),
             key=lambda each: _cost(each.substeps, each.iterations / iterations),
         )
         best: tuple[int, GameSetting] | None = None
         for each in within:
-            held = sum(self._held(StepSettings(**_given(each)), plays))
+            held = sum(self._held(RehearsalSettings(**_given(each)), plays))
             if held >= HELD * len(plays):
                 return each, each, self._odds(present, held, plays)
             if best is None or held > best[0]:
@@ -340,7 +340,7 @@ class GameStudy:
             return None, most_accurate, self._odds(present, None, plays)
         return None, best[1], self._odds(present, best[0], plays)
 
-    def _odds(self, present: int, held: int | None, plays: Sequence[tuple[_Play, Truth]]) -> PlaysHeld:
+    def _odds(self, present: int, held: int | None, plays: Sequence[tuple[_Play, GameTruth]]) -> PlaysHeld:
         return PlaysHeld(
             Proportion(present, len(plays)),
             None if held is None else Proportion(held, len(plays)),
@@ -349,22 +349,22 @@ class GameStudy:
 
     # Other plays
 
-    def _plays(self, truth: Truth) -> list[tuple[_Play, Truth]]:
+    def _plays(self, truth: GameTruth) -> list[tuple[_Play, GameTruth]]:
         """Return plays that differ a little from the recorded one, each with its truth, as many as the time allows."""
         fine = truth.run.settings.substeps
-        plays: list[tuple[_Play, Truth]] = []
+        plays: list[tuple[_Play, GameTruth]] = []
         for seed in range(2, 2 + self._plays_wanted):
             self._report(f"plays that differ a little: {len(plays)} of {self._plays_wanted}")
             nudge = Nudge(DISPLACEMENT / self._zoom, seed)
-            play = _Play(settings=StepSettings(), nudge=nudge, jitter_seed=seed)
-            runs = [self._run(replace(play, settings=StepSettings(substeps=each))) for each in (fine // 2, fine)]
+            play = _Play(settings=RehearsalSettings(), nudge=nudge, jitter_seed=seed)
+            runs = [self._run(replace(play, settings=RehearsalSettings(substeps=each))) for each in (fine // 2, fine)]
             coarse, exact = (each.result() for each in runs)
             plays.append((play, _truth_of(exact, coarse, TRUTH_FRACTION * self._tolerance)))
             if self._time_left <= PLAYED * self._time_limit:
                 break
         return plays
 
-    def _held(self, settings: StepSettings, plays: Sequence[tuple[_Play, Truth]]) -> list[bool]:
+    def _held(self, settings: RehearsalSettings, plays: Sequence[tuple[_Play, GameTruth]]) -> list[bool]:
         """Return whether a setting keeps to the tolerance, in each of some plays."""
         runs = [self._run(replace(play, settings=settings)) for play, _ in plays]
         return [self._measured(run.result(), truth).is_within for run, (_, truth) in zip(runs, plays, strict=True)]
@@ -374,12 +374,12 @@ class GameStudy:
     def _advice(
         self,
         own: Rehearsal,
-        truth: Truth,
+        truth: GameTruth,
         truth_error: float,
         present: GameSetting,
         recommended: GameSetting | None,
         best: GameSetting,
-        changes: tuple[SettingChange, ...],
+        changes: tuple[GameSettingChange, ...],
         plays: PlaysHeld,
         tried: Sequence[GameSetting],
     ) -> GameAdvice:
@@ -424,7 +424,7 @@ class GameStudy:
 
     def _timed(self, setting: GameSetting) -> GameSetting:
         """Return a setting with the least time of a few runs, one after the other."""
-        settings = StepSettings(**_given(setting))
+        settings = RehearsalSettings(**_given(setting))
         runs = [self._rehearse(_Play(settings=settings), self._draws) for _ in range(TIMINGS)]
         return replace(setting, physics_ms=min(1e3 * run.step_seconds / max(run.frames, 1) for run in runs))
 
@@ -456,18 +456,18 @@ OTHER_WORK = 1.0
 orders the settings that are tried; costs that are printed are measured."""
 
 
-def _truth_of(fine: Rehearsal, coarse: Rehearsal, limit: float) -> Truth:
+def _truth_of(fine: Rehearsal, coarse: Rehearsal, limit: float) -> GameTruth:
     """Return a run as the truth, as far as a coarser run agrees with it."""
     uncertain = unmatched(fine, coarse)
-    return Truth(fine, part_frames(fine, coarse, limit), uncertain, unmatched(coarse, fine))
+    return GameTruth(fine, part_frames(fine, coarse, limit), uncertain, unmatched(coarse, fine))
 
 
-def _without_chaos(truth: Truth, twin: Rehearsal, limit: float) -> Truth:
+def _without_chaos(truth: GameTruth, twin: Rehearsal, limit: float) -> GameTruth:
     """Return a truth that ends for each body where a run perturbed by rounding parts from it."""
     horizons = dict(truth.horizons)
     for body, frame in part_frames(truth.run, twin, limit).items():
         horizons[body] = min(frame, horizons.get(body, frame))
-    return Truth(
+    return GameTruth(
         truth.run,
         horizons,
         truth.uncertain | unmatched(truth.run, twin),

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.measure.game_advice.difference import Truth, difference_from
-from sandbox.measure.game_advice.result import GameAdvice, GameSetting, PlaysHeld, SettingChange
+from sandbox.measure.game_advice.difference import GameTruth, difference_from
+from sandbox.measure.game_advice.result import GameAdvice, GameSetting, GameSettingChange, PlaysHeld
 from sandbox.measure.game_advice.step_code import StepCode
 from sandbox.measure.proportion import Proportion
 from sandbox.rehearsal.rehearse import CallbackCalls, GameCallback, GameShape, Rehearsal
-from sandbox.rehearsal.step_settings import StepSettings
+from sandbox.rehearsal.step_settings import RehearsalSettings
 from tests.report.html.page_documents import HOSTILE
 
 FRAMES = 121
@@ -32,7 +32,7 @@ WALL, COIN, BALL_SHAPE, POST_SHAPE, BULLET_SHAPE = range(5)
 
 
 def rehearsal(
-    settings: StepSettings, *, hits: bool, lag: float = 0.0, frames: int = FRAMES, gravity: float = 900.0
+    settings: RehearsalSettings, *, hits: bool, lag: float = 0.0, frames: int = FRAMES, gravity: float = 900.0
 ) -> Rehearsal:
     """Return a run of the game.
 
@@ -90,13 +90,13 @@ def rehearsal(
 def runs() -> dict[str, Rehearsal]:
     """Return the runs to show."""
     return {
-        "truth": rehearsal(StepSettings(substeps=64), hits=True),
-        "present": rehearsal(StepSettings(), hits=False, lag=LAG),
-        "recommended": rehearsal(StepSettings(substeps=4), hits=True, lag=0.5),
+        "truth": rehearsal(RehearsalSettings(substeps=64), hits=True),
+        "present": rehearsal(RehearsalSettings(), hits=False, lag=LAG),
+        "recommended": rehearsal(RehearsalSettings(substeps=4), hits=True, lag=0.5),
     }
 
 
-def setting(run: Rehearsal, truth: Truth, changed: Mapping[str, float], physics_ms: float) -> GameSetting:
+def setting(run: Rehearsal, truth: GameTruth, changed: Mapping[str, float], physics_ms: float) -> GameSetting:
     """Return the setting of a run."""
     found = difference_from(truth, run, TOLERANCE_PX / ZOOM)
     return GameSetting(
@@ -116,7 +116,7 @@ def setting(run: Rehearsal, truth: Truth, changed: Mapping[str, float], physics_
 
 def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
     """Return the advice for the game with its runs."""
-    truth = Truth(shown["truth"], {}, frozenset())
+    truth = GameTruth(shown["truth"], {}, frozenset())
     present = setting(shown["present"], truth, {}, 0.2)
     recommended = setting(shown["recommended"], truth, {"substeps": 4}, 0.7)
     return GameAdvice(
@@ -127,6 +127,7 @@ def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
         tolerance_px=TOLERANCE_PX,
         zoom=ZOOM,
         dts=(1 / 60, 1 / 60, 1 / 60),
+        truth_frames=120,
         truth_substeps=64,
         truth_error_px=0.125,
         known_fraction=0.75,
@@ -134,7 +135,7 @@ def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
         present=present,
         recommended=recommended,
         most_accurate=None,
-        changes=(SettingChange("substeps 1 → 4", recommended), SettingChange("iterations 10 → 20", present)),
+        changes=(GameSettingChange("substeps 1 → 4", recommended), GameSettingChange("iterations 10 → 20", present)),
         plays=PlaysHeld(Proportion(1, 10), Proportion(9, 10), 0.2),
         code=StepCode("game.py", 12, "    space.step(dt)", ("    for _ in range(4):", f"        x({HOSTILE!r})")),
         remarks=(f"a remark on {HOSTILE}",),

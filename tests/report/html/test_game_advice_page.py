@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.measure.game_advice.difference import Truth
+from sandbox.measure.game_advice.difference import GameTruth
 from sandbox.measure.proportion import Proportion
-from sandbox.rehearsal.step_settings import StepSettings
+from sandbox.rehearsal.step_settings import RehearsalSettings
 from sandbox.report.html.game_advice import game_advice_page, write_game_advice
 from sandbox.report.html.game_replay import GameTrack, game_replay_document
 from sandbox.report.html.replay_data import ABSENT, decompress
@@ -53,7 +53,7 @@ def page_text(html: str) -> str:
 
 def document(**more: Any) -> dict[str, Any]:
     """Return the replay of the game with y down, or of one run of it with other arguments."""
-    found = runs() if not more else {"truth": rehearsal(StepSettings(), hits=True, **more)}
+    found = runs() if not more else {"truth": rehearsal(RehearsalSettings(), hits=True, **more)}
     return game_replay_document([GameTrack(name, "truth", run) for name, run in found.items()], DURATION, ZOOM)
 
 
@@ -89,9 +89,9 @@ def test_page_has_the_figures_of_the_advice(tmp_path: Path) -> None:
 
 def test_setting_that_only_departs_names_the_time() -> None:
     shown = {name: run for name, run in runs().items() if name != "recommended"}
-    shown["present"] = rehearsal(StepSettings(), hits=True, lag=LAG)
+    shown["present"] = rehearsal(RehearsalSettings(), hits=True, lag=LAG)
     advice = game_advice(runs())
-    present = setting(shown["present"], Truth(shown["truth"], {}, frozenset()), {}, 0.2)
+    present = setting(shown["present"], GameTruth(shown["truth"], {}, frozenset()), {}, 0.2)
     text = page_text(game_advice_page(replace(advice, present=present), shown).html())
     assert "too far off at 0.683 s" in text  # frame 41: 6 units · 41/120 · 0.5 px/unit is the first beyond 1 px
 
@@ -144,9 +144,9 @@ def test_page_without_a_recommended_setting_shows_the_most_accurate() -> None:
 
 
 def test_present_setting_within_the_tolerance_is_the_answer() -> None:
-    shown = {"truth": runs()["truth"], "present": rehearsal(StepSettings(), hits=True)}
+    shown = {"truth": runs()["truth"], "present": rehearsal(RehearsalSettings(), hits=True)}
     advice = game_advice(runs())
-    present = setting(shown["present"], Truth(shown["truth"], {}, frozenset()), {}, 0.2)
+    present = setting(shown["present"], GameTruth(shown["truth"], {}, frozenset()), {}, 0.2)
     html = game_advice_page(replace(advice, present=present, recommended=present, code=None), shown).html()
     assert "The present setting, 1 substep, 10 iterations, is the cheapest that keeps to 1 px." in html
     assert '<pre class="diff">' not in html
@@ -210,7 +210,7 @@ def test_removed_shapes_are_absent_from_then_on_and_added_ones_before() -> None:
 
 
 def test_run_that_ends_early_has_no_bodies_afterwards() -> None:
-    short = rehearsal(StepSettings(), hits=False, frames=50)
+    short = rehearsal(RehearsalSettings(), hits=False, frames=50)
     tracks = [GameTrack("truth", "truth", runs()["truth"]), GameTrack("present", "e1", short, [0.0] * 50)]
     data = game_replay_document(tracks, DURATION, ZOOM)
     found = positions(data, 1)
