@@ -122,7 +122,8 @@ def deny_changes(allowed: Sequence[Path], note: Callable[[str], None]) -> None:
     )
 
     def check(path: Path) -> None:
-        if not str(path.resolve()).startswith(folders):
+        # A temporary file without a name is opened by the path of its folder.
+        if not f"{path.resolve()}{os.sep}".startswith(folders):
             note(f"changes of {path}, which is not among the files that the recording has")
             raise DeniedError(f"{path}: a rehearsal does not change the files of the game")
 

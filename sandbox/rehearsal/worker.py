@@ -61,7 +61,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     with Path(os.devnull).open() as nothing, ExitStack() as stack:
         stack.enter_context(patch.object(sys, "stdin", nothing))
         steps = stack.enter_context(steps_with(StepSettings(**request["settings"]), nudge=nudge))
-        tape = stack.enter_context(replayed(inputs, log))
+        tape = stack.enter_context(replayed(inputs, log, draws=request["draws"]))
         stack.enter_context(started_as(name, inputs.arguments))
         if not request["draws"]:
             _leave_out_drawing(stack)
