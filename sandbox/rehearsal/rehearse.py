@@ -3,7 +3,7 @@
 import json
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,11 +32,36 @@ class GameCallback(NamedTuple):
 
     function: str
     """qualified name"""
-    type_a: int | None
-    """collision type; None for any"""
-    type_b: int | None
+    type_a: str
+    """name of the collision type in the game, or its number; `any` for any type"""
+    type_b: str
     phase: str
     """`begin`, `pre_solve`, `post_solve` or `separate`"""
+
+    def __str__(self) -> str:
+        """Return the callback as the game registers it."""
+        return f"on_collision({self.type_a}, {self.type_b}) {self.phase} {self.function}"
+
+
+class GameShape(NamedTuple):
+    """Form of a shape of a game, relative to its body."""
+
+    kind: str
+    """`circle`, `segment` or `polygon`"""
+    points: tuple[tuple[float, float], ...]
+    """centre of a circle, ends of a segment, vertices of a polygon, in units of the game"""
+    radius: float
+    is_sensor: bool
+
+
+class GameChange(NamedTuple):
+    """Body or joint that a game adds to a space, or removes from it, after its first step."""
+
+    frame: int
+    is_added: bool
+    is_joint: bool
+    number: int
+    """number of the body or of the joint, in the order in which the game adds them"""
 
 
 class CallbackCalls(NamedTuple):
@@ -67,6 +92,22 @@ class Rehearsal:
     """calls of callbacks, in order"""
     shape_bodies: tuple[int, ...]
     """number of the body of each shape; -1 for the static body of a space"""
+    shapes: tuple[GameShape, ...]
+    """form of each shape, when the game adds it"""
+    changes: tuple[GameChange, ...]
+    """bodies and joints that the game adds and removes, in order"""
+    body_names: Mapping[int, str]
+    """names of bodies by number, as far as the game has variables for them"""
+    own_settings: Mapping[str, float]
+    """settings of the space that makes the first step, by the names of `StepSettings`"""
+    dts: tuple[float, float, float]
+    """least, median and largest argument of `Space.step`, s"""
+    step_calls: tuple[tuple[str, int], ...]
+    """file and line of each call of `Space.step`, the most frequent first"""
+    has_forces: bool
+    """whether the game applies forces for a step; known from runs with substeps only"""
+    impulse_readers: tuple[int, ...]
+    """numbers of the callbacks that read the impulse or the energy of a contact"""
     hashes: tuple[str, ...]
     """hash of the states at the end of each frame"""
     steps: int
@@ -88,6 +129,10 @@ class Rehearsal:
     def frames(self) -> int:
         """Number of frames."""
         return len(self.offsets) - 1
+
+    def body_name(self, number: int) -> str:
+        """Return the name of a body: that of its variable in the game, or its number."""
+        return self.body_names.get(number, f"body {number}")
 
     def frame(self, number: int) -> tuple[IntArray, FloatArray]:
         """Return the numbers of the bodies and their states at the end of a frame."""
@@ -164,6 +209,14 @@ def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, out
             tuple(GameCallback(*each) for each in answer["callbacks"]),
             tuple(CallbackCalls(frame, kind, (a, b), count) for frame, kind, a, b, count in answer["calls"]),
             tuple(answer["shape_bodies"]),
+            tuple(GameShape(kind, tuple(map(tuple, points)), *rest) for kind, points, *rest in answer["shapes"]),
+            tuple(GameChange(*each) for each in answer["changes"]),
+            dict(answer["body_names"]),
+            answer["own_settings"],
+            tuple(answer["dts"]),
+            tuple((file, line) for file, line in answer["step_calls"]),
+            answer["has_forces"],
+            tuple(answer["impulse_readers"]),
             tuple(answer["hashes"]),
             answer["steps"],
             answer["ended"],

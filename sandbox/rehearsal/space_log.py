@@ -5,18 +5,23 @@ again in another run.
 """
 
 import hashlib
+import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from types import FrameType
 from typing import Any, ClassVar, NamedTuple
 from unittest.mock import patch
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakSet
 
 import numpy as np
 import pymunk
 from pymunk.batch import BodyFields, Buffer, get_space_bodies
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.rehearsal.step_settings import SPACE_ATTRIBUTES
+from sandbox.rehearsal.variable_names import body_names, type_name
 
 PHASES = ("begin", "pre_solve", "post_solve", "separate")
 FIELDS = BodyFields.BODY_ID | BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
@@ -26,16 +31,37 @@ WORLD = -1
 """Number of the static body of a space"""
 
 
-class CallbackCall(NamedTuple):
-    """Call of a collision callback of a game."""
+class Change(NamedTuple):
+    """Body or joint that a game adds to a space, or removes from it, after its first step."""
 
     frame: int
-    callback: int
-    """number of the callback"""
-    shapes: tuple[int, int]
-    """numbers of the two shapes, the smaller first"""
-    calls: int
-    """calls of this kind in the frame"""
+    is_added: bool
+    is_joint: bool
+    number: int
+    """number of the body or of the joint"""
+
+
+class ShapeForm(NamedTuple):
+    """Form of a shape, relative to its body."""
+
+    kind: str
+    """`circle`, `segment` or `polygon`"""
+    points: tuple[tuple[float, float], ...]
+    """centre of a circle, ends of a segment, vertices of a polygon"""
+    radius: float
+    is_sensor: bool
+
+    @classmethod
+    def of(cls, shape: pymunk.Shape) -> "ShapeForm":
+        """Return the form of a shape."""
+        if isinstance(shape, pymunk.Circle):
+            kind, points = "circle", [shape.offset]
+        elif isinstance(shape, pymunk.Segment):
+            kind, points = "segment", [shape.a, shape.b]
+        else:
+            assert isinstance(shape, pymunk.Poly)
+            kind, points = "polygon", shape.get_vertices()
+        return cls(kind, tuple((each.x, each.y) for each in points), shape.radius, shape.sensor)
 
 
 class LoggedFrame(NamedTuple):
@@ -53,8 +79,8 @@ class CallbackName:
 
     function: str
     """qualified name"""
-    types: tuple[int | None, int | None]
-    """collision types; None for any"""
+    types: tuple[str, str]
+    """names of the collision types, as the game has them, or their numbers; `any` for any type"""
     phase: str
     """`begin`, `pre_solve`, `post_solve` or `separate`"""
 
@@ -78,12 +104,28 @@ class SpaceLog:
         """calls of `Space.step`"""
         self._keeps_states = keeps_states
         self._stepped: dict[pymunk.Space, None] = {}  # since the end of the last frame
-        self.numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()
-        """number of each body, shape and joint"""
-        self._counts = {pymunk.Body: 0, pymunk.Shape: 0, pymunk.Constraint: 0}
-        self._by_id: dict[int, int] = {}
         self.shape_bodies: list[int] = []
         """number of the body of each shape; `WORLD` for the static body of a space"""
+        self.shapes: list[ShapeForm] = []
+        """form of each shape, when the game adds it"""
+        self.changes: list[Change] = []
+        """bodies and joints that the game adds and removes, in order"""
+        self.body_names: dict[int, str] = {}
+        """names of bodies by number, as far as the program has variables for them"""
+        self._numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()  # of each body, shape and joint
+        self._counts: Counter[str] = Counter()
+        self._by_id: dict[int, int] = {}  # number of a body by its id, which the batch functions of pymunk know
+        self._present: WeakSet[Any] = WeakSet()
+        self.dts: list[float] = []
+        """arguments of `Space.step`, s"""
+        self.step_calls: Counter[tuple[str, int]] = Counter()
+        """calls of `Space.step` by file and line"""
+        self.settings: dict[str, float] = {}
+        """settings of the space that makes the first step, by the names of `StepSettings`"""
+        self.impulse_readers: set[int] = set()
+        """numbers of the callbacks that read the impulse or the energy of a contact"""
+        self.running: int | None = None
+        """number of the callback that runs"""
         self._buffer = Buffer()
 
     @property
@@ -95,34 +137,58 @@ class SpaceLog:
         """Return whether a space has made a step since the end of the last frame."""
         return space in self._stepped
 
-    def note_step(self, space: pymunk.Space) -> None:
+    def note_step(self, space: pymunk.Space, dt: float, caller: FrameType) -> None:
         """Note that a space makes a step."""
+        if not self.steps:
+            self._note_start(space, caller)
         self._stepped[space] = None
         self.steps += 1
+        self.dts.append(dt)
+        self.step_calls[caller.f_code.co_filename, caller.f_lineno] += 1
 
     def note_added(self, objects: tuple[Any, ...]) -> None:
-        """Number objects that are added to a space."""
+        """Number objects that are added to a space, and note those that the game adds later."""
         for each in objects:
-            if isinstance(each, (list, tuple, set)):
-                self.note_added(tuple(each))
-            else:
-                self._number(each)
+            self._number(each)
+            if not isinstance(each, pymunk.Shape) and each not in self._present:
+                self._present.add(each)
+                self._note_change(each, is_added=True)
 
-    def _number(self, thing: Any) -> int:
-        known = self.numbers.get(thing)
+    def note_removed(self, objects: tuple[Any, ...]) -> None:
+        """Note objects that are removed from a space."""
+        for each in objects:
+            if each in self._present:
+                self._present.discard(each)
+                self._note_change(each, is_added=False)
+
+    def _note_start(self, space: pymunk.Space, caller: FrameType) -> None:
+        """Note settings, and the names of bodies in the code that makes the first step."""
+        self.settings = {name: getattr(space, attribute) for name, attribute in SPACE_ATTRIBUTES.items()}
+        if space.constraints:
+            self.settings["joint_bias"] = max(joint.error_bias for joint in space.constraints)
+        for body, name in body_names(caller):
+            self.body_names.setdefault(self._number(body), name)
+
+    def _note_change(self, thing: pymunk.Body | pymunk.Constraint, *, is_added: bool) -> None:
+        if self.steps:
+            is_joint = isinstance(thing, pymunk.Constraint)
+            self.changes.append(Change(self.frame, is_added, is_joint, self._number(thing)))
+
+    def _number(self, thing: pymunk.Body | pymunk.Shape | pymunk.Constraint) -> int:
+        """Return the number of an object; a new one the first time."""
+        known = self._numbers.get(thing)
         if known is not None:
             return known
-        kind = next((kind for kind in self._counts if isinstance(thing, kind)), None)
-        if kind is None:
-            return -1
-        number = self.numbers[thing] = self._counts[kind]
+        kind = _kind(thing)
+        number = self._numbers[thing] = self._counts[kind]
         self._counts[kind] += 1
         if isinstance(thing, pymunk.Body):
             self._by_id[thing.id] = number
         elif isinstance(thing, pymunk.Shape):
             body = thing.body
-            is_world = body is None or body is getattr(body.space, "static_body", None)
+            is_world = body is None or (body.space is not None and body is body.space.static_body)
             self.shape_bodies.append(WORLD if is_world or body is None else self._number(body))
+            self.shapes.append(ShapeForm.of(thing))
         return number
 
     def note_call(self, callback: int, arbiter: pymunk.Arbiter) -> None:
@@ -162,6 +228,10 @@ class SpaceLog:
         return self._by_id.get(identity, WORLD)
 
 
+def _kind(thing: object) -> str:
+    return next(kind.__name__ for kind in (pymunk.Body, pymunk.Shape, pymunk.Constraint) if isinstance(thing, kind))
+
+
 class LoggedCallback:
     """Collision callback of a game whose calls are logged. It can be copied and pickled if the callback can."""
 
@@ -173,9 +243,15 @@ class LoggedCallback:
 
     def __call__(self, arbiter: pymunk.Arbiter, space: pymunk.Space, data: Any) -> Any:
         """Log the call, and make it."""
-        if LoggedCallback.active is not None:
-            LoggedCallback.active.note_call(self._number, arbiter)
-        return self._function(arbiter, space, data)
+        log = LoggedCallback.active
+        if log is None:
+            return self._function(arbiter, space, data)
+        log.note_call(self._number, arbiter)
+        log.running = self._number
+        try:
+            return self._function(arbiter, space, data)
+        finally:
+            log.running = None
 
 
 @contextmanager
@@ -186,17 +262,22 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
         log: to which frames and calls are added.
         before_step: called before each step of the game.
     """
-    step, add, on_collision = pymunk.Space.step, pymunk.Space.add, pymunk.Space.on_collision
+    step, add, remove = pymunk.Space.step, pymunk.Space.add, pymunk.Space.remove
+    on_collision = pymunk.Space.on_collision
 
     def stepped(space: pymunk.Space, dt: float) -> None:
         if dt:  # pymunk makes no step of length 0
             before_step(space)
-            log.note_step(space)
+            log.note_step(space, dt, sys._getframe(1))
         step(space, dt)
 
     def added(space: pymunk.Space, *objects: Any) -> None:
         add(space, *objects)
         log.note_added(objects)
+
+    def removed(space: pymunk.Space, *objects: Any) -> None:
+        remove(space, *objects)
+        log.note_removed(objects)
 
     def registered(
         space: pymunk.Space,
@@ -208,21 +289,41 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
         separate: Any = None,
         data: Any = None,
     ) -> None:
+        game = sys._getframe(1)
+        types = _type_text(collision_type_a, game), _type_text(collision_type_b, game)
         given = dict(zip(PHASES, (begin, pre_solve, post_solve, separate), strict=True))
         for phase, function in given.items():
             if function is None or function is pymunk.empty_callback or isinstance(function, LoggedCallback):
                 continue
             text = getattr(function, "__qualname__", type(function).__qualname__)
-            name = CallbackName(text.replace("<locals>.", ""), (collision_type_a, collision_type_b), phase)
+            name = CallbackName(text.replace("<locals>.", ""), types, phase)
             given[phase] = LoggedCallback(function, log.callbacks.setdefault(name, len(log.callbacks)))
         on_collision(space, collision_type_a, collision_type_b, **given, data=data)
+
+    def noting(own: property) -> property:
+        assert own.fget is not None
+        read = own.fget
+
+        def value(arbiter: pymunk.Arbiter) -> Any:
+            if log.running is not None:
+                log.impulse_readers.add(log.running)
+            return read(arbiter)
+
+        return property(value)
 
     LoggedCallback.active = log
     try:
         with ExitStack() as stack:
+            for name in ("total_impulse", "total_ke"):
+                stack.enter_context(patch.object(pymunk.Arbiter, name, noting(getattr(pymunk.Arbiter, name))))
             stack.enter_context(patch.object(pymunk.Space, "step", stepped))
             stack.enter_context(patch.object(pymunk.Space, "add", added))
+            stack.enter_context(patch.object(pymunk.Space, "remove", removed))
             stack.enter_context(patch.object(pymunk.Space, "on_collision", registered))
             yield
     finally:
         LoggedCallback.active = None
+
+
+def _type_text(value: int | None, frame: FrameType) -> str:
+    return "any" if value is None else type_name(value, frame) or str(value)

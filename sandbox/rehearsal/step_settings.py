@@ -94,12 +94,13 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "joint_bias": (0.0, 1.0),
 }
 """Least and largest value of each setting"""
-_SPACE_ATTRIBUTES = {
+SPACE_ATTRIBUTES = {
     "iterations": "iterations",
     "slop": "collision_slop",
     "bias": "collision_bias",
     "persistence": "collision_persistence",
 }
+"""Attribute of a space for each setting that is one"""
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,8 @@ class StepClock:
 
     seconds: float = 0.0
     """with the callbacks of the game that they call, s"""
+    has_forces: bool = False
+    """whether the game applies forces for a step, in a run with substeps"""
 
 
 @contextmanager
@@ -141,7 +144,7 @@ def steps_with(
     step, clock = pymunk.Space.step, StepClock()
     overrides = [
         (attribute, getattr(settings, name))
-        for name, attribute in _SPACE_ATTRIBUTES.items()
+        for name, attribute in SPACE_ATTRIBUTES.items()
         if getattr(settings, name) is not None
     ]
     nudged: set[int] = set()
@@ -157,6 +160,7 @@ def steps_with(
             _move(space, nudge)
         start, count = perf_counter(), settings.count(dt)
         forces = [] if count == 1 else _forces(space)
+        clock.has_forces |= bool(forces)
         for substep in range(count):
             if substep:
                 for body, force, torque in forces:

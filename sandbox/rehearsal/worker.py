@@ -12,6 +12,7 @@ import time
 import traceback
 from contextlib import ExitStack
 from pathlib import Path
+from statistics import median_low
 from typing import Any
 from unittest.mock import patch
 
@@ -88,7 +89,15 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         # The order of `separate` callbacks within a step follows the addresses of shapes in memory.
         "calls": [[frame, callback, *shapes, count] for (frame, callback, shapes), count in sorted(log.calls.items())],
         "shape_bodies": log.shape_bodies,
+        "shapes": log.shapes,
+        "changes": log.changes,
+        "body_names": sorted(log.body_names.items()),
         "hashes": log.hashes,
+        "own_settings": log.settings,
+        "dts": [min(log.dts), median_low(log.dts), max(log.dts)] if log.dts else [0.0, 0.0, 0.0],
+        "step_calls": [[file, line] for (file, line), _ in log.step_calls.most_common()],
+        "has_forces": steps.has_forces,
+        "impulse_readers": sorted(log.impulse_readers),
         "steps": log.steps,
         "ended": ended,
         "failure": failure,
