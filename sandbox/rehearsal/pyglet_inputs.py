@@ -5,6 +5,7 @@ sends to windows, in a step of the event loop or in `Window.dispatch_events`, pa
 at the end of the step. Events that the program dispatches itself do not: it dispatches them in each run.
 """
 
+import ctypes
 import importlib
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,38 +17,16 @@ from typing import Any
 from unittest.mock import patch
 from weakref import WeakValueDictionary
 
-import pygame
-
 from sandbox.game_inputs import PYGLET_EVENT, Value
 from sandbox.rehearsal.input_script import ScriptedDevice
-from sandbox.rehearsal.pygame_inputs import KEYS, LOST, is_value
+from sandbox.rehearsal.pygame_inputs import LOST, is_value
+from sandbox.rehearsal.pyglet_script import ScriptedWindow
 from sandbox.rehearsal.tape import EndOfTape, Events, InputTape
 
 TICK = "pyglet.clock.tick"
 """Kind of the readings with which a clock moves on: one for each turn of the event loop"""
 CLOCK = "pyglet.clock"
 """Kind of the other readings of clocks, as by `schedule_once`"""
-_KEY_NAMES = {
-    "KP_ENTER": "NUM_ENTER",
-    "KP_PLUS": "NUM_ADD",
-    "KP_MINUS": "NUM_SUBTRACT",
-    "KP_MULTIPLY": "NUM_MULTIPLY",
-    "KP_DIVIDE": "NUM_DIVIDE",
-    "KP_PERIOD": "NUM_DECIMAL",
-    "KP_EQUALS": "NUM_EQUAL",
-    **{f"KP{digit}": f"NUM_{digit}" for digit in range(10)},
-    "LSUPER": "LWINDOWS",
-    "RSUPER": "RWINDOWS",
-    "SCROLLOCK": "SCROLLLOCK",
-}
-"""Names in pyglet of keys that pygame names otherwise"""
-_MODIFIERS = {
-    "MOD_SHIFT": ("LSHIFT", "RSHIFT"),
-    "MOD_CTRL": ("LCTRL", "RCTRL"),
-    "MOD_ALT": ("LALT", "RALT"),
-}
-_MOTIONS = ("UP", "DOWN", "LEFT", "RIGHT", "HOME", "END", "PAGEUP", "PAGEDOWN", "BACKSPACE", "DELETE")
-"""Keys that move the cursor of a text"""
 
 
 class _ImportHook:
@@ -131,6 +110,15 @@ def pyglet_inputs_from(
         yield
 
 
+def _has_egl() -> bool:
+    """Return whether pyglet can draw without a display; where it cannot, its windows are hidden."""
+    try:
+        ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return False
+    return True
+
+
 class _Patches:
     """Patches of the modules of pyglet.
 
@@ -156,7 +144,7 @@ class _Patches:
         self._is_collecting = False  # the platform sends events
         self._collected: list[tuple[Any, tuple[Any, ...]]] = []
         self._clock_kind = CLOCK
-        self._keyboard: _ScriptedWindow | None = None
+        self._keyboard: ScriptedWindow | None = None
 
     def _patch(self, owner: Any, name: str, function: Any, *, create: bool = False) -> None:
         self._stack.enter_context(patch.object(owner, name, function, create=create))
@@ -164,17 +152,17 @@ class _Patches:
     def options(self, pyglet: Any) -> None:
         """Patch `pyglet`: windows are not shown."""
         if self._device is not None:
-            self._patch(pyglet.options, "headless", True)
+            self._patch(pyglet.options, "headless", _has_egl())
             self._patch(pyglet.options, "audio", ("silent",))
 
     def sound(self, drivers: Any) -> None:
-        """Patch `pyglet.media.drivers`: no driver, whose threads would post events at any time."""
+        """Patch `pyglet.media.drivers`: sounds have no thread, which would post events at any time."""
         if self._device is not None:
-            self._patch(drivers, "get_audio_driver", lambda: None)
+            self._patch(drivers, "get_audio_driver", _NoSound)
 
     def before_input(self, _: Any) -> None:
         """Import what `pyglet.input` takes from `pyglet.window` on Linux, where windows that are not shown lack it."""
-        if self._device is not None and sys.platform == "linux":
+        if self._device is not None and sys.modules["pyglet"].options.headless and sys.platform == "linux":
             importlib.import_module("pyglet.window.xlib")
 
     def input(self, module: Any) -> None:
@@ -318,16 +306,29 @@ class _Patches:
         self._patch(window_type, "dispatch_pending_events", dispatch_pending_events)
         self._patch(window_type, "flip", shown)
         if self._device is not None:
-            self._keyboard = _ScriptedWindow(module.key)
-            self._complete(window_type)
+            self._keyboard = ScriptedWindow(module.key)
+            if sys.modules["pyglet"].options.headless:
+                self._complete(window_type)
+            else:
+                self._hide(window_type)
 
     def _collect_queue(self, window: Any) -> None:
         """Take the events that a window has kept since before the event loop."""
         while window._event_queue:
             self._collected.append((window, window._event_queue.popleft()))
 
+    def _hide(self, window_type: Any) -> None:
+        """Patch windows of the platform: they never appear."""
+
+        def set_visible(window: Any, visible: bool = True) -> None:
+            window._visible = visible
+            window.dispatch_event("_on_internal_resize", window._width, window._height)
+
+        self._patch(window_type, "set_visible", set_visible)
+        self._patch(window_type, "activate", lambda _: None)
+
     def _complete(self, window_type: Any) -> None:
-        """Patch windows that are not shown: with them a program can do all that it can with a window."""
+        """Patch windows of EGL, which have no platform: with them a program can do all that it can with a window."""
         set_size = window_type.__mro__[1].set_size
 
         def resize(window: Any, width: int, height: int) -> None:
@@ -418,69 +419,12 @@ class _Patches:
             window._mouse_in_window = name != "on_mouse_leave"
 
 
-class _ScriptedWindow:
-    """Events of pyglet for those of pygame.
+class _NoSound:
+    """Driver, player and listener of sounds that does nothing."""
 
-    Positions of the mouse are those of the library: in pyglet y points up.
+    def __getattr__(self, name: str) -> Callable[..., "_NoSound"]:
+        return lambda *_, **__: self
 
-    Args:
-        key: module `pyglet.window.key`.
-    """
-
-    def __init__(self, key: Any) -> None:
-        self._key = key
-        self._pressed: set[int] = set()
-        self._buttons = 0
-        self._symbols = {
-            code: code if 0x20 <= code < 0x7F else getattr(key, _KEY_NAMES.get(name.upper(), name.upper()), None)
-            for name, code in KEYS.items()
-        }
-        self._motions = {getattr(key, name): getattr(key, f"MOTION_{name}", getattr(key, name)) for name in _MOTIONS}
-
-    def events(self, event: pygame.event.Event, windows: Sequence[Any]) -> list[tuple[Any, tuple[Any, ...]]]:
-        """Return the events of windows for an event of pygame: the first window has keyboard and mouse."""
-        windows = [window for window in windows if window.context is not None]
-        if event.type == pygame.QUIT:
-            return [(window, ("on_close",)) for window in windows]
-        return [(windows[0], each) for each in self._events(event)] if windows else []
-
-    def _events(self, event: pygame.event.Event) -> list[tuple[Any, ...]]:
-        if event.type in (pygame.KEYDOWN, pygame.KEYUP):
-            return self._of_key(event)
-        if event.type == pygame.MOUSEMOTION:
-            if self._buttons:
-                return [("on_mouse_drag", *event.pos, *event.rel, self._buttons, self._modifiers)]
-            return [("on_mouse_motion", *event.pos, *event.rel)]
-        if event.type in (pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP):
-            button = 1 << (event.button - 1)
-            is_pressed = event.type == pygame.MOUSEBUTTONDOWN
-            self._buttons = self._buttons | button if is_pressed else self._buttons & ~button
-            name = "on_mouse_press" if is_pressed else "on_mouse_release"
-            return [(name, *event.pos, button, self._modifiers)]
-        return []
-
-    def _of_key(self, event: pygame.event.Event) -> list[tuple[Any, ...]]:
-        symbol = self._symbols.get(event.key)
-        if symbol is None:
-            symbol = self._key.user_key(event.scancode)
-        modifiers = self._modifiers
-        if event.type == pygame.KEYUP:
-            self._pressed.discard(symbol)
-            return [("on_key_release", symbol, modifiers)]
-        self._pressed.add(symbol)
-        found: list[tuple[Any, ...]] = [("on_key_press", symbol, modifiers)]
-        if symbol in self._motions:
-            found.append(("on_text_motion", self._motions[symbol]))
-        elif symbol == self._key.RETURN:
-            found.append(("on_text", "\r"))
-        elif 0x20 <= symbol < 0x7F and not modifiers & ~self._key.MOD_SHIFT:
-            found.append(("on_text", chr(symbol).upper() if modifiers else chr(symbol)))
-        return found
-
-    @property
-    def _modifiers(self) -> int:
-        return sum(
-            getattr(self._key, name)
-            for name, keys in _MODIFIERS.items()
-            if any(getattr(self._key, each) in self._pressed for each in keys)
-        )
+    def get_time(self) -> float:
+        """Return the position in the sound, s."""
+        return 0.0

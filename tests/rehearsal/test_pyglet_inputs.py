@@ -99,13 +99,13 @@ def test_a_game_is_rehearsed_bit_for_bit_and_its_inputs_act(program: str, tmp_pa
 )
 def test_examples_of_pymunk_are_rehearsed_bit_for_bit(name: str, inputs: list[str], tmp_path: Path) -> None:
     program = EXAMPLES / f"{name}.py"
-    played, _ = play(program, scripted(*inputs, frames=60), tmp_path)
-    assert played.steps >= 15
+    played, _ = play(program, scripted(*inputs, frames=40), tmp_path)
+    assert played.steps >= 10
     found = rehearse(program, played)
     assert (found.failure, found.steps) == (None, played.steps)
     assert first_difference(played.frame_hashes, found.hashes) is None
     if inputs:
-        without, _ = play(program, scripted(frames=60), tmp_path)
+        without, _ = play(program, scripted(frames=40), tmp_path)
         assert first_difference(without.frame_hashes, found.hashes) is not None
 
 

@@ -6,7 +6,9 @@ import pyglet
 import pymunk
 from pyglet.window import key
 
+pyglet.options["audio"] = ("silent",)
 window = pyglet.window.Window(320, 240, "game")
+beep = pyglet.media.StaticSource(pyglet.media.synthesis.Sine(0.2))
 keys = key.KeyStateHandler()
 space = pymunk.Space()
 space.gravity = 0, -500
@@ -43,6 +45,7 @@ def on_mouse_press(x, y, button, modifiers):
     print("mouse", x, y, flush=True)
     if button == pyglet.window.mouse.LEFT:
         add_ball((x, y), (300, 100), 5)
+        beep.play()
 
 
 def update(dt):
