@@ -27,6 +27,8 @@ TICK = "pyglet.clock.tick"
 """Kind of the readings with which a clock moves on: one for each turn of the event loop"""
 CLOCK = "pyglet.clock"
 """Kind of the other readings of clocks, as by `schedule_once`"""
+_RESIZE_EVENTS = ("_on_internal_resize", "on_resize")
+"""Event by which the platform resizes a window: in pyglet 2.1 the first one, whose handler dispatches the second"""
 
 
 class _ImportHook:
@@ -152,8 +154,9 @@ class _Patches:
     def options(self, pyglet: Any) -> None:
         """Patch `pyglet`: windows are not shown."""
         if self._device is not None:
-            self._patch(pyglet.options, "headless", _has_egl())
-            self._patch(pyglet.options, "audio", ("silent",))
+            for name, value in (("headless", _has_egl()), ("audio", ("silent",))):
+                self._stack.callback(pyglet.options.__setitem__, name, pyglet.options[name])
+                pyglet.options[name] = value
 
     def sound(self, drivers: Any) -> None:
         """Patch `pyglet.media.drivers`: sounds have no thread, which would post events at any time."""
@@ -162,7 +165,7 @@ class _Patches:
 
     def before_input(self, _: Any) -> None:
         """Import what `pyglet.input` takes from `pyglet.window` on Linux, where windows that are not shown lack it."""
-        if self._device is not None and sys.modules["pyglet"].options.headless and sys.platform == "linux":
+        if self._device is not None and sys.modules["pyglet"].options["headless"] and sys.platform == "linux":
             importlib.import_module("pyglet.window.xlib")
 
     def input(self, module: Any) -> None:
@@ -307,22 +310,22 @@ class _Patches:
         self._patch(window_type, "flip", shown)
         if self._device is not None:
             self._keyboard = ScriptedWindow(module.key)
-            if sys.modules["pyglet"].options.headless:
+            if window_type.__module__ == "pyglet.window.headless":
                 self._complete(window_type)
             else:
                 self._hide(window_type)
 
     def _collect_queue(self, window: Any) -> None:
         """Take the events that a window has kept since before the event loop."""
-        while window._event_queue:
-            self._collected.append((window, window._event_queue.popleft()))
+        self._collected += [(window, event) for event in window._event_queue]
+        window._event_queue.clear()
 
     def _hide(self, window_type: Any) -> None:
         """Patch windows of the platform: they never appear."""
 
         def set_visible(window: Any, visible: bool = True) -> None:
             window._visible = visible
-            window.dispatch_event("_on_internal_resize", window._width, window._height)
+            _dispatch_size(window)
 
         self._patch(window_type, "set_visible", set_visible)
         self._patch(window_type, "activate", lambda _: None)
@@ -333,10 +336,10 @@ class _Patches:
 
         def resize(window: Any, width: int, height: int) -> None:
             set_size(window, width, height)
-            window.dispatch_event("_on_internal_resize", width, height)
+            _dispatch_size(window)
 
         def recreate(window: Any, _: Sequence[str]) -> None:
-            window.dispatch_event("_on_internal_resize", window._width, window._height)
+            _dispatch_size(window)
 
         clipboard = ""
 
@@ -383,6 +386,8 @@ class _Patches:
         numbers = {id(window): number for number, window in self._windows.items()}
         found: list[tuple[int, dict[str, Value]]] = []
         for window, (name, *arguments) in collected:
+            if id(window) not in numbers:
+                continue  # made before the tape
             if is_value(arguments):
                 found.append((PYGLET_EVENT, {"window": numbers[id(window)], "name": name, "arguments": arguments}))
             else:
@@ -399,7 +404,7 @@ class _Patches:
                 continue  # closed
             if self._device is not None:
                 self._apply(window, str(name), arguments)
-            if name == "_on_internal_resize":
+            if name in _RESIZE_EVENTS:
                 window.switch_to()
             dispatch = sys.modules["pyglet.event"].EventDispatcher.dispatch_event
             # What handlers dispatch is dispatched at once, as in the event loop.
@@ -412,11 +417,17 @@ class _Patches:
     @staticmethod
     def _apply(window: Any, name: str, arguments: list[Any]) -> None:
         """Give a window the attributes that the platform gives it with an event."""
-        if name == "_on_internal_resize":
+        if name in _RESIZE_EVENTS:
             window._width, window._height = arguments
         elif name.startswith("on_mouse_"):
             window._mouse_x, window._mouse_y = arguments[:2]
             window._mouse_in_window = name != "on_mouse_leave"
+
+
+def _dispatch_size(window: Any) -> None:
+    """Dispatch the size of a window, as the platform does after a change."""
+    name = next(name for name in _RESIZE_EVENTS if name in window.event_types)
+    window.dispatch_event(name, window._width, window._height)
 
 
 class _NoSound:
