@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
+from sandbox.atomic_write import atomic_write
 from sandbox.resource_limits import SESSION_SIZE, read_limited
 from sandbox.scene.errors import Fault, SceneError
 
@@ -145,6 +146,16 @@ def load_inputs(path: str | Path) -> GameInputs:
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise SceneError([Fault.of(str(path), f"cannot be read: {reason}")]) from None
+
+
+def save_inputs(inputs: GameInputs, path: Path) -> None:
+    """Write a file that has the inputs of a game only, and no scene.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with atomic_write(path) as temporary:
+        temporary.write_text(json.dumps({"inputs": inputs_to_json(inputs)}, indent=1), encoding="utf-8")
 
 
 def file_digest(path: Path) -> str:

@@ -233,6 +233,8 @@ class Recording:
 
 def _not_a_session(document: Any) -> str:
     """Return the reason why a JSON document is not a session."""
+    if isinstance(document, Mapping) and "inputs" in document and "scene" not in document:
+        return "it has the inputs of a game only, whose space cannot be a scene; `sandbox advise GAME.py` takes them"
     made = {"runs": "run", "engines": "compare", "points": "tradeoff", "cells": "extremes", "$schema": "schema"}
     if isinstance(document, Mapping) and "format" not in document:
         for key, command in made.items():

@@ -29,6 +29,8 @@ def remarks_on(recording: Recording) -> tuple[str, ...]:
         remarks += [f"a replay may differ by rounding: {each}" for each in game.inexact]
     if check is not None and not check.is_equal:
         remarks.append(replay_sentence(recording.scene, check))
+    if remarks and recording.inputs is not None:
+        remarks.append(f"`sandbox advise {recording.inputs.program}` runs the game itself, which lacks nothing of this")
     return tuple(remarks)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 import numpy as np
+from click.core import ParameterSource
 
 from sandbox.cli.common import (
     collect_errors,
@@ -33,6 +34,7 @@ from sandbox.cli.streams import print_json
 from sandbox.cli.tables import add_columns, format_optional, new_table, print_item, print_line, print_table
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.game_inputs import load_inputs
 from sandbox.measure.advice.result import Advice, Knob, MeasuredSetting, OtherEngine
 from sandbox.measure.advice.study import DEFAULT_FPS, DEFAULT_ZOOM, advise
 from sandbox.measure.advice.text import (
@@ -121,6 +123,8 @@ class _Options(OutputOptions):
     """The command line as typed; None for an option that was left out."""
 
     scene: str
+    inputs: str | None
+    takes_scene: bool
     engine: str | None
     overrides: tuple[str, ...]
     fps: float
@@ -154,7 +158,9 @@ class _Options(OutputOptions):
 
 
 @click.command(name="advise")
-@click.argument("scene", metavar="SCENE|RECORDING")
+@click.argument("scene", metavar="SCENE|RECORDING|GAME.py")
+@click.option("--inputs", metavar="FILE", help="of GAME.py: recording with its inputs; default: GAME.json")
+@click.option("--scene", "takes_scene", is_flag=True, help="of a recorded game: advise on its scene, not the program")
 @click.option(
     "--engine", metavar="NAME", help="present engine of the game; default: pymunk, or the engine of the recording"
 )
@@ -209,8 +215,13 @@ def advise_command(options: _Options) -> int:
     Prints the forecast and the measured error of the present setting, the cheapest setting within the tolerance, the
     effect of each single change, the price of the other engines, and the lines of code to change. All settings that
     are considered step once a frame, dt = 1/fps, with substeps. SCENE|RECORDING is a scene file, the name of a shipped
-    scene, or a recorded session (.json). Exit status 1: no setting is within the tolerance and the budget.
+    scene, or a recorded session (.json). GAME.py is a pymunk game whose inputs `sandbox record` has kept: the game
+    itself runs again with other settings, as does a recording whose program is found. Exit status 1: no setting is
+    within the tolerance and the budget.
     """
+    program = _program(options)
+    if program is not None:
+        return _advise_game(options, program)
     faults: list[Fault] = []
     if options.engine is not None:
         with collect_errors(faults, "--engine", (UnknownEngineError,)):
@@ -251,6 +262,49 @@ def advise_command(options: _Options) -> int:
         click.echo("interrupted: what was measured so far is kept", err=True)
         status = 130
     return max(status, _write_page(advice, options, remarks))
+
+
+def _program(options: _Options) -> str | None:
+    """Return the program to advise on: that of the command line, or that of a recording; None for a scene."""
+    from sandbox.cli.advise_game import is_game, program_of
+
+    if is_game(options.scene):
+        return options.scene
+    if options.takes_scene or not is_recording(options.scene) or not Path(options.scene).is_file():
+        return None
+    try:
+        return program_of(options.scene, load_inputs(options.scene))
+    except SceneError:  # a recording without inputs
+        return None
+
+
+SCENE_ONLY = frozenset({"engine", "overrides", "fps", "margin", "spread", "effort", "repeats"})
+"""Options that have no effect on a game itself"""
+
+
+def _advise_game(options: _Options, program: str) -> int:
+    from sandbox.cli.advise_game import advise_game, is_game
+
+    context = click.get_current_context()
+    sources = {each.name: context.get_parameter_source(each.name or "") for each in context.command.params}
+    typed = {name for name, source in sources.items() if source == ParameterSource.COMMANDLINE}
+    given = [each.opts[0] for each in context.command.params if each.name in typed & SCENE_ONLY]
+    if given:
+        remedy = "" if is_game(options.scene) else "; add --scene to advise on the scene of the recording"
+        faults = [Fault.of(each, f"has no effect on a game itself{remedy}") for each in given]
+        return exit_with_errors(faults, options.as_json, scene=options.scene)
+    return advise_game(
+        program,
+        options.inputs if is_game(options.scene) else options.scene,
+        tolerance=options.tolerance,
+        zoom=PIXELS if options.pixels else options.given_zoom,
+        budget_ms=options.budget_ms,
+        plays=None if "starts" not in typed else 0 if options.starts == 1 else options.starts,
+        time_limit=options.time_limit,
+        out=options.out,
+        as_json=options.as_json,
+        quiet=options.quiet,
+    )
 
 
 def _looks_like_pixels(recording: Recording | None) -> bool:

@@ -36,6 +36,7 @@ COMMANDS = {
     "extremes": ("extremes:extremes_command", "find the limits of each engine: mass ratio, speed, stack height, …"),
     "report": ("report:report_command", "compare many scenes and write one HTML page: errors, costs, replays"),
     "record": ("record:record_command", "play a game that uses pymunk, and keep the session as a recording"),
+    "rehearse": ("rehearse:rehearse_command", "run a recorded pymunk game again, with other settings of its physics"),
     "import": ("import_level:import_command", "convert a level (.svg of Inkscape, .tmx of Tiled) to a scene file"),
     "check": ("check:check_command", "validate scenes and predict numerical problems before a run"),
     "warm": ("warm:warm_command", "compile all functions in advance, so that nothing waits for it later"),
@@ -157,11 +158,24 @@ def cli() -> None:
     """2D game physics sandbox: run one scene file on several physics engines, and measure error and cost."""
 
 
+def _hash_as_rehearsed() -> None:
+    """Start `sandbox record` anew with fixed hashes of strings, if they are random.
+
+    A set of strings is then in the same order in each later run of the game.
+    """
+    if sys.argv[1:2] == ["record"] and sys.flags.hash_randomization and "PYTHONHASHSEED" not in os.environ:
+        if sys.platform == "win32":  # where a program that replaces another one leaves its console
+            return
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, "PYTHONHASHSEED": "0"})
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line, and exit.
 
     Exit status: 0 done; 1 done, with a negative answer or a failed run; 2 wrong input; 130 interrupted.
     """
+    if arguments is None:
+        _hash_as_rehearsed()
     prepare_streams()
     status = call(arguments)
     gc.freeze()  # prevents a useless garbage collection at exit

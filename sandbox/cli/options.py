@@ -80,6 +80,7 @@ class Decorator(Protocol):
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+pymunk6_option = click.option("--pymunk6", is_flag=True, help="give the game the names and behaviour of pymunk 6")
 verbose_option = click.option("-v", "--verbose", is_flag=True, help="print all columns of the table, and explain each")
 sweep_option = click.option(
     "--sweep",

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING
 import click
 
 from sandbox.cli.common import collect_errors, exit_with_errors, reasons_not_writable
-from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.options import json_option, pymunk6_option, quiet_option
 from sandbox.cli.progress import progress_bars
 from sandbox.cli.streams import print_json
 from sandbox.echo import MAX_NAMED, shorten
 from sandbox.formatting import format_plural
+from sandbox.game_inputs import save_inputs
 from sandbox.jsonable import to_json
 from sandbox.recording import Recording, ReplayCheck
 from sandbox.recording_remarks import remarks_on, replay_sentence
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from sandbox.rehearsal.input_script import InputScript
 
 
-OWN_OPTIONS = ("--to", "--force", "--script", "--steps", "--json", "--quiet")
+OWN_OPTIONS = ("--to", "--force", "--script", "--steps", "--pymunk6", "--json", "--quiet")
 """Options of this command, which a game after whose name they stand gets instead"""
 
 
@@ -76,6 +77,7 @@ class RecordDocument:
     help="play without a window, on a virtual clock, with the keys and the mouse of a script of inputs (TOML)",
 )
 @click.option("--steps", type=click.IntRange(min=1), metavar="N", help="end the game after so many steps of its space")
+@pymunk6_option
 @json_option
 @quiet_option("print no summary; remarks are printed")
 def record_command(
@@ -85,6 +87,7 @@ def record_command(
     force: bool,
     script: Path | None,
     steps: int | None,
+    pymunk6: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -94,7 +97,9 @@ def record_command(
     Its pymunk spaces are watched: the scene is the space before its first step, and what the game changes between two
     steps becomes an action. At the end the recording is replayed, and compared with the game. `sandbox replay`, `run`,
     `advise` and `export` take the recording; `check`, `compare` and `tradeoff` take its scene, without actions. What a
-    scene cannot have, such as collision callbacks, is listed on standard error, and by these commands again.
+    scene cannot have, such as collision callbacks, is listed on standard error, and by these commands again. The
+    recording also keeps what the program reads: events, keys, mouse, clock and random seeds. `sandbox rehearse GAME.py`
+    and `sandbox advise GAME.py` run the game itself with them.
     """
     path = Path(target) if target is not None else Path(f"{Path(game).stem}.json")
     faults = _faults(game, path, force)
@@ -104,6 +109,8 @@ def record_command(
     if faults:
         return exit_with_errors(faults, as_json, **to_json(RecordDocument(game=game)))
     from sandbox.pymunk_capture.game_capture import StepLimitReached, capture
+    from sandbox.pymunk_capture.pymunk6 import pymunk6_names
+    from sandbox.pymunk_capture.removed_names import removed_name
     from sandbox.pymunk_capture.space_capture import CaptureError
 
     misplaced = [each for each in arguments if each.partition("=")[0] in OWN_OPTIONS]
@@ -114,11 +121,13 @@ def record_command(
     from sandbox.rehearsal.surroundings import InputRecorder, started_as
 
     ended: str | None = None
+    removed: Fault | None = None  # a name that pymunk 7 lacks, where the game uses it
     status, is_whole = 0, False
-    inputs = InputRecorder(game, arguments, played)
+    inputs = InputRecorder(game, arguments, played, pymunk6=pymunk6)
+    names = pymunk6_names() if pymunk6 else contextlib.nullcontext()
     output = contextlib.redirect_stdout(sys.stderr) if as_json else contextlib.nullcontext()
     # Standard output is for the JSON document then.
-    with capture(max_steps=steps) as captured, inputs.recording(), started_as(game, arguments), output:
+    with names, capture(max_steps=steps) as captured, inputs.recording(), started_as(game, arguments), output:
         try:
             runpy.run_path(game, run_name="__main__")
             is_whole = True
@@ -128,24 +137,27 @@ def record_command(
             is_whole = True  # the usual end of a game
         except KeyboardInterrupt:
             ended, status = "interrupted", 130
-        except CaptureError as error:
-            faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
         except Exception as error:  # noqa: BLE001, of the user's program
             traceback.print_exc()
-            ended, status = f"{type(error).__name__}: {error}", 1
-    if not captured.spaces and not faults:
+            removed = removed_name(error, game)
+            ended, status = f"{type(error).__name__}: {error}" if removed is None else str(removed), 1
+    if not captured.steps and removed is not None:
+        faults = [removed]
+    elif not captured.steps:
         faults = [Fault.of(game, "no pymunk space made a step, so that there is nothing to record")]
     recording: Recording | None = None
+    known = inputs.inputs(is_whole=is_whole)
     if not faults:
         try:
-            known = inputs.inputs(is_whole=is_whole)
             # before the replay, which may take as long as the game
             replace(captured.recording, inputs=known).save(path)
             recording = _with_title(_checked(captured, as_json or quiet), Path(game).stem)
             recording = replace(recording, inputs=known)
             recording.save(path)
         except CaptureError as error:
-            faults = [Fault.of(game, f"its space cannot be a scene: {error}")]
+            save_inputs(known, path)
+            fault = f"its space cannot be a scene: {error}; {path} has its inputs, for `rehearse` and `advise {game}`"
+            faults = [Fault.of(game, fault)]
         except OSError as error:
             faults = [Fault.of(str(path), f"cannot be written: {error.strerror or error}")]
     if recording is None or faults:
@@ -162,7 +174,7 @@ def record_command(
         omitted=captured.omitted,
         inexact=captured.inexact,
         replay=check,
-        remarks=remarks_on(recording),
+        remarks=(*remarks_on(recording), *(f"left out of the inputs: {each}" for each in known.notes)),
         ended=ended,
     )
     if as_json:
@@ -178,6 +190,8 @@ def record_command(
             click.echo(replay_sentence(recording.scene, check))
     for each in document.remarks:
         click.echo(f"{game}: {each}", err=True)
+    if removed is not None:
+        click.echo(str(removed), err=True)
     return status
 
 

@@ -66,7 +66,7 @@ def _without_actions(recording: Recording) -> tuple[str, ...]:
 def report_remarks(name: str, remarks: Sequence[str]) -> None:
     """Print the remarks on a recording on standard error, one per line, up to `MAX_REMARKS`.
 
-    The last ones say how far the replay departs, and are always printed.
+    The last ones say how far the replay departs and which command runs the game itself, and are always printed.
 
     Args:
         name: the recording as the user named it.

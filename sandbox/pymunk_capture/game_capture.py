@@ -24,6 +24,7 @@ from pydantic import ValidationError
 
 from sandbox.action import Action, Force, Move, Remove, SetParameter, Spawn
 from sandbox.jsonable import finite
+from sandbox.pymunk_capture.body_reader import BodyReader, BodyState
 from sandbox.pymunk_capture.space_capture import (
     NOT_TURNED,
     CaptureError,
@@ -37,6 +38,7 @@ from sandbox.scene.errors import PartError, SettingsError, quoted
 
 MAX_ACTIONS = 1_000_000
 """Actions of a recording; a game that changes 1,000 bodies at 60 Hz makes as many in 17 s"""
+NO_FORCE = (0.0, 0.0, 0.0)
 PROVISIONAL_DT = 1.0 / 60.0
 """s, step of the scene until the steps of the game are known"""
 
@@ -46,10 +48,12 @@ class SpaceCapture:
 
     Args:
         space: before its first step.
+        form_changes: returns the number of changes of the form of any space so far.
     """
 
-    def __init__(self, space: pymunk.Space) -> None:
+    def __init__(self, space: pymunk.Space, form_changes: Callable[[], int]) -> None:
         self.space = space
+        self._reader, self._form_changes = BodyReader(space), form_changes
         self._dts = array("d")  # arguments of the steps
         self.has_constant_step = True
         """whether all steps so far are of one length"""
@@ -77,7 +81,7 @@ class SpaceCapture:
         self.first_missing: tuple[int, str] | None = None
         """step in which the space first has such a body, and its name"""
         self._not_finite: dict[str, None] = {}  # names of bodies for which pymunk has computed such values
-        self._form = SpaceForm.of(space, self._names)
+        self._form, self._seen_changes = SpaceForm.of(space, self._names), form_changes()
         self._scene_joints = {joint: form for joint, form in self._form.joints.items() if joint in self._joint_paths}
         self.log = StateLog()
         """states after each step"""
@@ -92,8 +96,8 @@ class SpaceCapture:
         if len(self._actions) > MAX_ACTIONS:
             self._omitted[f"actions after the first {MAX_ACTIONS:,}"] = None
         else:
-            self._note_changes()
-            self._note_forces()
+            states = self._note_changes()
+            self._note_forces(states)
         self._dts.append(dt)
         self.has_constant_step &= dt == self._dts[0]
         self._set_in_step = {
@@ -114,7 +118,7 @@ class SpaceCapture:
         self._has_callbacks = has_callbacks
         dt = self._dts[-1]
         self._elapsed = self.steps * dt if self.has_constant_step else self._elapsed + dt
-        self._states = {body: MotionState.of(body) for body in self._names}
+        self._states = {body: state.motion for body, state in self._reader.read(self._names).items()}
         self.log.add(self.steps, self._logged(), self._states, self._set_in_step)
 
     def _has_other_type(self, body: pymunk.Body, name: str) -> bool:
@@ -166,8 +170,8 @@ class SpaceCapture:
         """The median step, s."""
         return median_low(self._dts)
 
-    def _note_changes(self) -> None:
-        """Note what the game has changed since the physics of the last step."""
+    def _note_changes(self) -> dict[pymunk.Body, BodyState]:
+        """Note what the game has changed since the physics of the last step, and return the states of all bodies."""
         space = self.space
         if tuple(space.gravity) != self._gravity:
             self._gravity = tuple(space.gravity)
@@ -180,15 +184,23 @@ class SpaceCapture:
                 self._omitted[
                     f"space.damping = {space.damping:g}, which the game sets; `world.damping` is above 0 and at most 1"
                 ] = None
+        if self.steps and self._form_changes() != self._seen_changes:
+            self._note_form()
+        states = self._reader.read(self._names)
         if self.steps:
-            form, known, joints = SpaceForm.of(space, self._names), dict(self._names), self._scene_joints
-            self._note_population()
-            exchanged = known.keys() ^ self._names.keys()
-            self._omitted |= dict.fromkeys(form.changes_since(self._form, exchanged | self._missing, known, joints))
-            self._note_coefficients(form)
-            self._note_motors(form)
-            self._note_motion()
-            self._form = form if not exchanged else SpaceForm.of(space, self._names)
+            self._note_motion(states)
+        return states
+
+    def _note_form(self) -> None:
+        """Note what has changed in the space besides the motion of its bodies."""
+        form, known, joints = SpaceForm.of(self.space, self._names), dict(self._names), self._scene_joints
+        self._note_population()
+        exchanged = known.keys() ^ self._names.keys()
+        self._omitted |= dict.fromkeys(form.changes_since(self._form, exchanged | self._missing, known, joints))
+        self._note_coefficients(form)
+        self._note_motors(form)
+        self._form = form if not exchanged else SpaceForm.of(self.space, self._names)
+        self._seen_changes = self._form_changes()
 
     def _act(self, kind: Callable[..., Action], **values: Any) -> None:
         """Add an action at the present time; one with values that a scene cannot have is a remark."""
@@ -275,10 +287,10 @@ class SpaceCapture:
             if value != before[key]:
                 self._act(SetParameter, path=f"{path}.{key}", value=value)
 
-    def _note_motion(self) -> None:
+    def _note_motion(self, states: Mapping[pymunk.Body, BodyState]) -> None:
         """Note bodies whose motion is not that after the physics of the last step, or was set within it."""
         for body, name in self._names.items():
-            before, now = self._states[body], MotionState.of(body)
+            before, now = self._states[body], states[body].motion
             was_set = (
                 body in self._set_in_step
                 and (name in self._moving or self._has_other_type(body, name))
@@ -308,13 +320,13 @@ class SpaceCapture:
             self._act(Move, **values)
         self._set_in_step = set()
 
-    def _note_forces(self) -> None:
+    def _note_forces(self, states: Mapping[pymunk.Body, BodyState]) -> None:
         """Note forces that the game applies for the next step, where they differ from those of the last one."""
         for body, name in self._names.items():
-            if body.body_type != pymunk.Body.DYNAMIC or name not in self._dynamic:
+            force = states[body].force
+            if force == self._forces.get(body, NO_FORCE):
                 continue
-            force = (*body.force, body.torque)
-            if force != self._forces.get(body, (0.0, 0.0, 0.0)):
+            if body.body_type == pymunk.Body.DYNAMIC and name in self._dynamic:
                 self._forces[body] = force
                 self._act(Force, body=name, force=(force[0], force[1]), torque=force[2])
 
@@ -375,13 +387,22 @@ class GameCapture:
 
     def __init__(self) -> None:
         self._captures: dict[pymunk.Space, SpaceCapture] = {}
+        self._refused: dict[pymunk.Space, CaptureError] = {}
+        self._steps: dict[pymunk.Space, int] = {}
+        self.form_changes = 0
+        """changes of what a space is, besides the motion of its bodies, in all spaces"""
 
-    def step(self, space: pymunk.Space, dt: float) -> SpaceCapture:
-        """Note the changes before a step of a space."""
-        if space not in self._captures:
-            self._captures[space] = SpaceCapture(space)
-        found = self._captures[space]
-        found.before_step(dt)
+    def step(self, space: pymunk.Space, dt: float) -> SpaceCapture | None:
+        """Note the changes before a step of a space; None for a space that cannot be a scene."""
+        self._steps[space] = self._steps.get(space, 0) + 1
+        if space not in self._captures and space not in self._refused:
+            try:
+                self._captures[space] = SpaceCapture(space, lambda: self.form_changes)
+            except CaptureError as error:
+                self._refused[space] = error
+        found = self._captures.get(space)
+        if found is not None:
+            found.before_step(dt)
         return found
 
     def note_physics_end(self, space: pymunk.Space, has_additions: bool) -> None:
@@ -394,6 +415,10 @@ class GameCapture:
         found = self._captures.get(space)
         if found is not None and not space._locked:
             found.after_physics(has_additions or bool(space._remove_later or space._post_step_callbacks))
+
+    def note_form_change(self) -> None:
+        """Note that something in a space changes besides the motion of its bodies."""
+        self.form_changes += 1
 
     def note_set(self, body: pymunk.Body) -> None:
         """Note that the motion of a body is set."""
@@ -414,7 +439,7 @@ class GameCapture:
     @property
     def steps(self) -> int:
         """Largest number of steps of a space."""
-        return max((each.steps for each in self._captures.values()), default=0)
+        return max(self._steps.values(), default=0)
 
     @property
     def recording(self) -> Recording:
@@ -422,6 +447,7 @@ class GameCapture:
 
         Raises:
             ValueError: no space has made a step.
+            CaptureError: that space cannot be a scene.
         """
         return self._longest.recording()
 
@@ -452,9 +478,12 @@ class GameCapture:
 
     @property
     def _longest(self) -> SpaceCapture:
-        if not self._captures:
+        if not self._steps:
             raise ValueError("no pymunk space has made a step")
-        return max(self._captures.values(), key=lambda each: each.steps)
+        space = max(self._steps, key=self._steps.__getitem__)
+        if space in self._refused:
+            raise self._refused[space]
+        return self._captures[space]
 
 
 class StepLimitReached(SystemExit):
@@ -491,11 +520,14 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
             raise StepLimitReached(0)
         found = game.step(space, dt)
         step(space, dt)
-        found.after_step()
+        if found is not None:
+            found.after_step()
 
     def added(space: pymunk.Space, *objects: Any) -> None:
         # pymunk calls it after the physics of a step, before it removes bodies and calls post-step callbacks
         game.note_physics_end(space, bool(objects))
+        if objects:
+            game.note_form_change()
         add(space, *objects)
 
     with ExitStack() as stack:
@@ -510,7 +542,37 @@ def capture(max_steps: int | None = None) -> Iterator[GameCapture]:
             assert own.fset is not None
             noted = own.setter(_noted(game.note_set, own.fset))
             stack.enter_context(_replaced(pymunk.Body, name, noted))
+        for owner, name, changing in _form_setters(game.note_form_change):
+            stack.enter_context(_replaced(owner, name, changing))
         yield game
+
+
+def _form_setters(note: Callable[[], None]) -> Iterator[tuple[type, str, Any]]:
+    """Yield the setters and methods of pymunk that change the form of a space, with a note of each call."""
+    for name in ("remove", "on_collision"):
+        yield pymunk.Space, name, _after(note, getattr(pymunk.Space, name))
+    joints = (each for each in vars(pymunk.constraints).values() if isinstance(each, type))
+    for owner in (pymunk.Space, pymunk.Body, pymunk.Shape, pymunk.Circle, pymunk.Segment, pymunk.Poly, *joints):
+        if not owner.__module__.startswith("pymunk."):
+            continue
+        for name, value in vars(owner).items():
+            if isinstance(value, property) and value.fset is not None and name not in MOTION:
+                yield owner, name, value.setter(_after(note, value.fset))
+
+
+def _after(note: Callable[[], None], method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method that is followed by a note."""
+
+    def noted(*arguments: Any, **more: Any) -> Any:
+        result = method(*arguments, **more)
+        note()
+        return result
+
+    return noted
+
+
+MOTION = frozenset({"position", "velocity", "angle", "angular_velocity", "force", "torque", "gravity", "damping"})
+"""Attributes of bodies and spaces that are compared at each step, and are no part of the form of a space"""
 
 
 def _noted(note: Callable[[pymunk.Body], None], method: Callable[..., None]) -> Callable[..., None]:

@@ -7,7 +7,7 @@ program that means harm, which has the rights of the user.
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -110,22 +110,25 @@ class DeniedError(PermissionError):
     """Something that a game may not do in a rehearsal."""
 
 
-def deny_changes(allowed: Sequence[Path], note: Callable[[str], None]) -> None:
-    """Let the rest of this process change files in some folders only, make no connections and start no programs.
+def deny_changes(scratch: Path, kept: Sequence[Path], note: Callable[[str], None]) -> None:
+    """Let the rest of this process change no files but temporary ones, make no connections and start no programs.
 
     Args:
-        allowed: the folders. Temporary files of the system are allowed too.
+        scratch: folder in which everything is allowed.
+        kept: folders of the game, whose files are not changed, wherever they are.
         note: called with a remark on each thing that is denied.
     """
-    folders = tuple(
-        str(each.resolve()) + os.sep for each in (*allowed, Path(tempfile.gettempdir()), Path(os.devnull).parent)
-    )
+    temporary = scratch, Path(tempfile.gettempdir()), Path(os.devnull).parent
+
+    def is_within(path: Path, folders: Iterable[Path]) -> bool:
+        return any(path.is_relative_to(folder.resolve()) for folder in folders)
 
     def check(path: Path) -> None:
-        # A temporary file without a name is opened by the path of its folder.
-        if not f"{path.resolve()}{os.sep}".startswith(folders):
-            note(f"changes of {path}, which is not among the files that the recording has")
-            raise DeniedError(f"{path}: a rehearsal does not change the files of the game")
+        resolved = path.resolve()
+        if is_within(resolved, (scratch,)) or (is_within(resolved, temporary) and not is_within(resolved, kept)):
+            return
+        note(f"changes of {path}, which is not among the files that the recording has")
+        raise DeniedError(f"{path}: a rehearsal does not change the files of the game")
 
     def refuse(remark: str) -> None:
         note(remark)

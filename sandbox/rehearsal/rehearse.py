@@ -23,6 +23,9 @@ MAX_OUTPUT = 20_000
 """Characters of what a game prints that are kept"""
 
 
+_running: set[WorkerProcess] = set()
+
+
 class RehearsalError(Exception):
     """A rehearsal has no result."""
 
@@ -119,7 +122,7 @@ class Rehearsal:
     seconds: float
     """wall-clock time of the run, s"""
     step_seconds: float
-    """part of it in `Space.step`, with the callbacks of the game, s"""
+    """processor time of `Space.step`, with the callbacks of the game, s"""
     output: str = field(repr=False)
     """what the game printed"""
     notes: tuple[str, ...] = ()
@@ -184,6 +187,7 @@ def rehearse(
         }
         command = [sys.executable, "-m", "sandbox.rehearsal.worker"]
         process = WorkerProcess(command, {"PYTHONHASHSEED": inputs.hash_seed or "0"})
+        _running.add(process)
         try:
             process.send(request)
             answer = process.receive(time_limit)
@@ -195,8 +199,15 @@ def rehearse(
             reason = f": {lines[-1]}" if lines else ""
             raise RehearsalError(f"{exit_text(process.exit_code())}{reason}") from None
         finally:
+            _running.discard(process)
             process.end()
         return _rehearsal(settings, answer, scratch / "states.npz", output)
+
+
+def kill_rehearsals() -> None:
+    """Kill all rehearsals that run, in whichever thread: each raises `RehearsalError`."""
+    for process in list(_running):
+        process.kill()
 
 
 def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, output: str) -> Rehearsal:

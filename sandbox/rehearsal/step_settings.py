@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, fields
-from time import perf_counter
+from time import process_time
 from typing import Any, Self
 from unittest.mock import patch
 
@@ -115,7 +115,7 @@ class Nudge:
 
 @dataclass
 class StepClock:
-    """Time of the steps of all spaces."""
+    """Processor time of the steps of all spaces."""
 
     seconds: float = 0.0
     """with the callbacks of the game that they call, s"""
@@ -158,7 +158,7 @@ def steps_with(
         if nudge is not None and id(space) not in nudged:
             nudged.add(id(space))
             _move(space, nudge)
-        start, count = perf_counter(), settings.count(dt)
+        start, count = process_time(), settings.count(dt)
         forces = [] if count == 1 else _forces(space)
         clock.has_forces |= bool(forces)
         for substep in range(count):
@@ -166,7 +166,7 @@ def steps_with(
                 for body, force, torque in forces:
                     body.force, body.torque = force, torque
             step(space, dt if count == 1 else dt / count)
-        clock.seconds += perf_counter() - start
+        clock.seconds += process_time() - start
 
     with ExitStack() as stack:
         stack.enter_context(patch.object(pymunk.Space, "step", stepped))

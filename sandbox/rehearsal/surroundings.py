@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+import pygame
 import pymunk
 
 from sandbox.game_inputs import GameInputs, file_digest
@@ -31,11 +32,14 @@ class InputRecorder:
     Args:
         program: path of the program.
         arguments: of the program.
+        pymunk6: whether the program uses names of pymunk 6.
         script: of inputs that replace keyboard, mouse and clock; None for those of the user.
     """
 
-    def __init__(self, program: str, arguments: Sequence[str], script: InputScript | None = None) -> None:
-        self._program, self._arguments = program, tuple(arguments)
+    def __init__(
+        self, program: str, arguments: Sequence[str], script: InputScript | None = None, *, pymunk6: bool = False
+    ) -> None:
+        self._program, self._arguments, self._pymunk6 = program, tuple(arguments), pymunk6
         resolved = Path(program).resolve()
         self._own_folder = resolved if resolved.is_dir() else resolved.parent
         self._digests: dict[str, str] = {}
@@ -121,6 +125,7 @@ class InputRecorder:
             program=self._program,
             folder=str(Path.cwd()),
             arguments=self._arguments,
+            pymunk6=self._pymunk6,
             seed=self._seed,
             hash_seed=os.environ.get("PYTHONHASHSEED"),
             started=self._started,
@@ -211,7 +216,7 @@ def surroundings(
         max_steps: calls of `Space.step` after which the next one raises `EndOfTape`; default: unlimited.
         draws: whether windows of pyglet are drawn.
     """
-    has_window = False
+    has_window = False  # of pyglet
 
     def finish_frame() -> None:
         log.end_frame()
@@ -221,13 +226,9 @@ def surroundings(
         nonlocal has_window
         has_window = True
 
-    def show() -> None:
-        open_window()
-        finish_frame()
-
     def before_step(space: pymunk.Space) -> None:
         # A program without a window has a frame for each step.
-        if not has_window and log.has_stepped(space):
+        if log.has_stepped(space) and not has_window and pygame.display.get_surface() is None:
             finish_frame()
         if max_steps is not None and log.steps >= max_steps:
             raise EndOfTape(0)
@@ -235,10 +236,10 @@ def surroundings(
     with ExitStack() as stack:
         stack.enter_context(seeded(seed))
         stack.enter_context(spaces_logged(log, before_step))
-        stack.enter_context(pygame_inputs_from(tape, device, end_frame=show, note=note))
+        stack.enter_context(pygame_inputs_from(tape, device, end_frame=finish_frame, note=note))
         scripted = device if isinstance(device, ScriptedDevice) else None
         stack.enter_context(
-            pyglet_inputs_from(tape, scripted, open_window=open_window, end_frame=show, note=note, draws=draws)
+            pyglet_inputs_from(tape, scripted, open_window=open_window, end_frame=finish_frame, note=note, draws=draws)
         )
         stack.enter_context(clock_from(tape, sleep=sleep, now=now))
         try:

@@ -8,6 +8,8 @@ from typing import Any
 
 import pymunk
 
+from sandbox.rehearsal.game_clock import is_own_code
+
 _TYPE_NAME = re.compile(r"coll|type|categor|layer", re.IGNORECASE)
 _AFFIXES = re.compile(r"^(coll(ision)?_?types?|coll(ision)?|ct|types?)_|_?(coll(ision)?)?_?types?$", re.IGNORECASE)
 _NO_NAMES = frozenset({"self", "body", "b", "space", "each"})
@@ -88,13 +90,19 @@ def _attributes(value: Any) -> list[tuple[str, Any]]:
 def _variables(frame: FrameType) -> Iterator[tuple[str, Any]]:
     """Yield the variables of a program: those of the calling functions, from the innermost on, and of the module."""
     each: FrameType | None = frame
-    while each is not None and not each.f_code.co_filename.startswith("<frozen"):  # which runs the program
+    while each is not None and is_own_code(each.f_code.co_filename) and not _runs_program(each):
+        each = each.f_back  # as the functions that stand in for those of pymunk 6
+    while each is not None and not _runs_program(each):
         for name, value in list(each.f_locals.items()):
             if not name.startswith("__"):
                 yield name, value
         if each.f_locals is not each.f_globals:
             yield from ((name, value) for name, value in list(each.f_globals.items()) if not name.startswith("__"))
         each = each.f_back
+
+
+def _runs_program(frame: FrameType) -> bool:
+    return frame.f_code.co_filename.startswith("<frozen")
 
 
 def _is_same(known: Any, value: Any) -> bool:

@@ -37,6 +37,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     import numpy as np
 
     from sandbox.game_inputs import jittered, load_inputs
+    from sandbox.pymunk_capture.pymunk6 import pymunk6_names
     from sandbox.rehearsal.guard import deny_changes, mirror_folders
     from sandbox.rehearsal.space_log import SpaceLog
     from sandbox.rehearsal.step_settings import Nudge, StepSettings, steps_with
@@ -51,8 +52,9 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         Path(os.path.normpath(own_folder / name)): None if content is None else base64.b64decode(content)
         for name, content in inputs.saved_files.items()
     }
+    kept = [own_folder, Path.cwd()]
     if saved:
-        mirrors = mirror_folders([own_folder, Path.cwd()], saved, scratch / "files")
+        mirrors = mirror_folders(kept, saved, scratch / "files")
         program = mirrors[own_folder] / program.relative_to(own_folder)
         os.chdir(mirrors[Path.cwd()])
     name = str(program)
@@ -61,12 +63,14 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     nudge = None if request["nudge"] is None else Nudge(**request["nudge"])
     with Path(os.devnull).open() as nothing, ExitStack() as stack:
         stack.enter_context(patch.object(sys, "stdin", nothing))
+        if inputs.pymunk6:
+            stack.enter_context(pymunk6_names())
         steps = stack.enter_context(steps_with(StepSettings(**request["settings"]), nudge=nudge))
         tape = stack.enter_context(replayed(inputs, log, draws=request["draws"]))
         stack.enter_context(started_as(name, inputs.arguments))
         if not request["draws"]:
             _leave_out_drawing(stack)
-        deny_changes([scratch], lambda remark: notes.setdefault(remark))
+        deny_changes(scratch, kept, lambda remark: notes.setdefault(remark))
         start = time.perf_counter()
         try:
             runpy.run_path(name, run_name="__main__")

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from sandbox.game_inputs import load_inputs
 from sandbox.recording import Recording
+from sandbox.scene.errors import SceneError
 from tests.cli.calling import call, json_of, process
 
 GAME = """
@@ -60,18 +62,20 @@ def test_error_of_the_game_keeps_what_was_played(game: Path, capfd: pytest.Captu
     assert Recording.load(Path("jump.json")).duration == pytest.approx(20 / 60)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("print(1)\n", "no pymunk space made a step"),
-        (GAME.replace("pymunk.Body(1, 10)", "pymunk.Body(1e40, 10)"), "mass"),
-    ],
-)
-def test_game_without_a_scene_writes_nothing(game, text, message, capfd):
-    game.write_text(text)
+def test_game_without_a_step_writes_nothing(game: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    game.write_text("print(1)\n")
     assert call(["record", str(game)]) == 2
-    assert message in capfd.readouterr().err
+    assert "no pymunk space made a step" in capfd.readouterr().err
     assert not Path("jump.json").exists()
+
+
+def test_game_without_a_scene_keeps_its_inputs(game: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    game.write_text(GAME.replace("pymunk.Body(1, 10)", "pymunk.Body(1e40, 10)"))
+    assert call(["record", str(game)]) == 2
+    assert "mass" in capfd.readouterr().err
+    assert load_inputs("jump.json").steps == 20
+    with pytest.raises(SceneError, match="inputs of a game only"):
+        Recording.load("jump.json")
 
 
 PLAY = GAME.replace("if k == 5:", "if k == 12:\n        CHANGE\n    if k == 5:")

@@ -56,8 +56,8 @@ class PlaysHeld:
 
     present: Proportion
     """plays in which the present setting is within the tolerance"""
-    recommended: Proportion | None
-    """plays in which the recommended setting is; None without one"""
+    chosen: Proportion | None
+    """plays in which the recommended setting is, or without one the most accurate; None if no setting is within it"""
     displacement: float
     """largest displacement of the bodies at the start, in units of the game"""
 
@@ -92,11 +92,12 @@ class GameAdvice:
     recommended: GameSetting | None
     """cheapest setting within the tolerance; None if none was found"""
     most_accurate: GameSetting | None
-    """without a recommended setting: the one with the fewest lost contacts and the smallest error"""
+    """without a recommended setting: the one that keeps to the tolerance in most of the plays that differ a little, or
+    has the fewest lost contacts and the smallest error"""
     changes: tuple[SettingChange, ...]
     """effect of each single change of the present setting"""
-    plays: PlaysHeld | None
-    """odds over plays that differ a little; None if none was tried"""
+    plays: PlaysHeld
+    """odds over plays that differ a little"""
     code: StepCode | None
     """lines of the game to change; None if there is nothing to change"""
     remarks: tuple[str, ...]
@@ -107,8 +108,6 @@ class GameAdvice:
     """number of runs of the game"""
     seconds: float
     """s, time of the advice"""
-    interrupted: bool
-    """whether Ctrl-C ended the advice; what was measured before is kept"""
     machine: Mapping[str, Any]
     """description of the machine"""
     versions: Mapping[str, str]

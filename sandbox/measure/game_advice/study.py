@@ -21,7 +21,7 @@ from sandbox.measure.game_advice.step_code import step_code
 from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
-from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, rehearse
+from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, kill_rehearsals, rehearse
 from sandbox.rehearsal.step_settings import Nudge, StepSettings
 
 FIRST_TRUTH = 16
@@ -50,7 +50,7 @@ SLOP_PX = 0.01
 """px, slop that is tried"""
 STIFF_JOINT = 0.5
 """Fraction of the error of a joint that is left after a step, in a setting that is tried"""
-PLAYS = 10
+DEFAULT_PLAYS = 10
 """Plays that differ a little from the recorded one"""
 DISPLACEMENT = 0.1
 """px, displacement of all bodies at the start of such a play"""
@@ -88,6 +88,7 @@ class GameStudy:
         inputs: recorded inputs.
         tolerance_px: accepted error, px.
         zoom: px per unit of length of the game.
+        plays: number of plays that differ a little from the recorded one.
         time_limit: s after which no further settings and plays are tried.
         on_progress: progress callback.
     """
@@ -99,13 +100,14 @@ class GameStudy:
         *,
         tolerance_px: float = DEFAULT_TOLERANCE_PX,
         zoom: float = 1.0,
+        plays: int = DEFAULT_PLAYS,
         time_limit: float = DEFAULT_TIME_LIMIT,
         on_progress: ProgressCallback | None = None,
     ) -> None:
         self._program, self._inputs = program, inputs
         self._tolerance_px, self._zoom = tolerance_px, zoom
         self._tolerance = tolerance_px / zoom
-        self._time_limit, self._on_progress = time_limit, on_progress
+        self._plays_wanted, self._time_limit, self._on_progress = plays, time_limit, on_progress
         self._start = time.monotonic()
         self._draws = True
         self.shown: dict[str, Rehearsal] = {}
@@ -128,13 +130,16 @@ class GameStudy:
             changes = self._changes(own, truth)
             tried = self._tried(own, changes, truth)
             candidates = [present, *(each.setting for each in changes), *tried]
-            recommended, plays = self._recommended(own, candidates, truth)
-            best = recommended or min(candidates, key=lambda each: (each.lost, _error(each)))
+            recommended, best, plays = self._recommended(own, candidates, truth)
             self.shown = {"truth": truth.run, "present": own}
             if best.changed:
                 name = "most accurate" if recommended is None else "recommended"
                 self.shown[name] = self._run(_Play(settings=StepSettings(**_given(best)))).result()
             return self._advice(own, truth, truth_error, present, recommended, best, changes, plays, tried)
+        except BaseException:  # such as Ctrl-C
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            kill_rehearsals()
+            raise
         finally:
             self._pool.shutdown(cancel_futures=True)
 
@@ -301,12 +306,14 @@ class GameStudy:
 
     def _recommended(
         self, own: Rehearsal, candidates: Sequence[GameSetting], truth: Truth
-    ) -> tuple[GameSetting | None, PlaysHeld | None]:
-        """Return the cheapest setting that keeps to the tolerance, also in plays that differ a little, and its odds."""
+    ) -> tuple[GameSetting | None, GameSetting, PlaysHeld]:
+        """Return the cheapest setting that keeps to the tolerance, also in plays that differ a little.
+
+        Returns:
+            It, or None; the setting to choose, which without it is the most accurate one; the odds of the latter.
+        """
         iterations = int(own.own_settings.get("iterations", 10))
         plays = self._plays(truth)
-        if not plays:
-            return None, None
         present = sum(self._held(StepSettings(), plays))
         within = sorted(
             {_key(each.changed): each for each in candidates if each.is_within}.values(),
@@ -316,11 +323,15 @@ class GameStudy:
         for each in within:
             held = sum(self._held(StepSettings(**_given(each)), plays))
             if held >= HELD * len(plays):
-                return each, self._odds(present, held, plays)
-            best = best or (held, each)
+                return each, each, self._odds(present, held, plays)
+            if best is None or held > best[0]:
+                best = held, each
             if self._time_left <= 0.0:
                 break
-        return None, self._odds(present, None, plays)
+        if best is None:
+            most_accurate = min(candidates, key=lambda each: (each.lost, _error(each)))
+            return None, most_accurate, self._odds(present, None, plays)
+        return None, best[1], self._odds(present, best[0], plays)
 
     def _odds(self, present: int, held: int | None, plays: Sequence[tuple[_Play, Truth]]) -> PlaysHeld:
         return PlaysHeld(
@@ -335,8 +346,8 @@ class GameStudy:
         """Return plays that differ a little from the recorded one, each with its truth, as many as the time allows."""
         fine = truth.run.settings.substeps
         plays: list[tuple[_Play, Truth]] = []
-        for seed in range(2, 2 + PLAYS):
-            self._report(f"plays that differ a little: {len(plays)} of {PLAYS}")
+        for seed in range(2, 2 + self._plays_wanted):
+            self._report(f"plays that differ a little: {len(plays)} of {self._plays_wanted}")
             nudge = Nudge(DISPLACEMENT / self._zoom, seed)
             play = _Play(settings=StepSettings(), nudge=nudge, jitter_seed=seed)
             runs = [self._run(replace(play, settings=StepSettings(substeps=each))) for each in (fine // 2, fine)]
@@ -362,7 +373,7 @@ class GameStudy:
         recommended: GameSetting | None,
         best: GameSetting,
         changes: tuple[SettingChange, ...],
-        plays: PlaysHeld | None,
+        plays: PlaysHeld,
         tried: Sequence[GameSetting],
     ) -> GameAdvice:
         self._report("timing")
@@ -399,7 +410,6 @@ class GameStudy:
             tried=1 + len(changes) + len(tried),
             runs=self._count,
             seconds=time.monotonic() - self._start,
-            interrupted=False,
             machine=machine(),
             versions=versions(),
         )
