@@ -30,7 +30,6 @@ from sandbox.measure.game_advice.text import (
     truth_sentences,
 )
 from sandbox.recording import Recording
-from sandbox.recording_remarks import is_in_pixels
 from sandbox.rehearsal.rehearse import RehearsalError
 from sandbox.scene.errors import Fault, SceneError
 
@@ -99,21 +98,19 @@ def advise_game(
     except SceneError as error:
         return exit_with_errors(error.faults, as_json, scene=game)
     recording = inputs_file or f"{Path(game).stem}.json"
-    recorded = _recording_of(recording)
-    known_zoom = zoom or (1.0 if recorded is not None and is_in_pixels(recorded.scene) else None)
-    remarks = remarks_on_inputs(game, inputs)
-    if known_zoom is None:
-        known_zoom = DEFAULT_ZOOM
-        remarks.append(f"the unit of length is taken for a metre of {known_zoom:g} px; --zoom or --pixels states it")
+    recorded, remarks = _recording_of(recording), remarks_on_inputs(game, inputs)
     number, unit = tolerance
-    pixels = number if unit == "px" else number * LENGTHS[unit] * known_zoom
+    if unit != "px" and zoom is None:
+        fault = Fault.of("--tolerance", f"in {unit} needs --zoom, the pixels per metre of the game, or --pixels")
+        return exit_with_errors([fault], as_json, scene=game)
+    pixels = number if unit == "px" else number * LENGTHS[unit] * (zoom or 1.0)
     try:
         with status_line(as_json or quiet) as progress:
             study = GameStudy(
                 game,
                 inputs,
                 tolerance_px=pixels,
-                zoom=known_zoom,
+                zoom=zoom,
                 plays=DEFAULT_PLAYS if plays is None else plays,
                 time_limit=time_limit or DEFAULT_TIME_LIMIT,
                 on_progress=progress,
@@ -149,8 +146,6 @@ def advise_game(
     return status
 
 
-DEFAULT_ZOOM = 50.0
-"""px/m"""
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 
 
@@ -198,7 +193,7 @@ def print_game_advice(advice: GameAdvice, budget_ms: float | None) -> None:
 
 
 def _print_setting(advice: GameAdvice, setting: GameSetting, budget_ms: float | None) -> None:
-    text = figures_text(setting)
+    text = figures_text(advice, setting)
     if budget_ms is not None:
         text += f", {'more than' if _is_over(setting, budget_ms) else 'within'} the budget of {budget_ms:g} ms"
     print_item(text, INDENT)

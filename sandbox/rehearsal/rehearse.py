@@ -99,10 +99,16 @@ class Rehearsal:
     """form of each shape, when the game adds it"""
     changes: tuple[GameChange, ...]
     """bodies and joints that the game adds and removes, in order"""
+    shape_changes: tuple[tuple[int, bool, int], ...]
+    """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
     body_names: Mapping[int, str]
     """names of bodies by number, as far as the game has variables for them"""
     own_settings: Mapping[str, float]
     """settings of the space that makes the first step, by the names of `StepSettings`"""
+    gravity: tuple[float, float]
+    """gravity of that space, in units of the game per s²"""
+    window: tuple[int, int] | None
+    """size of the window at the first step, px; None without a window"""
     dts: tuple[float, float, float]
     """least, median and largest argument of `Space.step`, s"""
     step_calls: tuple[tuple[str, int], ...]
@@ -120,9 +126,9 @@ class Rehearsal:
     failure: str | None
     """exception that ended it; None if none did"""
     seconds: float
-    """wall-clock time of the run, s"""
+    """processor time of the run, without the start of the process, s"""
     step_seconds: float
-    """processor time of `Space.step`, with the callbacks of the game, s"""
+    """part of it in `Space.step`, with the callbacks of the game, s"""
     output: str = field(repr=False)
     """what the game printed"""
     notes: tuple[str, ...] = ()
@@ -222,8 +228,11 @@ def _rehearsal(settings: StepSettings, answer: dict[str, Any], states: Path, out
             tuple(answer["shape_bodies"]),
             tuple(GameShape(kind, tuple(map(tuple, points)), *rest) for kind, points, *rest in answer["shapes"]),
             tuple(GameChange(*each) for each in answer["changes"]),
+            tuple((frame, is_added, number) for frame, is_added, number in answer["shape_changes"]),
             dict(answer["body_names"]),
             answer["own_settings"],
+            tuple(answer["gravity"]),
+            None if answer["window"] is None else tuple(answer["window"]),
             tuple(answer["dts"]),
             tuple((file, line) for file, line in answer["step_calls"]),
             answer["has_forces"],

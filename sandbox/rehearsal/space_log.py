@@ -110,6 +110,8 @@ class SpaceLog:
         """form of each shape, when the game adds it"""
         self.changes: list[Change] = []
         """bodies and joints that the game adds and removes, in order"""
+        self.shape_changes: list[tuple[int, bool, int]] = []
+        """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
         self.body_names: dict[int, str] = {}
         """names of bodies by number, as far as the program has variables for them"""
         self._numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()  # of each body, shape and joint
@@ -122,6 +124,10 @@ class SpaceLog:
         """calls of `Space.step` by file and line"""
         self.settings: dict[str, float] = {}
         """settings of the space that makes the first step, by the names of `StepSettings`"""
+        self.gravity = 0.0, 0.0
+        """gravity of that space, in units of the game per s²"""
+        self.window: tuple[int, int] | None = None
+        """size of the window at the first step, px; None without a window"""
         self.impulse_readers: set[int] = set()
         """numbers of the callbacks that read the impulse or the energy of a contact"""
         self.running: int | None = None
@@ -150,6 +156,8 @@ class SpaceLog:
         """Number objects that are added to a space, and note those that the game adds later."""
         for each in objects:
             self._number(each)
+            if isinstance(each, pymunk.Shape):
+                self._note_shape(each, is_added=True)
             if not isinstance(each, pymunk.Shape) and each not in self._present:
                 self._present.add(each)
                 self._note_change(each, is_added=True)
@@ -157,13 +165,17 @@ class SpaceLog:
     def note_removed(self, objects: tuple[Any, ...]) -> None:
         """Note objects that are removed from a space."""
         for each in objects:
+            if isinstance(each, pymunk.Shape):
+                self._note_shape(each, is_added=False)
             if each in self._present:
                 self._present.discard(each)
                 self._note_change(each, is_added=False)
 
     def _note_start(self, space: pymunk.Space, caller: FrameType) -> None:
-        """Note settings, and the names of bodies in the code that makes the first step."""
+        """Note settings and window, and the names of bodies in the code that makes the first step."""
         self.settings = {name: getattr(space, attribute) for name, attribute in SPACE_ATTRIBUTES.items()}
+        self.gravity = space.gravity.x, space.gravity.y
+        self.window = _window_size()
         if space.constraints:
             self.settings["joint_bias"] = max(joint.error_bias for joint in space.constraints)
         for body, name in body_names(caller):
@@ -173,6 +185,10 @@ class SpaceLog:
         if self.steps:
             is_joint = isinstance(thing, pymunk.Constraint)
             self.changes.append(Change(self.frame, is_added, is_joint, self._number(thing)))
+
+    def _note_shape(self, shape: pymunk.Shape, *, is_added: bool) -> None:
+        if self.steps:
+            self.shape_changes.append((self.frame, is_added, self._number(shape)))
 
     def _number(self, thing: pymunk.Body | pymunk.Shape | pymunk.Constraint) -> int:
         """Return the number of an object; a new one the first time."""
@@ -226,6 +242,12 @@ class SpaceLog:
             for body in space.bodies:
                 self._by_id[body.id] = self._number(body)
         return self._by_id.get(identity, WORLD)
+
+
+def _window_size() -> tuple[int, int] | None:
+    pygame = sys.modules.get("pygame")  # a program without a window may lack pygame
+    surface = None if pygame is None else pygame.display.get_surface()
+    return None if surface is None else surface.get_size()
 
 
 def _kind(thing: object) -> str:

@@ -158,15 +158,16 @@ def steps_with(
         if nudge is not None and id(space) not in nudged:
             nudged.add(id(space))
             _move(space, nudge)
-        start, count = process_time(), settings.count(dt)
+        count = settings.count(dt)
         forces = [] if count == 1 else _forces(space)
         clock.has_forces |= bool(forces)
         for substep in range(count):
             if substep:
                 for body, force, torque in forces:
                     body.force, body.torque = force, torque
+            start = process_time()
             step(space, dt if count == 1 else dt / count)
-        clock.seconds += process_time() - start
+            clock.seconds += process_time() - start
 
     with ExitStack() as stack:
         stack.enter_context(patch.object(pymunk.Space, "step", stepped))

@@ -6,6 +6,7 @@ from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers, p
 from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.pymunk_loops import attributes, looped, looping, states, states_and_contacts
+from tools.benchmarks.rehearsals import REHEARSALS
 from tools.benchmarks.row import Bench
 from tools.benchmarks.turning import edits, turns
 from tools.benchmarks.workloads import (
@@ -477,4 +478,5 @@ BENCHES = (
     ),
     *GAMES,
     *ENVIRONMENTS,
+    *REHEARSALS,
 )

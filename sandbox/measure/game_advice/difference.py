@@ -1,11 +1,13 @@
 """Difference of two runs of a game: distances of its bodies, and collision callbacks that one of them lacks."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.jsonable import in_json
 from sandbox.rehearsal.rehearse import GameCallback, Rehearsal
 
 CHATTER = 15
@@ -20,6 +22,17 @@ STEP_PHASES = ("pre_solve", "post_solve")
 
 Pair = tuple[GameCallback, tuple[int, int]]
 """Callback and the numbers of two shapes"""
+
+
+class DifferingContact(NamedTuple):
+    """Contact for which a run calls a callback at another time than the truth, or not at all."""
+
+    frame: int
+    """its first frame: of the truth, or of the run if the truth does not have it"""
+    kind: str
+    """`missed`, `late`, `early` or `extra`"""
+    shapes: tuple[int, int]
+    """numbers of the two shapes"""
 
 
 @dataclass(frozen=True)
@@ -39,6 +52,8 @@ class CallbackDifference:
     """frame of the first one of them; None if there is none"""
     first_pair: str | None
     """its two bodies"""
+    contacts: tuple[DifferingContact, ...] = field(default=(), metadata=in_json(omit=True))
+    """all of them, in order"""
 
     @property
     def is_equal(self) -> bool:
@@ -60,6 +75,8 @@ class GameDifference:
     """first frame with an error of more than the tolerance; None if there is none"""
     by_frame: FloatArray
     """(F,) largest distance in each frame"""
+    missing_frames: int
+    """frames that one of the runs has and the other one lacks, because the game ends earlier"""
     callbacks: tuple[CallbackDifference, ...]
     """of each callback that is called in one of the runs"""
 
@@ -164,6 +181,7 @@ def difference_from(truth: Truth, run: Rehearsal, tolerance: float) -> GameDiffe
         None if worst is None else worst[2],
         int(beyond[0]) if len(beyond) else None,
         by_frame,
+        abs(truth.run.frames - run.frames),
         tuple(_callback_differences(truth, run, frames)),
     )
 
@@ -207,7 +225,7 @@ def _callback_differences(truth: Truth, run: Rehearsal, frames: int) -> Iterator
     for callback in dict.fromkeys([*truth.run.callbacks, *run.callbacks]):
         pairs = [pair for pair in dict.fromkeys([*expected, *found]) if pair[0] == callback]
         count = missed = late = extra = 0
-        events: list[tuple[int, Pair]] = []
+        events: list[DifferingContact] = []
         for pair in pairs:
             end = min(frames, *(_horizon(truth, run, shape) for shape in pair[1])) - IN_TIME
             right = [frame for frame in expected.get(pair, []) if frame < end and (pair, frame) not in truth.uncertain]
@@ -217,7 +235,8 @@ def _callback_differences(truth: Truth, run: Rehearsal, frames: int) -> Iterator
             for frame, match in _match(right, here):
                 used.add(match)
                 if match is None or abs(match - frame) > IN_TIME:
-                    events.append((frame, pair))
+                    kind = "missed" if match is None else "late" if match > frame else "early"
+                    events.append(DifferingContact(frame, kind, pair[1]))
                     missed += match is None
                     late += match is not None
             known = [frame for each, frame in (*truth.uncertain, *truth.doubtful) if each == pair]
@@ -225,12 +244,19 @@ def _callback_differences(truth: Truth, run: Rehearsal, frames: int) -> Iterator
                 if frame in used or frame >= end or any(abs(frame - other) <= WINDOW for other in known):
                     continue
                 extra += 1
-                events.append((frame, pair))
+                events.append(DifferingContact(frame, "extra", pair[1]))
         if count or missed or extra:
-            first = min(events, key=lambda each: each[0], default=None)
-            pair_text = None if first is None else _pair_text(truth.run, run, first[1])
+            events.sort(key=lambda each: each.frame)
+            first = events[0] if events else None
             yield CallbackDifference(
-                str(callback), count, missed, late, extra, None if first is None else first[0], pair_text
+                str(callback),
+                count,
+                missed,
+                late,
+                extra,
+                None if first is None else first.frame,
+                None if first is None else _pair_text(truth.run, run, first.shapes),
+                tuple(events),
             )
 
 
@@ -244,6 +270,6 @@ def _horizon(truth: Truth, run: Rehearsal, shape: int) -> int:
     return truth.horizon(_body_of(truth.run, run, shape))
 
 
-def _pair_text(truth: Rehearsal, run: Rehearsal, pair: Pair) -> str:
-    names = (_body_of(truth, run, shape) for shape in pair[1])
+def _pair_text(truth: Rehearsal, run: Rehearsal, shapes: tuple[int, int]) -> str:
+    names = (_body_of(truth, run, shape) for shape in shapes)
     return " and ".join("the static body" if body < 0 else truth.body_name(body) for body in names)

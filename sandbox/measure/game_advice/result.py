@@ -32,8 +32,13 @@ class GameSetting:
     """ms, time of `Space.step` in a frame, with the callbacks"""
     failure: str | None = None
     """why the game failed with this setting; None if it did not"""
+    frames: int = 0
+    """frames until the game ended"""
     is_within: bool = False
-    """whether the error is within the tolerance and no contact is missed, late or extra"""
+    """whether the error is within the tolerance, no contact is missed, late or extra, and the game ends as the truth
+    does"""
+    errors_px: tuple[float, ...] = field(default=(), metadata=in_json(omit=True))
+    """px, largest distance of a body from the truth in each frame, as long as it is known"""
 
     @property
     def lost(self) -> int:
@@ -80,6 +85,8 @@ class GameAdvice:
     """px per unit of length of the game"""
     dts: tuple[float, float, float]
     """s, least, median and largest step of the game"""
+    truth_frames: int
+    """frames of the truth until the game ended"""
     truth_substeps: int
     """substeps of the run that is taken for the truth"""
     truth_error_px: float

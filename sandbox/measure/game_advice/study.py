@@ -14,14 +14,15 @@ from typing import Any
 import numpy as np
 
 from sandbox.game_inputs import GameInputs
-from sandbox.measure.game_advice.difference import Truth, difference_from, part_frames, unmatched
+from sandbox.measure.game_advice.difference import IN_TIME, Truth, difference_from, part_frames, unmatched
 from sandbox.measure.game_advice.repeatability import Mismatch, first_mismatch, likely_causes
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting, PlaysHeld, SettingChange
 from sandbox.measure.game_advice.step_code import step_code
 from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
-from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, kill_rehearsals, rehearse
+from sandbox.recording_remarks import MIN_PIXELS
+from sandbox.rehearsal.rehearse import GameShape, Rehearsal, RehearsalError, kill_rehearsals, rehearse
 from sandbox.rehearsal.step_settings import Nudge, StepSettings
 
 FIRST_TRUTH = 16
@@ -87,7 +88,8 @@ class GameStudy:
         program: path of the program.
         inputs: recorded inputs.
         tolerance_px: accepted error, px.
-        zoom: px per unit of length of the game.
+        zoom: px per unit of length of the game; None for 1 if its shapes have the sizes of pixel graphics, and for
+            50 if not.
         plays: number of plays that differ a little from the recorded one.
         time_limit: s after which no further settings and plays are tried.
         on_progress: progress callback.
@@ -99,14 +101,14 @@ class GameStudy:
         inputs: GameInputs,
         *,
         tolerance_px: float = DEFAULT_TOLERANCE_PX,
-        zoom: float = 1.0,
+        zoom: float | None = None,
         plays: int = DEFAULT_PLAYS,
         time_limit: float = DEFAULT_TIME_LIMIT,
         on_progress: ProgressCallback | None = None,
     ) -> None:
         self._program, self._inputs = program, inputs
-        self._tolerance_px, self._zoom = tolerance_px, zoom
-        self._tolerance = tolerance_px / zoom
+        self._tolerance_px, self._given_zoom = tolerance_px, zoom
+        self._zoom, self._tolerance = 1.0, tolerance_px
         self._plays_wanted, self._time_limit, self._on_progress = plays, time_limit, on_progress
         self._start = time.monotonic()
         self._draws = True
@@ -125,6 +127,8 @@ class GameStudy:
         """
         try:
             own = self._own_run()
+            self._zoom = self._given_zoom or guessed_zoom(own)
+            self._tolerance = self._tolerance_px / self._zoom
             truth, truth_error = self._truth()
             present = self._measured(own, truth)
             changes = self._changes(own, truth)
@@ -217,7 +221,8 @@ class GameStudy:
         difference = difference_from(truth, run, self._tolerance)
         own = {name: run.own_settings[name] for name in run.own_settings}
         settings = run.settings
-        is_within = run.failure is None and difference.error <= self._tolerance and not difference.lost
+        ends_in_time = difference.missing_frames <= IN_TIME
+        is_within = run.failure is None and ends_in_time and difference.error <= self._tolerance and not difference.lost
         return GameSetting(
             substeps=settings.substeps,
             iterations=settings.iterations or int(own.get("iterations", 10)),
@@ -229,7 +234,9 @@ class GameStudy:
             callbacks=difference.callbacks,
             physics_ms=1e3 * run.step_seconds / max(run.frames, 1),
             failure=run.failure,
+            frames=run.frames,
             is_within=is_within,
+            errors_px=tuple((self._zoom * difference.by_frame).tolist()),
         )
 
     def _time_of(self, frame: int) -> float:
@@ -396,6 +403,7 @@ class GameStudy:
             tolerance_px=self._tolerance_px,
             zoom=self._zoom,
             dts=own.dts,
+            truth_frames=fine.frames,
             truth_substeps=fine.settings.substeps,
             truth_error_px=truth_error,
             known_fraction=truth.known_fraction,
@@ -406,7 +414,7 @@ class GameStudy:
             changes=changes,
             plays=plays,
             code=code,
-            remarks=tuple(remarks_on(own, chosen)),
+            remarks=tuple(remarks_on(own, chosen, None if self._given_zoom is not None else self._zoom)),
             tried=1 + len(changes) + len(tried),
             runs=self._count,
             seconds=time.monotonic() - self._start,
@@ -474,8 +482,26 @@ def mismatch_text(mismatch: Mismatch, program: str | Path, inputs: GameInputs) -
     return "\n".join([text, *(f"likely cause: {each}" for each in causes)])
 
 
-def remarks_on(own: Rehearsal, chosen: GameSetting) -> Iterable[str]:
-    """Yield what else matters for the setting of a game."""
+def guessed_zoom(run: Rehearsal) -> float:
+    """Return the px per unit of length of a game, judged by the sizes of its moving shapes."""
+    sizes = [2.0 * _reach(shape) for shape, body in zip(run.shapes, run.shape_bodies, strict=True) if body >= 0]
+    return 1.0 if sizes and float(np.median(sizes)) >= MIN_PIXELS else METRE
+
+
+METRE = 50.0
+"""px per unit of length of a game whose bodies are too small for pixels"""
+
+
+def _reach(shape: GameShape) -> float:
+    """Return half the size of a shape, in units of the game."""
+    points = np.asarray(shape.points)
+    return shape.radius + 0.5 * float(np.max(np.ptp(points, axis=0), initial=0.0))
+
+
+def remarks_on(own: Rehearsal, chosen: GameSetting, guessed: float | None) -> Iterable[str]:
+    """Yield what else matters for the setting of a game; `guessed` is the zoom, if it was not given."""
+    if guessed == METRE:
+        yield f"the unit of length is taken for a metre of {METRE:g} px; --zoom or --pixels states it"
     low, middle, high = own.dts
     if high > low * (1.0 + VARIES):
         yield (

@@ -41,7 +41,7 @@ def truth_sentences(advice: GameAdvice) -> Iterator[str]:
         )
 
 
-def figures_text(setting: GameSetting) -> str:
+def figures_text(advice: GameAdvice, setting: GameSetting) -> str:
     """Return error and cost of a setting."""
     if setting.error_px is None:
         return f"failed: {setting.failure}"
@@ -50,6 +50,8 @@ def figures_text(setting: GameSetting) -> str:
         parts[0] += f" ({setting.body} at {setting.time:.3g} s)"
     if setting.within_until is not None:
         parts[0] += f", more than the tolerance from {setting.within_until:.3g} s on"
+    if abs(setting.frames - advice.truth_frames) > 1:
+        parts.append(f"the game ends after {setting.frames:,} frames, the truth after {advice.truth_frames:,}")
     parts.append(f"{format_number(setting.physics_ms)} ms of physics per frame")
     return "; ".join(parts)
 

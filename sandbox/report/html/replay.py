@@ -96,6 +96,9 @@ def replay_document(
                 "errors": _errors(track, time),
                 "breaks": _breaks(track.run, scene),
                 "value": track.value,
+                "shape": None,
+                "absent": {},
+                "marks": [],
             }
             for track, text in zip(tracks, texts, strict=True)
         ],
@@ -103,11 +106,15 @@ def replay_document(
         "bodies": len(drawn),
         "time": [float(f"{t:.9g}") for t in time.tolist()],
         "duration": scene.world.duration,
+        "start": 0.0,
+        "panes": None,
+        "unit": "m",
+        "mark_time": 0.0,
         "trusted_until": trusted_until,
         "step": box.step,
         "half": 0.5 * box.side,
         "view": [view[0] - origin[0], view[1] - origin[1], view[2] - origin[0], view[3] - origin[1]],
-        "speed": _initial_speed(scene.world.duration),
+        "speed": initial_speed(scene.world.duration),
         "note": "; ".join(notes),
         "swept": swept,
         "values": sorted({track.value for track in tracks if track.value is not None}),
@@ -120,14 +127,14 @@ def _encoded(
     """Return the times of as many frames as the budget allows, and the encoded tracks at these times."""
     max_frames = MAX_FRAMES
     while True:
-        time = longest[_evenly_spread(len(longest), max_frames)]
+        time = longest[evenly_spread(len(longest), max_frames)]
         texts = [_encode(track, time, drawn, has_angles, box) for track in tracks]
         if sum(map(len, texts)) <= BUDGET or max_frames <= MIN_FRAMES:
             return time, texts
         max_frames = max(MIN_FRAMES, max_frames // 2)
 
 
-def _evenly_spread(count: int, max_frames: int) -> IntArray:
+def evenly_spread(count: int, max_frames: int) -> IntArray:
     """Return the indices of at most `max_frames` frames, evenly spread, with the first and the last one."""
     return np.unique(np.rint(np.linspace(0, max(count - 1, 0), min(count, max_frames))).astype(np.int64))
 
@@ -209,6 +216,6 @@ def _breaks(run: Trajectory, scene: Scene) -> Mapping[str, float]:
     return {str(k): float(f"{time:.6g}") for k, time in enumerate(times) if time < math.inf}
 
 
-def _initial_speed(duration: float) -> float:
+def initial_speed(duration: float) -> float:
     """Return the speed at which the replay takes about `TARGET_DURATION`."""
     return min(SPEEDS, key=lambda speed: abs(math.log(duration / speed / TARGET_DURATION)))

@@ -243,6 +243,7 @@ def static_geometry(scene: Scene, drawn: IntArray, origin: tuple[float, float]) 
         "posts": [[*_moved(post.position, origin), post.radius] for post in scene.posts if post.solid],
         "pockets": [[*_moved(pocket.position, origin), pocket.radius] for pocket in scene.pockets],
         "solids": _solids(bodies, origin),
+        "sensors": [],
         "attractions": [_moved(a.toward, origin) for a in scene.attractions if not isinstance(a.toward, str)],
         "joints": _joints(scene, drawn, origin),
     }

@@ -38,7 +38,7 @@ def next_picture(browser: Browser) -> str:
     return str(browser.do(PICTURE))
 
 
-@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
+@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "game advice", "overview"])
 def test_page_logs_no_errors_and_requests_nothing(kind: str, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     if kind != "extremes":
@@ -50,7 +50,7 @@ def test_page_logs_no_errors_and_requests_nothing(kind: str, browser: Browser, p
     assert browser.do("return performance.getEntriesByType('resource').length") == 0
 
 
-@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
+@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "game advice", "overview"])
 def test_hostile_texts_are_shown_and_not_executed(kind: str, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     assert browser.do("return window.harm === undefined && !document.querySelector('img, #harm')")
@@ -207,7 +207,7 @@ def test_selected_point_of_a_trade_off_shows_its_settings(browser: Browser, page
 
 
 @pytest.mark.parametrize("width", [360, 800, 1600])
-@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
+@pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "game advice", "overview"])
 def test_page_is_not_wider_than_its_window(kind: str, width: int, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
@@ -245,6 +245,61 @@ def test_slider_of_a_sweep_shows_one_value_at_a_time(browser: Browser, tmp_path:
     next_picture(browser)
     assert browser.do(shown).count("pymunk") == len(steps)
     assert browser.do(solid) == len(steps)
+
+
+PICTURES = "return [...document.querySelectorAll('canvas')].map((it) => it.toDataURL())"
+
+
+def test_runs_of_a_game_share_time_and_view(browser: Browser, pages: Pages) -> None:
+    browser.show(pages["game advice"])
+    browser.do("document.querySelector('.replay').scrollIntoView()")
+    browser.wait(READY)
+    next_picture(browser)
+    assert browser.do(TIME) == pytest.approx(59 / 60, abs=1e-5)  # the first lost contact, to six digits
+    assert browser.do("return document.querySelectorAll('.marks .mark').length") == 1
+    for change in (
+        (SCRUB, 1.5),
+        ("document.querySelector('[data-action=nearer]').click()",),
+        ("document.querySelector('[data-track=truth]').click()",),
+    ):
+        before = browser.do(PICTURES)
+        browser.do(*change)
+        next_picture(browser)
+        assert all(new != old for new, old in zip(browser.do(PICTURES), before, strict=True))
+    cursors = browser.do("return [...document.querySelectorAll('svg.time')].map((it) => Number(it.dataset.time))")
+    assert cursors == [1.5, 1.5, 1.5]  # the marks of two runs, and the errors
+    # The present setting is 6 · 90/120 units of 0.5 px off then.
+    assert browser.do("return document.querySelector('.legend .error').textContent") == "2.25 px"
+
+
+def test_drag_in_the_marks_of_a_run_seeks(browser: Browser, pages: Pages) -> None:
+    browser.show(pages["game advice"])
+    marks = browser.driver.find_element(By.CSS_SELECTOR, ".marks svg")
+    browser.do("arguments[0].scrollIntoView({block: 'center'})", marks)
+    browser.wait(READY)
+    ActionChains(browser.driver).move_to_element(marks).click().perform()
+    assert browser.do(TIME) == pytest.approx(1.0, abs=0.005)  # half of 2 s, within a pixel of 900
+
+
+def test_ring_marks_a_lost_contact_in_its_run(browser: Browser, pages: Pages) -> None:
+    browser.show(pages["game advice"])
+    browser.do("document.querySelector('.replay').scrollIntoView()")
+    browser.wait(READY)
+    browser.do("document.documentElement.style.setProperty('--bad', '#00ff00')")
+    green = (
+        "return [...document.querySelectorAll('canvas')].map((it) => {"
+        "const { data } = it.getContext('2d').getImageData(0, 0, it.width, it.height); let count = 0;"
+        "for (let k = 0; k < data.length; k += 4) count += data[k] < 60 && data[k + 1] > 200 && data[k + 2] < 60;"
+        "return count; })"
+    )
+    browser.do(SCRUB, 59 / 60)
+    next_picture(browser)
+    truth, present, recommended = browser.do(green)
+    assert truth == recommended == 0
+    assert present > 60  # px: the ring alone has 2π · 10 · 2, some of them blended with the background
+    browser.do(SCRUB, 1.9)
+    next_picture(browser)
+    assert browser.do(green) == [0, 0, 0]
 
 
 def test_sweep_over_words_has_no_slider() -> None:

@@ -54,14 +54,16 @@ const WIDTHS = [4.5, 3, 1.7]; // px, outlines by track: each is visible under th
 const TURN = 2 * Math.PI;
 
 class Renderer {
-  constructor(context, camera, colours) {
+  constructor(context, camera, colours, unit = "m") {
     this.context = context;
     this.camera = camera;
     this.colours = colours;
+    this.unit = unit;
   }
 
-  /* The background: a grid, static geometry, and a scale bar. */
-  drawGeometry(geometry) {
+  /* The background: a grid, static geometry, and a scale bar. `absent` has times, from and until, in which a solid or
+     a sensor with a number is absent. */
+  drawGeometry(geometry, absent = {}, time = 0) {
     const { context, camera, colours } = this;
     context.lineCap = context.lineJoin = "round";
     context.fillStyle = colours.sheet;
@@ -83,13 +85,25 @@ class Renderer {
       context.fill();
       context.stroke();
     }
-    for (const [x, y, angle, piece] of geometry.solids) {
+    const isPresent = (number) => !(absent[number] || []).some(([from, until]) => from <= time && (until === null || time < until));
+    for (const [x, y, angle, piece, number] of geometry.solids) {
+      if (!isPresent(number)) continue;
       context.beginPath();
       this.addPiece(piece, x, y, Math.cos(angle), Math.sin(angle));
       context.fill();
       context.stroke();
     }
     context.strokeStyle = colours.soft;
+    context.lineWidth = 1;
+    context.setLineDash([2, 3]);
+    for (const [x, y, angle, piece, number] of geometry.sensors) {
+      if (!isPresent(number)) continue;
+      context.beginPath();
+      this.addPiece(piece, x, y, Math.cos(angle), Math.sin(angle));
+      context.stroke();
+    }
+    context.setLineDash([]);
+    context.lineWidth = 1.5;
     for (const [x, y] of geometry.attractions) {
       const [px, py] = [camera.toX(x), camera.toY(y)];
       context.beginPath();
@@ -142,18 +156,18 @@ class Renderer {
     context.lineTo(right, y - 4);
     context.stroke();
     context.textAlign = "center";
-    this.write(formatNumber(step, "m"), right - length / 2, y - 6);
+    this.write(formatNumber(step, this.unit), right - length / 2, y - 6);
   }
 
   /* A text with an outline in the colour of the background, legible on everything. */
-  write(text, x, y) {
+  write(text, x, y, colour = this.colours.soft) {
     const { context, colours } = this;
     context.font = `12px ${colours.font}`;
     context.lineWidth = 4;
     context.lineJoin = "round";
     context.strokeStyle = colours.sheet;
     context.strokeText(text, x, y);
-    context.fillStyle = colours.soft;
+    context.fillStyle = colour;
     context.fillText(text, x, y);
   }
 
@@ -238,11 +252,34 @@ class Renderer {
     context.closePath();
   }
 
-  /* One track at one time. `pose` is x, y, angle of each body; x is nan for an absent one. */
-  drawTrack(geometry, track, pose, bodies, time, place) {
+  /* Rings with a text at the marks of a track, from their time on for `lasting`, s. */
+  drawMarks(marks, time, lasting) {
+    const { context, camera, colours } = this;
+    const written = [];
+    for (const [at, x, y, text] of marks) {
+      const age = time - at;
+      if (age < -1e-4 || age > lasting) continue; // times are rounded to a few digits
+      const [px, py] = [camera.toX(x), camera.toY(y)];
+      context.globalAlpha = 1 - 0.6 * Math.max(age / lasting, 0);
+      context.strokeStyle = colours.bad;
+      context.lineWidth = 2;
+      context.beginPath();
+      context.arc(px, py, 10, 0, TURN);
+      context.stroke();
+      // Texts near each other have a line each.
+      let line = py - 16;
+      while (written.some(([u, v]) => Math.abs(u - px) < 120 && Math.abs(v - line) < 14)) line -= 14;
+      written.push([px, line]);
+      context.textAlign = px > 0.6 * camera.width ? "right" : px < 0.4 * camera.width ? "left" : "center";
+      this.write(text, Math.min(Math.max(px, 6), camera.width - 6), line, colours.bad);
+    }
+    context.globalAlpha = 1;
+  }
+
+  /* One track at one time. `pose` is x, y, angle of each body; x is nan for an absent one. A truth is dashed. */
+  drawTrack(geometry, track, pose, bodies, time, place, truth = track.css_class === "truth") {
     const { context, camera, colours } = this;
     const colour = colours[track.css_class];
-    const truth = track.css_class === "truth";
     context.save();
     context.strokeStyle = context.fillStyle = colour;
     context.lineCap = context.lineJoin = "round";
@@ -252,7 +289,7 @@ class Renderer {
       const [x, y, angle] = [pose[3 * n], pose[3 * n + 1], pose[3 * n + 2]];
       if (Number.isNaN(x)) continue;
       const [cos, sin] = [Math.cos(angle), Math.sin(angle)];
-      const shape = geometry.shapes[geometry.shape[n]];
+      const shape = geometry.shapes[track.shape ? track.shape[n] : geometry.shape[n]];
       for (const piece of shape) this.addPiece(piece, x, y, cos, sin);
       // A line from the centre shows the rotation of a body that is a single disc.
       if (shape.length === 1 && shape[0].length === 3 && track.hasAngles && !truth) {

@@ -1,4 +1,5 @@
-/* The replay of one scene: engines on top of each other on a canvas, with the time cursor of the charts beside it. */
+/* The replay of one scene: engines on top of each other on a canvas, or on one canvas each, with the time cursor of the
+   charts beside it. */
 const MAX_PATHS = 8; // up to this number of bodies, the path of each is drawn
 const REDUCED_MOTION = window.matchMedia("(prefers-reduced-motion: reduce)");
 const DARK = window.matchMedia("(prefers-color-scheme: dark)");
@@ -20,8 +21,7 @@ class Replay {
   constructor(figure, clock) {
     this.figure = figure;
     this.clock = clock;
-    this.canvas = figure.querySelector("canvas");
-    this.context = this.canvas.getContext("2d");
+    this.canvases = [...figure.querySelectorAll("canvas")];
     this.scene = JSON.parse(figure.querySelector("script.data").textContent);
     this.camera = new Camera(this.scene.view);
     this.hidden = new Set();
@@ -34,7 +34,7 @@ class Replay {
     this.scrub.max = String(this.scene.duration);
     this.listen();
     clock.listen((time) => this.show(time));
-    new ResizeObserver(() => this.resize()).observe(this.canvas);
+    new ResizeObserver(() => this.resize()).observe(this.canvases[0]);
     // A replay far down a long page is decompressed once it is near.
     const near = new IntersectionObserver(
       (entries) => {
@@ -68,7 +68,7 @@ class Replay {
   }
 
   listen() {
-    const { figure, canvas, camera } = this;
+    const { figure } = this;
     const actions = {
       play: () => this.play(!this.playing),
       back: () => this.step(-1),
@@ -94,6 +94,15 @@ class Replay {
       this.select(this.scene.values[Number(slider.value)]);
     }
     figure.addEventListener("keydown", (event) => this.press(event, actions));
+    for (const canvas of this.canvases) this.listenTo(canvas);
+    DARK.addEventListener("change", () => this.draw());
+    window.addEventListener("beforeprint", () => this.drawFor("light"));
+    window.addEventListener("afterprint", () => this.drawFor(null));
+  }
+
+  /* Zooming and panning on a canvas; all canvases share the camera. */
+  listenTo(canvas) {
+    const { figure, camera } = this;
     canvas.addEventListener(
       "wheel",
       (event) => {
@@ -121,10 +130,7 @@ class Replay {
         this.dragged = null;
       });
     }
-    canvas.addEventListener("dblclick", actions.fit);
-    DARK.addEventListener("change", () => this.draw());
-    window.addEventListener("beforeprint", () => this.drawFor("light"));
-    window.addEventListener("afterprint", () => this.drawFor(null));
+    canvas.addEventListener("dblclick", () => this.fit());
   }
 
   press(event, actions) {
@@ -287,10 +293,12 @@ class Replay {
 
   resize() {
     const ratio = window.devicePixelRatio || 1;
-    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const { clientWidth: width, clientHeight: height } = this.canvases[0];
     if (!width || !height) return;
-    this.canvas.width = Math.round(width * ratio);
-    this.canvas.height = Math.round(height * ratio);
+    for (const canvas of this.canvases) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
     this.ratio = ratio;
     this.camera.resize(width, height);
     this.paint();
@@ -312,17 +320,34 @@ class Replay {
   paint() {
     this.isRequested = false;
     if (!this.ready || !this.ratio) return;
-    const { context, scene, camera, clock, figure } = this;
+    const { scene, clock, figure } = this;
     const style = getComputedStyle(figure);
     const colours = { font: style.fontFamily };
-    const names = ["sheet", "soft", "rule", "solid", "pocket", "e0", "e1", "e2", "e3", "e4", "e5", "truth"];
+    const names = ["sheet", "soft", "rule", "solid", "pocket", "e0", "e1", "e2", "e3", "e4", "e5", "truth", "bad"];
     for (const name of names) colours[name] = style.getPropertyValue(`--${name}`).trim();
     colours.edge = style.getPropertyValue("--solid-edge").trim();
-    context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    const renderer = new Renderer(context, camera, colours);
-    renderer.drawGeometry(scene.geometry);
-    const [before, fraction] = this.between(clock.time);
     const shown = scene.tracks.filter((track) => !this.hidden.has(track.name));
+    for (const [k, canvas] of this.canvases.entries()) {
+      const names = scene.panes === null ? scene.tracks.map((track) => track.name) : scene.panes[k];
+      const own = scene.tracks.find((track) => track.name === names[0]);
+      const visible = shown.filter((track) => names.includes(track.name));
+      this.paintPane(canvas, { ...colours }, visible, own ? own.absent : {});
+    }
+    const late = scene.trusted_until !== null && clock.time > scene.trusted_until;
+    figure.querySelector(".status").textContent = late ? "the truth is not trusted at this time" : "";
+    figure.dataset.shown = shown.map((track) => track.name).join(",");
+    figure.dataset.painted = String(Number(figure.dataset.painted || 0) + 1);
+  }
+
+  /* Draw tracks on a canvas. The truth is dashed above other tracks, and solid where it is the only one. */
+  paintPane(canvas, colours, shown, absent) {
+    const { scene, camera, clock } = this;
+    const context = canvas.getContext("2d");
+    context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    const renderer = new Renderer(context, camera, colours, scene.unit);
+    renderer.drawGeometry(scene.geometry, absent, clock.time);
+    const [before, fraction] = this.between(clock.time);
+    const isAlone = scene.panes !== null && shown.length === 1;
     const first = Math.max(0, WIDTHS.length - scene.tracks.filter((track) => track.css_class !== "truth").length);
     if (scene.bodies <= MAX_PATHS) for (const track of shown) this.drawPath(renderer, track, before, fraction);
     for (const track of shown) {
@@ -330,18 +355,18 @@ class Replay {
       const late = track.css_class === "truth" && scene.trusted_until !== null && clock.time > scene.trusted_until;
       context.globalAlpha = 1;
       if (late) colours.truth = colours.soft;
-      renderer.drawTrack(scene.geometry, track, this.pose, scene.bodies, clock.time, first + scene.tracks.indexOf(track));
+      const isDashed = track.css_class === "truth" && !isAlone;
+      const place = first + scene.tracks.indexOf(track);
+      renderer.drawTrack(scene.geometry, track, this.pose, scene.bodies, clock.time, place, isDashed);
     }
     this.drawNames(renderer, shown);
-    const late = scene.trusted_until !== null && clock.time > scene.trusted_until;
-    figure.querySelector(".status").textContent = late ? "the truth is not trusted at this time" : "";
-    figure.dataset.shown = shown.map((track) => track.name).join(",");
-    figure.dataset.painted = String(Number(figure.dataset.painted || 0) + 1);
+    for (const track of shown) renderer.drawMarks(track.marks, clock.time, scene.mark_time);
   }
 
   /* The paths of the bodies up to now. */
   drawPath(renderer, track, before, fraction) {
-    const { context, camera, scene } = this;
+    const { camera, scene } = this;
+    const { context } = renderer;
     const each = scene.has_angles ? 3 : 2;
     this.place(track, before, fraction);
     context.save();
@@ -373,16 +398,19 @@ class Replay {
 
   /* Names beside the bodies of the last visible track. */
   drawNames(renderer, shown) {
-    const { scene, camera, context } = this;
+    const { scene, camera } = this;
+    const { context } = renderer;
     if (!shown.length) return;
-    context.textAlign = "left";
     for (const [n, name] of scene.geometry.names.entries()) {
       const x = this.pose[3 * n];
-      if (Number.isNaN(x)) continue;
+      if (Number.isNaN(x) || !name) continue;
       const reach = Math.max(...scene.geometry.shapes[scene.geometry.shape[n]].map((piece) => piece[0])) * camera.scale;
       const aside = Math.max(reach, 3) * 0.75 + 6;
       const text = name.length > 24 ? `${name.slice(0, 23)}…` : name;
-      renderer.write(text, camera.toX(x) + aside, camera.toY(this.pose[3 * n + 1]) - aside);
+      context.font = `12px ${renderer.colours.font}`;
+      const isAtEdge = camera.toX(x) + aside + context.measureText(text).width > camera.width;
+      context.textAlign = isAtEdge ? "right" : "left";
+      renderer.write(text, camera.toX(x) + (isAtEdge ? -aside : aside), camera.toY(this.pose[3 * n + 1]) - aside);
     }
   }
 }
@@ -391,6 +419,7 @@ for (const figure of document.querySelectorAll(".replay")) {
   const place = figure.closest(".linked");
   const clock = new TimeCursor(JSON.parse(figure.querySelector("script.data").textContent).duration);
   const replay = new Replay(figure, clock);
+  clock.set(replay.scene.start);
   for (const chart of place ? place.querySelectorAll("svg.time") : []) {
     linkChart(chart, clock, () => {
       replay.play(false);
