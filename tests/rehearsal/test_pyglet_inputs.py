@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic, sleep
 
@@ -13,7 +14,7 @@ import numpy as np
 import pymunk
 import pytest
 
-from sandbox.game_inputs import GameInputs, load_inputs
+from sandbox.game_inputs import PYGLET_EVENT, GameInputs, InputEvent, load_inputs
 from sandbox.rehearsal.rehearse import Rehearsal, first_difference, rehearse
 from sandbox.rehearsal.step_settings import StepSettings
 from tests.driven.driving import start_server
@@ -159,9 +160,20 @@ def test_a_full_screen_has_the_recorded_size(tmp_path: Path) -> None:
     assert screens[0].value == [1920, 1080]
     assert "on_resize 1920 1080" in printed
     other = {**inputs.readings, "pyglet.screen": tuple(each._replace(value=[1280, 720]) for each in screens)}
-    found = rehearse(GAMES / "all_events.py", GameInputs(**{**vars(inputs), "readings": other}))
+    found = rehearse(GAMES / "all_events.py", replace(inputs, readings=other))
     assert "on_resize 1280 720" in found.output
     assert found.output.strip().endswith("1280 px")
+
+
+def test_a_window_has_the_size_that_the_user_gave_it(tmp_path: Path) -> None:
+    inputs, printed = play(GAMES / "all_events.py", scripted(frames=6), tmp_path)
+    assert "200 px" in printed
+    values = {"window": 0, "name": "_on_internal_resize", "arguments": [250, 150]}
+    first, *others = inputs.events
+    resized = replace(inputs, events=(first, InputEvent(2, 0, PYGLET_EVENT, values), *others))
+    found = rehearse(GAMES / "all_events.py", resized)
+    assert "on_resize 250 150" in found.output
+    assert found.output.strip().endswith("250 px")
 
 
 def test_a_program_that_waits_for_events_ends_with_them(tmp_path: Path) -> None:
