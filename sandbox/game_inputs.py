@@ -1,7 +1,7 @@
 """Inputs of a pymunk game, as its program saw them: events, keys, mouse, clock and random seeds, frame by frame.
 
 They are a part of a recording, with a version of its own. A frame ends when the program shows it
-(`pygame.display.flip`); of a program without a window, with each `Space.step`.
+(`pygame.display.flip`, `flip` of a pyglet window); of a program without a window, with each `Space.step`.
 """
 
 import hashlib
@@ -21,6 +21,8 @@ from sandbox.scene.errors import Fault, SceneError
 VERSION = 1
 STATES = ("keys", "modifiers", "mouse", "mouse_buttons", "focus")
 """Kinds of readings that are states of keyboard and mouse"""
+PYGLET_EVENT = -1
+"""Type of an event of pyglet: its values are the number of the window, from 0, the name and the arguments"""
 
 InputValue = bool | int | float | str | list[Any] | dict[str, Any] | None
 """Value in JSON"""
@@ -43,7 +45,7 @@ class InputEvent(NamedTuple):
     call: int
     """number of the call, within the frame, by which the program looks into its queue and finds the event"""
     type: int
-    """number of the type in pygame"""
+    """number of the type in pygame, or `PYGLET_EVENT`"""
     values: dict[str, InputValue]
     """attributes"""
 

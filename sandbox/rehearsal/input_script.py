@@ -29,7 +29,7 @@ class InputChange(BaseModel):
     release: str | None = None
     """likewise"""
     mouse: tuple[int, int] | None = None
-    """position to which the mouse moves, px"""
+    """position to which the mouse moves, px, as the program reads it: y points down in pygame, and up in pyglet"""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

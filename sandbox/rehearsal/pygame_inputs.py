@@ -200,16 +200,17 @@ class PygameEventQueue:
         """Return the attributes of an event that a recording can have."""
         values: dict[str, InputValue] = {}
         for name, value in event.__dict__.items():
-            if _is_value(value):
+            if is_value(value):
                 values[name] = _list(value)
             elif name != "window":  # an object of the window itself
                 self._note(f"{LOST}: {name} of {pygame.event.event_name(event.type)}")
         return values
 
 
-def _is_value(value: Any) -> bool:
+def is_value(value: Any) -> bool:
+    """Return whether a recording can have a value."""
     if isinstance(value, (list, tuple)):
-        return all(map(_is_value, value))
+        return all(map(is_value, value))
     return value is None or isinstance(value, (bool, int, float, str))
 
 

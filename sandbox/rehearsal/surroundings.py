@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-
 import pygame
 import pymunk
 
@@ -19,6 +17,7 @@ from sandbox.rehearsal.game_clock import clock_from
 from sandbox.rehearsal.guard import FileWatch
 from sandbox.rehearsal.input_script import InputScript, ScriptedDevice
 from sandbox.rehearsal.pygame_inputs import LiveDevice, PygameDevice, pygame_inputs_from
+from sandbox.rehearsal.pyglet_inputs import pyglet_inputs_from
 from sandbox.rehearsal.random_seeds import random_seed, seeded
 from sandbox.rehearsal.space_log import SpaceLog, spaces_logged
 from sandbox.rehearsal.tape import EndOfTape, InputTape, RecordingTape, ReplayTape
@@ -148,12 +147,13 @@ def _is_ordinary(path: Path) -> bool:
 
 
 @contextmanager
-def replayed(inputs: GameInputs, log: SpaceLog) -> Iterator[ReplayTape]:
+def replayed(inputs: GameInputs, log: SpaceLog, *, draws: bool = True) -> Iterator[ReplayTape]:
     """Give recorded inputs to the program that runs within a `with` block.
 
     Args:
         inputs: of the program.
         log: of its spaces.
+        draws: whether windows of pyglet are drawn.
 
     Yields:
         The tape.
@@ -173,6 +173,7 @@ def replayed(inputs: GameInputs, log: SpaceLog) -> Iterator[ReplayTape]:
         sleep=lambda _: None,
         note=note,
         max_steps=max_steps,
+        draws=draws,
     ):
         yield tape
 
@@ -199,6 +200,7 @@ def surroundings(
     now: Callable[[], float] | None = None,
     note: Callable[[str], None],
     max_steps: int | None = None,
+    draws: bool = True,
 ) -> Iterator[None]:
     """Let a program read its inputs from a tape, and log its spaces frame by frame, within a `with` block.
 
@@ -212,15 +214,21 @@ def surroundings(
         now: virtual clock from which a tape that records reads, s; default: the real clocks.
         note: called with a remark on what the tape cannot have.
         max_steps: calls of `Space.step` after which the next one raises `EndOfTape`; default: unlimited.
+        draws: whether windows of pyglet are drawn.
     """
+    has_window = False  # of pyglet
 
     def finish_frame() -> None:
         log.end_frame()
         end_frame()
 
+    def open_window() -> None:
+        nonlocal has_window
+        has_window = True
+
     def before_step(space: pymunk.Space) -> None:
         # A program without a window has a frame for each step.
-        if log.has_stepped(space) and pygame.display.get_surface() is None:
+        if log.has_stepped(space) and not has_window and pygame.display.get_surface() is None:
             finish_frame()
         if max_steps is not None and log.steps >= max_steps:
             raise EndOfTape(0)
@@ -229,6 +237,10 @@ def surroundings(
         stack.enter_context(seeded(seed))
         stack.enter_context(spaces_logged(log, before_step))
         stack.enter_context(pygame_inputs_from(tape, device, end_frame=finish_frame, note=note))
+        scripted = device if isinstance(device, ScriptedDevice) else None
+        stack.enter_context(
+            pyglet_inputs_from(tape, scripted, open_window=open_window, end_frame=finish_frame, note=note, draws=draws)
+        )
         stack.enter_context(clock_from(tape, sleep=sleep, now=now))
         try:
             yield

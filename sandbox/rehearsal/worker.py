@@ -69,7 +69,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         if inputs.pymunk6:
             stack.enter_context(pymunk6_names())
         steps = stack.enter_context(steps_with(RehearsalSettings(**request["settings"]), nudge=nudge))
-        tape = stack.enter_context(replayed(inputs, log))
+        tape = stack.enter_context(replayed(inputs, log, draws=request["draws"]))
         stack.enter_context(started_as(name, inputs.arguments))
         if not request["draws"]:
             _leave_out_drawing(stack)

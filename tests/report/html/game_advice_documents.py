@@ -127,7 +127,7 @@ def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
         tolerance_px=TOLERANCE_PX,
         zoom=ZOOM,
         dts=(1 / 60, 1 / 60, 1 / 60),
-        truth_frames=120,
+        truth_frames=FRAMES,
         truth_substeps=64,
         truth_error_px=0.125,
         known_fraction=0.75,
