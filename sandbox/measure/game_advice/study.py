@@ -483,11 +483,27 @@ def mismatch_text(mismatch: Mismatch, program: str | Path, inputs: GameInputs) -
 
 
 def guessed_zoom(run: Rehearsal) -> float:
-    """Return the px per unit of length of a game, judged by the sizes of its moving shapes."""
+    """Return the px per unit of length of a game.
+
+    It is 1 if the moving shapes have the sizes of pixel graphics, or if the level is about as many units wide as the
+    window has pixels.
+    """
     sizes = [2.0 * _reach(shape) for shape, body in zip(run.shapes, run.shape_bodies, strict=True) if body >= 0]
-    return 1.0 if sizes and float(np.median(sizes)) >= MIN_PIXELS else METRE
+    if sizes and float(np.median(sizes)) >= MIN_PIXELS:
+        return 1.0
+    if run.window is not None:
+        static = [shape.points for shape, body in zip(run.shapes, run.shape_bodies, strict=True) if body < 0]
+        points = np.concatenate([run.states[:, :2], *(np.reshape(each, (-1, 2)) for each in static)])
+        extent = float(np.max(np.ptp(np.quantile(points, MIDDLE, axis=0), axis=0))) if len(points) else 0.0
+        return 1.0 if extent >= MIN_WINDOW * max(run.window) else METRE
+    return METRE
 
 
+MIDDLE = (0.02, 0.98)
+"""Quantiles of positions between which a level lies; a body that falls out of it does not count"""
+MIN_WINDOW = 0.1
+"""Extent of a level in units, relative to the pixels of the window, from which on the unit is the pixel. At 50 px per
+metre it is 0.02."""
 METRE = 50.0
 """px per unit of length of a game whose bodies are too small for pixels"""
 
