@@ -22,6 +22,7 @@ from sandbox.measure.game_advice.study import (
 )
 from sandbox.measure.game_advice.text import (
     callback_text,
+    contacts_text,
     figures_text,
     present_odds_text,
     recommended_head,
@@ -208,14 +209,14 @@ def _print_changes(advice: GameAdvice) -> None:
     _print_heading("3. One change at a time of the present setting")
     table = new_table()
     add_columns(table, [f"{INDENT}change"])
-    add_columns(table, ("error, px", "contacts lost", "ms per frame"), "right")
+    add_columns(table, ("error, px", "contacts", "ms per frame"), "right")
     add_columns(table, [""])
     for each in advice.changes:
         setting = each.setting
         table.add_row(
             f"{INDENT}{each.change}",
             "failed" if setting.error_px is None else format_number(setting.error_px),
-            str(setting.lost),
+            contacts_text(setting),
             format_number(setting.physics_ms),
             "within" if setting.is_within else "",
         )

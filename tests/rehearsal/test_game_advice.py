@@ -117,7 +117,7 @@ def test_bullets_that_tunnel_are_missed_callbacks(record: Recorder) -> None:
     assert lost_contacts(advice, "begin")["Game.hit_target"] == (8, 15)
     assert lost_contacts(advice, "begin")["Game.collect_coin"] == (0, 6)
     assert advice.chosen is not None
-    assert advice.chosen.lost == 0
+    assert advice.chosen.differing == 0
 
 
 def test_game_that_cannot_be_repeated_gets_no_advice_but_its_cause(record: Recorder) -> None:

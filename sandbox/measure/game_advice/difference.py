@@ -81,7 +81,7 @@ class GameDifference:
     """of each callback that is called in one of the runs"""
 
     @property
-    def lost(self) -> int:
+    def differing(self) -> int:
         """Number of contacts that are missed, late, early or extra."""
         return sum(each.missed + each.late + each.extra for each in self.callbacks)
 

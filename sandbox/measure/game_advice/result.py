@@ -41,7 +41,7 @@ class GameSetting:
     """px, largest distance of a body from the truth in each frame, as long as it is known"""
 
     @property
-    def lost(self) -> int:
+    def differing(self) -> int:
         """Number of contacts that are missed, late, early or extra."""
         return sum(each.missed + each.late + each.extra for each in self.callbacks)
 
@@ -100,7 +100,7 @@ class GameAdvice:
     """cheapest setting within the tolerance; None if none was found"""
     most_accurate: GameSetting | None
     """without a recommended setting: the one that keeps to the tolerance in most of the plays that differ a little, or
-    has the fewest lost contacts and the smallest error"""
+    has the fewest differing contacts and the smallest error"""
     changes: tuple[GameSettingChange, ...]
     """effect of each single change of the present setting"""
     plays: PlaysHeld

@@ -222,7 +222,9 @@ class GameStudy:
         own = {name: run.own_settings[name] for name in run.own_settings}
         settings = run.settings
         ends_in_time = difference.missing_frames <= IN_TIME
-        is_within = run.failure is None and ends_in_time and difference.error <= self._tolerance and not difference.lost
+        is_within = (
+            run.failure is None and ends_in_time and difference.error <= self._tolerance and not difference.differing
+        )
         return GameSetting(
             substeps=settings.substeps,
             iterations=settings.iterations or int(own.get("iterations", 10)),
@@ -336,7 +338,7 @@ class GameStudy:
             if self._time_left <= 0.0:
                 break
         if best is None:
-            most_accurate = min(candidates, key=lambda each: (each.lost, _error(each)))
+            most_accurate = min(candidates, key=lambda each: (each.differing, _error(each)))
             return None, most_accurate, self._odds(present, None, plays)
         return None, best[1], self._odds(present, best[0], plays)
 

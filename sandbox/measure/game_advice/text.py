@@ -56,6 +56,12 @@ def figures_text(advice: GameAdvice, setting: GameSetting) -> str:
     return "; ".join(parts)
 
 
+def contacts_text(setting: GameSetting) -> str:
+    """Return how many contacts differ from those of the truth, over all callbacks: `8 missed, 8 extra`."""
+    counts = {word: sum(getattr(each, word) for each in setting.callbacks) for word in ("missed", "late", "extra")}
+    return ", ".join(f"{count:,} {word}" for word, count in counts.items() if count) or "as in the truth"
+
+
 def callback_text(difference: CallbackDifference, advice: GameAdvice) -> str:
     """Return the contacts that a callback lacks or has too many."""
     if difference.is_equal:

@@ -11,6 +11,7 @@ from sandbox.formatting import format_number, format_plural
 from sandbox.measure.game_advice.difference import CallbackDifference, DifferingContact
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting
 from sandbox.measure.game_advice.step_code import StepCode
+from sandbox.measure.game_advice.text import contacts_text, setting_text
 from sandbox.measure.proportion import Proportion
 from sandbox.rehearsal.rehearse import Rehearsal
 from sandbox.report.game_advice_plot import game_error_chart
@@ -36,13 +37,6 @@ from sandbox.report.html.replay import TRUTH
 TEMPLATE = "game_advice.html.j2"
 CLASSES = {"present": "e1", "recommended": "e2", "most accurate": "e3"}
 """Class that has the colour of each run besides the truth"""
-SETTING_NAMES = {
-    "slop": "collision_slop",
-    "bias": "collision_bias",
-    "persistence": "collision_persistence",
-    "joint_bias": "error_bias of joints",
-}
-"""Names of the settings of pymunk besides substeps and iterations"""
 HOW_TO_READ = (
     "The truth is dashed in the pictures of the other runs. Press play, drag the slider or drag in a chart: all "
     "pictures show the same time. A ring marks a contact that the truth lacks, or that is missed, late or early."
@@ -106,7 +100,7 @@ def _answers(advice: GameAdvice) -> Iterator[str]:
     if chosen is None:
         yield f"No setting that was tried keeps to {tolerance}."
         return
-    result = f"{_px(chosen.error_px)} px, {format_plural(chosen.lost, 'lost contact')}"
+    result = f"{_px(chosen.error_px)} px, contacts {contacts_text(chosen)}"
     cost = f"{format_number(chosen.physics_ms)} ms of physics per frame ({_cost_ratio(advice, chosen)})"
     odds = _plays_text(plays.chosen)
     if advice.recommended is None:
@@ -159,13 +153,6 @@ def _measured_by(advice: GameAdvice) -> Markup:
     return concatenated(*(paragraph(isolated(each)) for each in sentences))
 
 
-def setting_text(setting: GameSetting) -> str:
-    """Return a setting in a few words, such as `8 substeps, 5 iterations`."""
-    parts = [format_plural(setting.substeps, "substep"), format_plural(setting.iterations, "iteration")]
-    others = {name: value for name, value in setting.changed.items() if name in SETTING_NAMES}
-    return ", ".join([*parts, *(f"{SETTING_NAMES[name]} {value:.3g}" for name, value in others.items())])
-
-
 def _settings_table(advice: GameAdvice, settings: Mapping[str, GameSetting]) -> Markup:
     """Return a row for each setting of `settings`."""
     odds = dict.fromkeys(settings, advice.plays.chosen) | {"present": advice.plays.present}
@@ -176,8 +163,8 @@ def _settings_table(advice: GameAdvice, settings: Mapping[str, GameSetting]) -> 
         (HtmlColumn("error, px", True, "largest distance of a body from the truth"), lambda row: _px(row[1].error_px)),
         (HtmlColumn("of body"), lambda row: _where(row[1])),
         (
-            HtmlColumn("lost contacts", True, "contacts whose callbacks are missed, late, early or extra"),
-            lambda row: f"{row[1].lost:,}",
+            HtmlColumn("contacts", True, "contacts whose callbacks are missed, late, early or extra"),
+            lambda row: contacts_text(row[1]),
         ),
         (
             HtmlColumn("ms per frame", True, "time of Space.step in a frame, with the callbacks"),
@@ -198,8 +185,8 @@ def _verdict(setting: GameSetting) -> Markup:
         return badge("fails", "bad", setting.failure)
     if setting.is_within:
         return badge("within tolerance", "good")
-    if setting.lost:
-        return badge(f"{format_plural(setting.lost, 'contact')} lost", "bad")
+    if setting.differing:
+        return badge(contacts_text(setting), "bad")
     if setting.within_until is None:
         return badge("not within", "bad")
     return badge(f"too far off at {setting.within_until:.3g} s", "bad")
@@ -261,7 +248,7 @@ def _place(program: str, code: StepCode) -> str:
 def _runs(advice: GameAdvice, runs: Mapping[str, Rehearsal], settings: Mapping[str, GameSetting]) -> Markup:
     """Return the replays side by side, the errors over time, and the callbacks.
 
-    The replay begins with the first lost contact of the present setting, or with its largest error.
+    The replay begins with the first differing contact of the present setting, or with its largest error.
     """
     duration = advice.duration or 1.0  # a session of a single frame has none
     times = frame_times(runs.values(), duration)
@@ -333,7 +320,7 @@ def _changes(advice: GameAdvice) -> Markup:
         HtmlColumn("verdict"),
         HtmlColumn("error, px", True),
         HtmlColumn("error ratio", True, "relative to the present setting"),
-        HtmlColumn("lost contacts", True),
+        HtmlColumn("contacts", True),
     )
     rows: list[list[Content]] = [
         [
@@ -341,7 +328,7 @@ def _changes(advice: GameAdvice) -> Markup:
             _verdict(each.setting),
             _px(each.setting.error_px),
             _error_ratio(advice.present.error_px, each.setting.error_px),
-            f"{each.setting.lost:,}",
+            contacts_text(each.setting),
         ]
         for each in advice.changes
     ]

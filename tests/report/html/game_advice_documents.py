@@ -109,7 +109,7 @@ def setting(run: Rehearsal, truth: GameTruth, changed: Mapping[str, float], phys
         within_until=None if found.within_until is None else found.within_until / 60,
         callbacks=found.callbacks,
         physics_ms=physics_ms,
-        is_within=ZOOM * found.error <= TOLERANCE_PX and not found.lost,
+        is_within=ZOOM * found.error <= TOLERANCE_PX and not found.differing,
         errors_px=tuple((ZOOM * found.by_frame).tolist()),
     )
 

@@ -72,7 +72,7 @@ def test_page_has_the_figures_of_the_advice(tmp_path: Path) -> None:
     text = page_text(path.read_text(encoding="utf-8"))
     for figure in (
         "Present setting (1 substep, 10 iterations): 1 of 1 contact",
-        "Recommended setting (4 substeps, 10 iterations): 0.25 px, 0 lost contacts",
+        "Recommended setting (4 substeps, 10 iterations): 0.25 px, contacts as in the truth",
         "0.7 ms of physics per frame (×3.50)",
         "is up to 3 px off at 2 s",  # LAG at 0.5 px per unit
         "1 of 10 (2–40 %)",  # Wilson's interval of 1 of 10

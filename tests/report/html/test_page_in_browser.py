@@ -255,7 +255,7 @@ def test_runs_of_a_game_share_time_and_view(browser: Browser, pages: Pages) -> N
     browser.do("document.querySelector('.replay').scrollIntoView()")
     browser.wait(READY)
     next_picture(browser)
-    assert browser.do(TIME) == pytest.approx(59 / 60, abs=1e-5)  # the first lost contact, to six digits
+    assert browser.do(TIME) == pytest.approx(59 / 60, abs=1e-5)  # the first differing contact, to six digits
     assert browser.do("return document.querySelectorAll('.marks .mark').length") == 1
     for change in (
         (SCRUB, 1.5),
