@@ -18,7 +18,12 @@ def target_text(advice: GameAdvice) -> str:
 
 def setting_text(setting: GameSetting) -> str:
     """Return a setting in a few words: `4 substeps, 10 iterations, collision_slop 0.01`."""
-    names = {"slop": "collision_slop", "bias": "collision_bias", "joint_bias": "error_bias of joints"}
+    names = {
+        "slop": "collision_slop",
+        "bias": "collision_bias",
+        "persistence": "collision_persistence",
+        "joint_bias": "error_bias of joints",
+    }
     parts = [format_plural(setting.substeps, "substep"), format_plural(setting.iterations, "iteration")]
     parts += [f"{names.get(name, name)} {value:.3g}" for name, value in setting.changed.items() if name not in COUNTS]
     return ", ".join(parts)
