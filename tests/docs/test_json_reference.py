@@ -62,7 +62,10 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "advise acted.json --effort 0.1 --repeats 1",
         "advise lacking.json --effort 0.1 --repeats 1 --tolerance 0.5m",
     ),
-    "sandbox advise GAME.py": ("advise --time-limit 1 shooting.py", "advise --time-limit 1 shooting.json"),
+    "sandbox advise GAME.py": (
+        "advise --time-limit 5 --pixels --tolerance 20px shooting.py",
+        "advise --time-limit 5 --tolerance 4m shooting.json",
+    ),
     "sandbox rehearse": ("rehearse shooting.py --substeps 8", "rehearse shooting.py"),
     "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),
     "sandbox report": ("report tunnel.toml --effort 0 --engines exact --out page.html",),
@@ -109,12 +112,12 @@ import pymunk
 space = pymunk.Space()
 wall = pymunk.Segment(space.static_body, (50, -50), (50, 50), 1)
 body = pymunk.Body(1, 1)
-body.velocity = 1500, 0
+body.velocity = 300, 0
 shape = pymunk.Circle(body, 3)
 wall.collision_type, shape.collision_type = 1, 2
 space.add(body, shape, wall)
 space.on_collision(1, 2, begin=lambda arbiter, space, data: None, post_solve=lambda arbiter, space, data: None)
-for _ in range(10):
+for _ in range(20):
     space.step(1 / 60)
 """
 TUNNEL = """
