@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, fields
-from time import process_time
+from time import thread_time
 from typing import Any, Self
 from unittest.mock import patch
 
@@ -115,7 +115,10 @@ class Nudge:
 
 @dataclass
 class StepClock:
-    """Processor time of the steps of all spaces."""
+    """Processor time of the steps of all spaces, of the thread that makes them.
+
+    The time of the whole process advances in coarse ticks on some systems once the processor time is limited.
+    """
 
     seconds: float = 0.0
     """with the callbacks of the game that they call, s"""
@@ -158,7 +161,7 @@ def steps_with(
         if nudge is not None and id(space) not in nudged:
             nudged.add(id(space))
             _move(space, nudge)
-        start, count = process_time(), settings.count(dt)
+        start, count = thread_time(), settings.count(dt)
         forces = [] if count == 1 else _forces(space)
         clock.has_forces |= bool(forces)
         for substep in range(count):
@@ -166,7 +169,7 @@ def steps_with(
                 for body, force, torque in forces:
                     body.force, body.torque = force, torque
             step(space, dt if count == 1 else dt / count)
-        clock.seconds += process_time() - start
+        clock.seconds += thread_time() - start
 
     with ExitStack() as stack:
         stack.enter_context(patch.object(pymunk.Space, "step", stepped))
