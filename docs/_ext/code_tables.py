@@ -10,7 +10,7 @@ from typing import get_args, get_type_hints
 
 from environment_tables import arguments, classic, classics, environment, environments
 from gallery import gallery
-from python_tables import classes, model_fields
+from python_tables import classes, input_script, model_fields
 from replays import replay
 from scene_tables import cell, scene_overview, scene_tables, top_keys
 
@@ -241,6 +241,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
     "scene-top": top_keys,
     "model": model_fields,
     "classes": classes,
+    "input-script": input_script,
     "engines": engines,
     "solver-choices": solver_choices,
     "causes": causes,

@@ -4,12 +4,22 @@ from pydantic import BaseModel
 from scene_tables import keys_table
 
 import sandbox
+from sandbox.rehearsal.input_script import InputScript, ScriptedInput
 from sandbox.scene.files.json_schema import _Generator
 
 
 def model_fields(*names: str) -> str:
     """Return the class and the table of fields of each model among the public names."""
     return "\n\n".join(_model(name) for name in names)
+
+
+def input_script() -> str:
+    """Return the keys of a script of inputs."""
+    parts = []
+    for model, heading in ((InputScript, "At the top of the file"), (ScriptedInput, "`[[input]]`")):
+        document = model.model_json_schema(schema_generator=_Generator)
+        parts.append(f"## {heading}\n\n{keys_table(document, ('script', model.__name__), document)}")
+    return "\n\n".join(parts)
 
 
 def classes(*names: str) -> str:

@@ -273,9 +273,14 @@ def _program(options: _Options) -> str | None:
     if options.takes_scene or not is_recording(options.scene) or not Path(options.scene).is_file():
         return None
     try:
-        return program_of(options.scene, load_inputs(options.scene))
+        inputs = load_inputs(options.scene)
     except SceneError:  # a recording without inputs
         return None
+    program = program_of(options.scene, inputs)
+    if program is None:
+        reason = f"{inputs.program} is not there, or has changed since the recording"
+        click.echo(f"{options.scene}: {reason}: advice on the scene of the recording", err=True)
+    return program
 
 
 SCENE_ONLY = frozenset({"engine", "overrides", "fps", "margin", "spread", "effort", "repeats"})
@@ -289,9 +294,12 @@ def _advise_game(options: _Options, program: str) -> int:
     sources = {each.name: context.get_parameter_source(each.name or "") for each in context.command.params}
     typed = {name for name, source in sources.items() if source == ParameterSource.COMMANDLINE}
     given = [each.opts[0] for each in context.command.params if each.name in typed & SCENE_ONLY]
-    if given:
-        remedy = "" if is_game(options.scene) else "; add --scene to advise on the scene of the recording"
-        faults = [Fault.of(each, f"has no effect on a game itself{remedy}") for each in given]
+    remedy = "" if is_game(options.scene) else "; add --scene to advise on the scene of the recording"
+    faults = [Fault.of(each, f"has no effect on a game itself{remedy}") for each in given]
+    if options.takes_scene:
+        faults.append(Fault.of("--scene", f"{options.scene} is a program; name its recording"))
+    faults += _output_faults(options)
+    if faults:
         return exit_with_errors(faults, options.as_json, scene=options.scene)
     return advise_game(
         program,
@@ -336,12 +344,21 @@ def _read(options: _Options, faults: list[Fault]) -> Scene | Recording | None:
                 raise SceneError([Fault.of("--set", "a recording has its scene and settings within it")])
         else:
             read = load(scene_path(options.scene), options.overrides)
+    if options.inputs is not None:
+        faults.append(Fault.of("--inputs", "is for GAME.py; a scene has no inputs, and a recording its own"))
+    faults += _output_faults(options)
+    return read
+
+
+def _output_faults(options: _Options) -> list[Fault]:
+    """Return the faults of the unit of length and of the page to write."""
+    faults = []
     if options.pixels and options.given_zoom is not None:
         faults.append(Fault.of("--pixels", "is --zoom 1; leave out one of them"))
     if options.out is not None:
         name = shorten(str(options.out), MAX_NAMED)
         faults += [Fault.of("--out", f"{name}: {reason}") for reason in reasons_not_writable(options.out)]
-    return read
+    return faults
 
 
 def _write_page(advice: Advice, options: _Options, remarks: Sequence[str]) -> int:

@@ -7,16 +7,18 @@ from sandbox.jsonable import json_schema
 
 DOCUMENTS = {
     "advise": "sandbox.measure.advice.result:Advice",
+    "advise-game": "sandbox.measure.game_advice.result:GameAdvice",
     "check": "sandbox.cli.check:CheckDocument",
     "compare": "sandbox.measure.compare.result:Comparison",
     "extremes": "sandbox.measure.extremes.runner:Extremes",
     "match": "sandbox.cli.games:MatchResult",
+    "rehearse": "sandbox.cli.rehearse:RehearsalDocument",
     "run": "sandbox.cli.run_tables:RunsDocument",
     "runs": "sandbox.cli.runs:StoredRunsDocument",
     "shots": "sandbox.measure.shots.study:ShotStudy",
     "tradeoff": "sandbox.measure.tradeoff.result:Tradeoff",
 }
-"""Dataclass of the document of each command, as `module:class`."""
+"""Dataclass of the document of each command, as `module:class`; `advise-game` is that of `advise GAME.py`."""
 
 
 def document_schema(command: str) -> dict[str, Any]:

@@ -243,7 +243,7 @@ def _loaded(script: Path) -> "InputScript":
     Raises:
         SceneError: it cannot be read, or has faults.
     """
-    os.environ |= {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy"}
+    os.environ |= {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
     from sandbox.rehearsal.input_script import load_script
 
     return load_script(script)

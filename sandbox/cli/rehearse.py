@@ -313,7 +313,14 @@ def _rehearsed(
         document = replace(
             document, from_own=FromOwn(error=found.error, body=found.body, frame=found.frame, callbacks=lost)
         )
-    causes = () if differs is None else likely_causes(options.game, inputs)
+    causes: Sequence[str] = ()
+    if differs is not None:
+        # Repeatable, but not as recorded: with another program that is no fault of the inputs.
+        changed = changed_files(options.game, inputs) if mismatch is None else []
+        causes = [f"{each} has changed since the recording" for each in changed]
+        if mismatch is None and Path(options.game).name != Path(inputs.program).name:
+            causes = [f"the inputs are those of {inputs.program}"]
+        causes = causes or likely_causes(options.game, inputs)
     return (
         replace(
             document,

@@ -20,7 +20,7 @@ MAX_FRAMES = 1_000_000
 class InputChange(BaseModel):
     """What happens to keys and mouse in one frame."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     frame: Annotated[int, Field(ge=0)]
     """number of the frame, from 0"""
@@ -45,7 +45,7 @@ class InputChange(BaseModel):
 class InputScript(BaseModel):
     """Script of inputs."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     frames: Annotated[int, Field(ge=1, le=MAX_FRAMES)]
     """frames after which the window is closed"""

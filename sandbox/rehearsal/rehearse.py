@@ -128,7 +128,7 @@ class Rehearsal:
     seconds: float
     """processor time of the run, without the start of the process, s"""
     step_seconds: float
-    """wall-clock time of `Space.step`, with the callbacks of the game, s"""
+    """processor time of `Space.step`, with the callbacks of the game, s"""
     output: str = field(repr=False)
     """what the game printed"""
     notes: tuple[str, ...] = ()

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, fields
-from time import perf_counter
+from time import thread_time
 from typing import Any, Self
 from unittest.mock import patch
 
@@ -117,16 +117,19 @@ class Nudge:
 
 @dataclass
 class StepClock:
-    """Times of the steps of all spaces."""
+    """Processor times of the steps of all spaces, of the thread that makes them.
+
+    The time of the whole process advances in coarse ticks on some systems once the processor time is limited.
+    """
 
     times: list[float] = field(default_factory=list)
-    """wall-clock time of each step, with the callbacks of the game that it calls, s"""
+    """time of each step, with the callbacks of the game that it calls, s"""
     has_forces: bool = False
     """whether the game applies forces for a step, in a run with substeps"""
 
     @property
     def seconds(self) -> float:
-        """Time of all steps, s; that of each is the median of five, because the system interrupts single ones."""
+        """Time of all steps, s; that of each is the median of five, because interrupts of the system make single ones longer."""
         if len(self.times) < WINDOW:
             return sum(self.times)
         times = np.pad(np.asarray(self.times), WINDOW // 2, mode="edge")
@@ -175,9 +178,9 @@ def steps_with(
             if substep:
                 for body, force, torque in forces:
                     body.force, body.torque = force, torque
-            start = perf_counter()
+            start = thread_time()
             step(space, dt if count == 1 else dt / count)
-            clock.times.append(perf_counter() - start)
+            clock.times.append(thread_time() - start)
 
     with ExitStack() as stack:
         stack.enter_context(patch.object(pymunk.Space, "step", stepped))

@@ -130,3 +130,26 @@ def test_time_limit_ends_the_search(tmp_path: Path, capfd: pytest.CaptureFixture
     assert document["out_of_time"]
     assert document["present"]["error"] is not None
     assert document["recommended"] is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        (["--scene", "game.py"], "--scene"),
+        (["--engine", "exact", "game.py"], "--engine"),
+        (["--pixels", "--zoom", "2", "game.py"], "--pixels"),
+        (["--out", "missing/page.html", "game.py"], "--out"),
+        (["--inputs", "game.json", "bounce"], "--inputs"),
+    ],
+)
+def test_options_that_do_not_fit_a_game_or_a_scene_are_faults(
+    arguments: list[str],
+    option: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("game.py").write_text("")
+    assert call(["advise", *arguments]) == 2
+    assert capsys.readouterr().err.startswith(f"{option}: ")

@@ -62,6 +62,11 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "advise acted.json --effort 0.1 --repeats 1",
         "advise lacking.json --effort 0.1 --repeats 1 --tolerance 0.5m",
     ),
+    "sandbox advise GAME.py": (
+        "advise --time-limit 5 --pixels --tolerance 20px shooting.py",
+        "advise --time-limit 5 --tolerance 4m shooting.json",
+    ),
+    "sandbox rehearse": ("rehearse shooting.py --substeps 8", "rehearse shooting.py"),
     "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),
     "sandbox report": ("report tunnel.toml --effort 0 --engines exact --out page.html",),
     "sandbox shots": ("shots 9-ball --count 20 --sensitivity --horizon --window '7:upper left pocket'",),
@@ -79,7 +84,10 @@ SAMPLES: dict[str, tuple[str, ...]] = {
 }
 """Commands that together print all keys of a section, by section of the page."""
 
-SLOW = [f"sandbox {name}" for name in ("compare", "tradeoff", "advise", "extremes", "report", "shots", "match")]
+SLOW = [
+    f"sandbox {name}"
+    for name in ("compare", "tradeoff", "advise", "advise GAME.py", "extremes", "report", "shots", "match")
+]
 """Sections of which all samples run in the nightly part, and the first one in CI."""
 UNSUCCESSFUL = ("extremes", "match")
 """Commands whose samples end with status 1: a limit is worse than the stored one, and a frame is abandoned."""
@@ -98,6 +106,19 @@ space = pymunk.Space()
 body = pymunk.Body(1, 1)
 space.add(body, pymunk.Circle(body, 1))
 space.step(0.01)
+"""
+SHOOTING = """
+import pymunk
+space = pymunk.Space()
+wall = pymunk.Segment(space.static_body, (50, -50), (50, 50), 1)
+body = pymunk.Body(1, 1)
+body.velocity = 300, 0
+shape = pymunk.Circle(body, 3)
+wall.collision_type, shape.collision_type = 1, 2
+space.add(body, shape, wall)
+space.on_collision(1, 2, begin=lambda arbiter, space, data: None, post_solve=lambda arbiter, space, data: None)
+for _ in range(20):
+    space.step(1 / 60)
 """
 TUNNEL = """
 world = { duration = 0.2 }
@@ -175,6 +196,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("tunnel.toml").write_text(TUNNEL)
     Path("bent.toml").write_text(BENT)
     Path("played.py").write_text(PLAYED)
+    Path("shooting.py").write_text(SHOOTING)
+    call(["record", "--quiet", "shooting.py"])
     Path("figures.py").write_text("def figure(run):\n    return len(run.time)\n")
     Path("level.svg").write_text('<svg viewBox="0 0 9 9"><circle r="5"/><text>x</text></svg>')
     limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
@@ -195,11 +218,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def check_sample(sample: str, keys: Key, section: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Run a sample; check its exit status and its document, and mark the printed keys."""
     command, *arguments = shlex.split(sample)
+    schema = "advise-game" if section == "sandbox advise GAME.py" else command
     status = call([command, "--json", *arguments])  # `record` passes what follows its file to the game
     document = json.loads(capsys.readouterr().out)
     assert status == (2 if "bad.toml" in sample else command in UNSUCCESSFUL)
-    if command in DOCUMENTS and "--dry-run" not in sample and section != "Faults":
-        assert_valid_document(command, document)
+    if schema in DOCUMENTS and "--dry-run" not in sample and section != "Faults":
+        assert_valid_document(schema, document)
     if section == "Faults":
         document = {"faults": document["faults"]}
     assert list(undocumented(document, keys)) == [], sample
