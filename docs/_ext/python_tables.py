@@ -4,7 +4,7 @@ from pydantic import BaseModel
 from scene_tables import keys_table
 
 import sandbox
-from sandbox.rehearsal.input_script import InputScript, ScriptedInput
+from sandbox.rehearsal.input_script import InputChange, InputScript
 from sandbox.scene.files.json_schema import _Generator
 
 
@@ -16,7 +16,7 @@ def model_fields(*names: str) -> str:
 def input_script() -> str:
     """Return the keys of a script of inputs."""
     parts = []
-    for model, heading in ((InputScript, "At the top of the file"), (ScriptedInput, "`[[input]]`")):
+    for model, heading in ((InputScript, "At the top of the file"), (InputChange, "`[[input]]`")):
         document = model.model_json_schema(schema_generator=_Generator)
         parts.append(f"## {heading}\n\n{keys_table(document, ('script', model.__name__), document)}")
     return "\n\n".join(parts)

@@ -397,11 +397,9 @@ def _print(document: RehearsalDocument) -> None:
         where = "" if own.body is None else f" ({own.body} in frame {own.frame})"
         print_item(f"against its own settings: up to {format_number(own.error)} units of length away{where}", "")
         for difference in own.callbacks:
-            counts = f"{difference.missed} of them not here, {difference.late} at another time"
-            text = (
-                f"{difference.callback}: {difference.expected} contacts there, {counts}, {difference.extra} only here"
-            )
-            print_item(text, INDENT)
+            counts = f"{difference.missed} missing, {difference.late} at another time, {difference.extra} extra"
+            there = f"{format_plural(difference.expected, 'contact')} with its own settings"
+            print_item(f"{difference.callback}: {there}; here {counts}", INDENT)
     lines = document.output.strip().splitlines()
     if lines:
         print_item("the game printed:" if len(lines) <= MAX_OUTPUT_LINES else "the game printed, at the end:", "")

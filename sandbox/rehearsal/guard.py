@@ -7,10 +7,13 @@ program that means harm, which has the rights of the user.
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
+from unittest.mock import patch
 
 from sandbox.rehearsal.game_clock import PACKAGES, is_own_code
 
@@ -39,7 +42,6 @@ _REMARKS = {
         ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.startfile", "os.fork"),
         "other programs that it starts",
     ),
-    "_thread.start_new_thread": THREADS,
 }
 """Remark on each event of the interpreter that a rehearsal cannot repeat"""
 
@@ -98,6 +100,24 @@ class FileWatch:
             self._note(_REMARKS[event])
 
 
+@contextmanager
+def threads_noted(note: Callable[[str], None]) -> Iterator[None]:
+    """Note threads that a program starts, within a `with` block: not all versions of the interpreter audit them.
+
+    Args:
+        note: called with the remark.
+    """
+    start = threading.Thread.start
+
+    def started(self: threading.Thread) -> None:
+        if not _is_by_package():
+            note(THREADS)
+        start(self)
+
+    with patch.object(threading.Thread, "start", started):
+        yield
+
+
 def _is_by_package() -> bool:
     """Return whether a package that the game uses does it, and not the game, such as pygame in search of fonts."""
     frame: FrameType | None = sys._getframe(1)
@@ -132,8 +152,7 @@ def deny_changes(scratch: Path, kept: Sequence[Path], note: Callable[[str], None
 
     def refuse(remark: str) -> None:
         note(remark)
-        if remark != THREADS:
-            raise DeniedError(f"a rehearsal has no {remark}")
+        raise DeniedError(f"a rehearsal has no {remark}")
 
     FileWatch(refuse, on_write=check).start()
 

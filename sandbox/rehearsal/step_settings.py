@@ -129,7 +129,7 @@ class StepClock:
 
     @property
     def seconds(self) -> float:
-        """Time of all steps, s; that of each is the median of five, because interrupts of the system make single ones longer."""
+        """Time of all steps, s; that of each is the median of five, because interrupts make single ones longer."""
         if len(self.times) < WINDOW:
             return sum(self.times)
         times = np.pad(np.asarray(self.times), WINDOW // 2, mode="edge")

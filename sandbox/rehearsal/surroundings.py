@@ -14,7 +14,7 @@ import pymunk
 
 from sandbox.game_inputs import GameInputs, file_digest
 from sandbox.rehearsal.game_clock import clock_from
-from sandbox.rehearsal.guard import FileWatch
+from sandbox.rehearsal.guard import FileWatch, threads_noted
 from sandbox.rehearsal.input_script import InputScript, ScriptedDevice
 from sandbox.rehearsal.pygame_inputs import LiveDevice, PygameDevice, pygame_inputs_from
 from sandbox.rehearsal.pyglet_inputs import pyglet_inputs_from
@@ -235,6 +235,7 @@ def surroundings(
 
     with ExitStack() as stack:
         stack.enter_context(seeded(seed))
+        stack.enter_context(threads_noted(note))
         stack.enter_context(spaces_logged(log, before_step))
         stack.enter_context(pygame_inputs_from(tape, device, end_frame=finish_frame, note=note))
         scripted = device if isinstance(device, ScriptedDevice) else None

@@ -84,6 +84,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
             ended, failure = "error", f"{type(error).__name__}: {error}"
         seconds = time.thread_time() - start
     sys.stdout.flush()
+    unread = [kind for kind in tape.unread if kind not in inputs.notes]
     offsets = np.cumsum([0, *(len(frame.bodies) for frame in log.frames)])
     np.savez(
         request["states"],
@@ -113,7 +114,10 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "failure": failure,
         "seconds": seconds,
         "step_seconds": steps.seconds,
-        "notes": [*notes, *(f"readings that the recording has none of: {kind}" for kind in tape.unread)],
+        "notes": [
+            *notes,
+            *(f"readings that the recording has none of: {kind}" for kind in tape.unread if kind not in inputs.notes),
+        ],
     }
 
 

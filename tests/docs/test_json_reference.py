@@ -63,8 +63,8 @@ SAMPLES: dict[str, tuple[str, ...]] = {
         "advise lacking.json --effort 0.1 --repeats 1 --tolerance 0.5m",
     ),
     "sandbox advise GAME.py": (
-        "advise --time-limit 5 --pixels --tolerance 20px shooting.py",
-        "advise --time-limit 5 --tolerance 4m shooting.json",
+        "advise --starts 1 --pixels --tolerance 20px shooting.py",
+        "advise --starts 1 --zoom 5 --tolerance 4m shooting.json",
     ),
     "sandbox rehearse": ("rehearse shooting.py --substeps 8", "rehearse shooting.py"),
     "sandbox extremes": ("extremes --quick --axes speed --engines pymunk --against against.json",),

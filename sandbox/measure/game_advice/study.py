@@ -43,6 +43,8 @@ ENOUGH = 3
 """Numbers of substeps within the tolerance after which no more are tried"""
 SEARCH = 0.5
 """Fraction of the time limit that is left when no more settings are tried"""
+MIN_PLAYS = 3
+"""Plays that are made however long they take"""
 PLAYED = 0.25
 """Fraction of the time limit that is left when no more plays are made"""
 HELD = 0.9
@@ -362,7 +364,7 @@ class GameStudy:
             runs = [self._run(replace(play, settings=RehearsalSettings(substeps=each))) for each in (fine // 2, fine)]
             coarse, exact = (each.result() for each in runs)
             plays.append((play, _truth_of(exact, coarse, TRUTH_FRACTION * self._tolerance)))
-            if self._time_left <= PLAYED * self._time_limit:
+            if len(plays) >= MIN_PLAYS and self._time_left <= PLAYED * self._time_limit:
                 break
         return plays
 
