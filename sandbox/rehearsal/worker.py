@@ -114,10 +114,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "failure": failure,
         "seconds": seconds,
         "step_seconds": steps.seconds,
-        "notes": [
-            *notes,
-            *(f"readings that the recording has none of: {kind}" for kind in tape.unread if kind not in inputs.notes),
-        ],
+        "notes": [*notes, *(f"readings that the recording has none of: {kind}" for kind in unread)],
     }
 
 
