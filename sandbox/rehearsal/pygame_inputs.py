@@ -4,6 +4,7 @@
 are in it in order, and the functions of `pygame.event` take from it as from the queue of SDL.
 """
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -312,6 +313,19 @@ def _in_milliseconds(seconds: float) -> int:
     return round(MILLISECONDS * seconds)
 
 
+def _sounds(tape: InputTape) -> Iterator[tuple[Any, str, Any]]:
+    """Yield the functions by which a program asks whether sounds still play, with those that read a tape."""
+
+    def taped(kind: str, live: Callable[[], InputValue]) -> Callable[[], InputValue]:
+        return lambda: tape.state(kind, live)
+
+    for name in ("mixer", "mixer_music"):
+        module = sys.modules.get(f"pygame.{name}")  # absent where pygame has been built without sound
+        for function in ("get_busy", "get_pos"):
+            if hasattr(module, function):
+                yield module, function, taped(f"{name}.{function}", getattr(module, function))
+
+
 @contextmanager
 def pygame_inputs_from(
     tape: InputTape, device: PygameDevice, *, end_frame: Callable[[], None], note: Callable[[str], None]
@@ -374,6 +388,7 @@ def pygame_inputs_from(
         (pygame.display, "flip", shown_by(flip)),
         (pygame.display, "update", shown_by(update)),
         (pygame.joystick, "Joystick", joystick_noted),
+        *_sounds(tape),
     ]
     with ExitStack() as stack:
         for owner, name, function in replaced:

@@ -16,8 +16,8 @@ from tests.cli.calling import json_of, lines_of, output_of, process, write_scene
 
 def test_commands_are_the_documented_ones() -> None:
     expected = (
-        "run runs play serve compare tradeoff advise shots extremes report record rehearse import check warm scenes engines "
-        "schema export replay miss match"
+        "run runs play serve compare tradeoff advise shots extremes report record rehearse import check warm scenes "
+        "engines schema export replay miss match"
     )
     assert list(COMMANDS) == expected.split()
 

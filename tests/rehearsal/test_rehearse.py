@@ -374,3 +374,37 @@ def test_runs_are_told_apart_bit_by_bit(record: Recorder) -> None:
     run: Rehearsal = rehearse("game.py", inputs)
     assert first_difference(run.hashes, rehearse("game.py", inputs, nudge=Nudge(1e-12, 1)).hashes) == 0
     assert first_difference(run.hashes, run.hashes[:-1]) == run.frames - 1
+
+
+SOUND = """
+import array
+import pygame, pymunk
+pygame.mixer.init(44100, -16, 1)
+pygame.display.init()
+pygame.display.set_mode((100, 100))
+pygame.mixer.Sound(buffer=array.array("h", [0] * 2205)).play()
+space = pymunk.Space()
+body = pymunk.Body(1, 1)
+space.add(body, pymunk.Circle(body, 1))
+for k in range(40):
+    pygame.event.get()
+    pygame.time.wait(5)
+    if pygame.mixer.get_busy():
+        body.velocity = (k + 1, 0)
+    space.step(1 / 60)
+    pygame.display.flip()
+"""
+
+
+def test_game_that_waits_for_a_sound_hears_it_end_in_the_same_frame(
+    record: Recorder,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The sound lasts 0.05 s, in a recording in real time."""
+    for name in ("SDL_VIDEODRIVER", "SDL_AUDIODRIVER"):
+        monkeypatch.setenv(name, "dummy")
+    game = game_file(SOUND)
+    assert process("record", "--to", "live.json", str(game)).returncode == 0
+    inputs = load_inputs("live.json")
+    assert [each.value for each in inputs.readings["mixer.get_busy"]] == [True, False]
+    assert rehearse(game, inputs).hashes == inputs.frame_hashes
