@@ -374,3 +374,25 @@ def test_runs_are_told_apart_bit_by_bit(record: Recorder) -> None:
     run: Rehearsal = rehearse("game.py", inputs)
     assert first_difference(run.hashes, rehearse("game.py", inputs, nudge=Nudge(1e-12, 1)).hashes) == 0
     assert first_difference(run.hashes, run.hashes[:-1]) == run.frames - 1
+
+
+IGNORING = """
+import pygame, pymunk
+screen = pygame.display.set_mode((50, 50))
+space = pymunk.Space()
+space.gravity = (0, 900)
+body = pymunk.Body(1, 10)
+space.add(body, pymunk.Circle(body, 5))
+while True:
+    pygame.event.get()
+    space.step(1 / 60)
+    pygame.display.flip()
+"""
+
+
+@pytest.mark.fail_slow(60)  # a recording and a rehearsal, each in a process of its own
+def test_script_ends_a_game_that_ignores_the_closing_of_its_window(record: Recorder) -> None:
+    inputs = record(game_file(IGNORING), script="frames = 20\n")
+    assert 20 < inputs.frames < 200
+    assert any("runs on" in note for note in inputs.notes)
+    assert rehearse("game.py", inputs).hashes == inputs.frame_hashes
