@@ -314,6 +314,8 @@ def _rehearsed(
             document, from_own=FromOwn(error=found.error, body=found.body, frame=found.frame, callbacks=lost)
         )
     causes = () if differs is None else likely_causes(options.game, inputs)
+    if mismatch is None and differs is not None and (changed := changed_files(options.game, inputs)):
+        causes = (f"files that have changed since the recording: {', '.join(changed)}",)
     return (
         replace(
             document,

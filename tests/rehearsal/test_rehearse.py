@@ -396,3 +396,13 @@ def test_script_ends_a_game_that_ignores_the_closing_of_its_window(record: Recor
     assert 20 < inputs.frames < 200
     assert any("runs on" in note for note in inputs.notes)
     assert rehearse("game.py", inputs).hashes == inputs.frame_hashes
+
+
+@pytest.mark.fail_slow(60)  # a recording and a rehearsal, each in a process of its own
+def test_changed_program_is_the_cause_of_a_difference(record: Recorder) -> None:
+    record(game_file(FALLING))
+    game_file(FALLING.replace("step(1 / 30)", "step(1 / 31)"))
+    found = process("rehearse", "--inputs", "inputs.json", "game.py")
+    assert found.returncode == 1
+    cause = next(line for line in found.stdout.splitlines() if "cause" in line)
+    assert "changed since the recording: game.py" in cause
