@@ -1,5 +1,6 @@
 """Advice for a game itself, part of the command `advise`."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -181,8 +182,8 @@ def print_game_advice(advice: GameAdvice, budget_ms: float | None) -> None:
     _print_changes(advice)
     if advice.code is not None:
         _print_heading(f"4. Lines to change: {advice.code.file}:{advice.code.line}")
-        if advice.code.old:
-            print_line(f"{INDENT}- {advice.code.old.strip()}")
+        for line in textwrap.dedent(advice.code.old).splitlines():
+            print_line(f"{INDENT}- {line}")
         indent = len(advice.code.old) - len(advice.code.old.lstrip())
         for line in advice.code.new:
             print_line(f"{INDENT}+ {line[indent:]}")

@@ -119,6 +119,7 @@ def record_command(
             f"{game}: {', '.join(misplaced)}: passed to the game; options of this command come before GAME.py", err=True
         )
     from sandbox.rehearsal.surroundings import InputRecorder, started_as
+    from sandbox.rehearsal.tape import EndOfTape
 
     ended: str | None = None
     removed: Fault | None = None  # a name that pymunk 7 lacks, where the game uses it
@@ -133,8 +134,8 @@ def record_command(
             is_whole = True
         except StepLimitReached:
             pass
-        except SystemExit:
-            is_whole = True  # the usual end of a game
+        except SystemExit as end:
+            is_whole = not isinstance(end, EndOfTape)  # the usual end of a game
         except KeyboardInterrupt:
             ended, status = "interrupted", 130
         except Exception as error:  # noqa: BLE001, of the user's program

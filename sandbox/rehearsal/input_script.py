@@ -127,6 +127,11 @@ class ScriptedDevice:
             self._inputs.setdefault(each.frame, []).append(each)
         self._start_frame()
 
+    @property
+    def frames_since_close(self) -> int:
+        """Frames since the script has closed the window; negative before."""
+        return self._frame - self._script.frames
+
     def now(self) -> float:
         """Return the time since the start, s; each reading takes a little of it."""
         self.time += TICK

@@ -25,6 +25,9 @@ from sandbox.rehearsal.tape import EndOfTape, InputTape, RecordingTape, ReplayTa
 MAX_SAVED = 2**20
 """bytes, largest file that a program writes of which the content before is kept"""
 
+MAX_CLOSING = 60
+"""Frames that a program has to end after a script has closed its window"""
+
 
 class InputRecorder:
     """Records the inputs of a program that runs within `recording`.
@@ -73,6 +76,9 @@ class InputRecorder:
             self._tape.end_frame()
             if scripted is not None:
                 scripted.end_frame()
+                if scripted.frames_since_close > MAX_CLOSING:
+                    self.note("its end: it runs on after its window is closed, and the recording ends it")
+                    raise EndOfTape(0)
 
         with surroundings(
             self._tape,

@@ -187,3 +187,27 @@ def test_wrong_input_is_named(
     assert found.returncode == 2
     assert word in found.stderr
     assert "Traceback" not in found.stderr
+
+
+TWO_PLACES = """
+import pymunk
+spaces = [pymunk.Space() for _ in range(2)]
+for space in spaces:
+    space.gravity = (0, 900)
+    body = pymunk.Body(1, 10)
+    space.add(body, pymunk.Circle(body, 5))
+for k in range(30):
+    spaces[0].step(1 / 60)
+    spaces[1].step(1 / 120)
+"""
+
+
+def test_all_places_of_steps_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("game.py").write_text(TWO_PLACES)
+    assert process("record", "game.py").returncode == 0
+    advice = GameStudy("game.py", load_inputs("game.json"), tolerance_px=TOLERANCE, plays=0, time_limit=20.0).advise()
+    assert advice.code is not None
+    assert advice.code.line == 9
+    assert any("game.py:10" in each for each in advice.remarks)
+    assert not any("measured time" in each for each in advice.remarks)  # both steps are constant

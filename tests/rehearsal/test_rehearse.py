@@ -408,3 +408,35 @@ def test_game_that_waits_for_a_sound_hears_it_end_in_the_same_frame(
     inputs = load_inputs("live.json")
     assert [each.value for each in inputs.readings["mixer.get_busy"]] == [True, False]
     assert rehearse(game, inputs).hashes == inputs.frame_hashes
+
+
+IGNORING = """
+import pygame, pymunk
+screen = pygame.display.set_mode((50, 50))
+space = pymunk.Space()
+space.gravity = (0, 900)
+body = pymunk.Body(1, 10)
+space.add(body, pymunk.Circle(body, 5))
+while True:
+    pygame.event.get()
+    space.step(1 / 60)
+    pygame.display.flip()
+"""
+
+
+@pytest.mark.fail_slow(60)  # a recording and a rehearsal, each in a process of its own
+def test_script_ends_a_game_that_ignores_the_closing_of_its_window(record: Recorder) -> None:
+    inputs = record(game_file(IGNORING), script="frames = 20\n")
+    assert 20 < inputs.frames < 200
+    assert any("runs on" in note for note in inputs.notes)
+    assert rehearse("game.py", inputs).hashes == inputs.frame_hashes
+
+
+@pytest.mark.fail_slow(60)  # a recording and a rehearsal, each in a process of its own
+def test_changed_program_is_the_cause_of_a_difference(record: Recorder) -> None:
+    record(game_file(FALLING))
+    game_file(FALLING.replace("step(1 / 30)", "step(1 / 31)"))
+    found = process("rehearse", "--inputs", "inputs.json", "game.py")
+    assert "differs from the recorded game: frame 0" in found.stdout
+    cause = next(line for line in found.stdout.splitlines() if "cause" in line)
+    assert "game.py has changed since the recording" in cause

@@ -523,7 +523,13 @@ def remarks_on(own: Rehearsal, chosen: GameSetting, guessed: float | None) -> It
     if guessed == METRE:
         yield f"the unit of length is taken for a metre of {METRE:g} px; --zoom or --pixels states it"
     low, middle, high = own.dts
-    if high > low * (1.0 + VARIES):
+    places = [f"{Path(file).name}:{line}" for file, line in own.step_calls]
+    if chosen.changed and len(places) > 1:
+        yield (
+            f"the game makes steps in {len(places)} places, all of which have the setting here; change the others in "
+            f"the same way: {', '.join(places[1:])}"
+        )
+    elif high > low * (1.0 + VARIES):
         yield (
             f"the game steps by measured time, {1e3 * low:.3g} to {1e3 * high:.3g} ms (median {1e3 * middle:.3g} ms): "
             "its physics differs from play to play; step by a constant dt, and as often as the time of the frame needs"

@@ -229,7 +229,7 @@ def _to_change(advice: GameAdvice, remarks: Sequence[str]) -> Markup:
     if advice.code is None:
         return notes or Markup()
     head = "Lines to change" if advice.recommended is not None else "Lines of the most accurate setting"
-    old = [advice.code.old] if advice.code.old else []
+    old = advice.code.old.splitlines()
     lines = fragment(TEMPLATE, "code", _place(advice.program, advice.code), old, advice.code.new)
     code = concatenated(Markup("<h3>{}</h3>").format(head), lines)
     return code if notes is None else fragment(TEMPLATE, "beside", code, notes)
