@@ -43,7 +43,10 @@ MAX_CALLBACKS = 12
 def is_game(name: str) -> bool:
     """Return whether an argument names a program and no scene."""
     path = Path(name)
-    return path.suffix == ".py" or (path / "__main__.py").exists()
+    try:
+        return path.suffix == ".py" or (path / "__main__.py").exists()
+    except OSError:  # the name is too long for the file system
+        return False
 
 
 def program_of(recording: str, inputs: GameInputs) -> str | None:

@@ -13,7 +13,7 @@ from sandbox.cli.options import POSITIVE, OutputOptions, json_option, quiet_opti
 from sandbox.cli.progress import status_line
 from sandbox.cli.streams import print_json
 from sandbox.cli.tables import print_item, print_line
-from sandbox.echo import MAX_NAMED, shorten
+from sandbox.echo import MAX_NAMED, short_repr, shorten
 from sandbox.formatting import format_number, format_plural
 from sandbox.game_inputs import GameInputs, file_digest, load_inputs
 from sandbox.jsonable import in_json, to_json
@@ -209,7 +209,12 @@ def read_inputs(game: str, given: str | None) -> GameInputs:
     Raises:
         SceneError: there is no such program, or no such file, or it has no inputs.
     """
-    if not Path(game).exists():
+    try:
+        exists = Path(game).exists()
+    except OSError as error:  # the name is too long for the file system
+        reason = error.strerror or str(error)
+        raise SceneError([Fault.of(shorten(game, MAX_NAMED), f"cannot be read: {reason}")]) from None
+    if not exists:
         raise SceneError([Fault.of(game, "does not exist; name the Python file of the game")])
     path = inputs_path(game, given)
     if given is None and not Path(path).exists():
@@ -245,7 +250,7 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[GameInputs | None, Re
     for each in options.overrides:
         name, separator, value = each.partition("=")
         if not separator:
-            faults.append(Fault.of("--set", f"{each!r} is not KEY=VALUE"))
+            faults.append(Fault.of("--set", f"{short_repr(each)} is not KEY=VALUE"))
         values[name.strip().removeprefix("solver.")] = value.strip()
     for name in ("substeps", "iterations", "dt"):
         if (given := getattr(options, name)) is not None:

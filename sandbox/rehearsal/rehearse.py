@@ -4,7 +4,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -93,9 +93,9 @@ class Rehearsal:
     callbacks: tuple[GameCallback, ...]
     calls: tuple[CallbackCalls, ...]
     """calls of callbacks, in order"""
-    shape_bodies: tuple[int, ...]
+    shape_bodies: Mapping[int, int]
     """number of the body of each shape; -1 for the static body of a space"""
-    shapes: tuple[GameShape, ...]
+    shapes: Mapping[int, GameShape]
     """form of each shape, when the game adds it"""
     changes: tuple[GameChange, ...]
     """bodies and joints that the game adds and removes, in order"""
@@ -225,8 +225,11 @@ def _rehearsal(settings: RehearsalSettings, answer: dict[str, Any], states: Path
             arrays["states"],
             tuple(GameCallback(*each) for each in answer["callbacks"]),
             tuple(CallbackCalls(frame, kind, (a, b), count) for frame, kind, a, b, count in answer["calls"]),
-            tuple(answer["shape_bodies"]),
-            tuple(GameShape(kind, tuple(map(tuple, points)), *rest) for kind, points, *rest in answer["shapes"]),
+            dict(answer["shape_bodies"]),
+            {
+                number: GameShape(kind, tuple(map(tuple, points)), *rest)
+                for number, (kind, points, *rest) in answer["shapes"]
+            },
             tuple(GameChange(*each) for each in answer["changes"]),
             tuple((frame, is_added, number) for frame, is_added, number in answer["shape_changes"]),
             dict(answer["body_names"]),
@@ -246,6 +249,21 @@ def _rehearsal(settings: RehearsalSettings, answer: dict[str, Any], states: Path
             output[-MAX_OUTPUT:],
             tuple(answer["notes"]),
         )
+
+
+def densely_numbered(runs: Mapping[str, Rehearsal]) -> dict[str, Rehearsal]:
+    """Return runs whose bodies have numbers from 0 on, without gaps, in the same order and equal in all runs."""
+    numbers = np.unique(np.concatenate([[*run.bodies, *run.shape_bodies.values()] for run in runs.values()]))
+    index = {number: place for place, number in enumerate(numbers[numbers >= 0].tolist())}
+    return {
+        name: replace(
+            run,
+            bodies=np.array([index[each] for each in run.bodies.tolist()], np.int64),
+            shape_bodies={shape: index.get(body, body) for shape, body in run.shape_bodies.items()},
+            body_names={index[body]: each for body, each in run.body_names.items() if body in index},
+        )
+        for name, run in runs.items()
+    }
 
 
 def first_difference(hashes: Sequence[str], others: Sequence[str]) -> int | None:

@@ -1,11 +1,12 @@
 """Log of the pymunk spaces of a game: states of all bodies after each frame, and the calls of collision callbacks.
 
 Bodies, shapes and joints have numbers in the order in which the game adds them to its spaces, so that they are found
-again in another run.
+again in another run. The number of an object that a collision callback adds follows from its contact.
 """
 
 import hashlib
 import sys
+import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -27,6 +28,8 @@ PHASES = ("begin", "pre_solve", "post_solve", "separate")
 FIELDS = BodyFields.BODY_ID | BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
 WIDTH = 6
 HASH_BYTES = 4
+CAUSED = 2**32
+"""Numbers of objects that callbacks add begin here"""
 WORLD = -1
 """Number of the static body of a space"""
 
@@ -104,9 +107,9 @@ class SpaceLog:
         """calls of `Space.step`"""
         self._keeps_states = keeps_states
         self._stepped: dict[pymunk.Space, None] = {}  # since the end of the last frame
-        self.shape_bodies: list[int] = []
+        self.shape_bodies: dict[int, int] = {}
         """number of the body of each shape; `WORLD` for the static body of a space"""
-        self.shapes: list[ShapeForm] = []
+        self.shapes: dict[int, ShapeForm] = {}
         """form of each shape, when the game adds it"""
         self.changes: list[SpaceChange] = []
         """bodies and joints that the game adds and removes, in order"""
@@ -116,6 +119,7 @@ class SpaceLog:
         """names of bodies by number, as far as the program has variables for them"""
         self._numbers: WeakKeyDictionary[Any, int] = WeakKeyDictionary()  # of each body, shape and joint
         self._counts: Counter[str] = Counter()
+        self._caused: Counter[tuple[str, int, tuple[int, int]]] = Counter()
         self._by_id: dict[int, int] = {}  # number of a body by its id, which the batch functions of pymunk know
         self._present: WeakSet[Any] = WeakSet()
         self.dts: list[float] = []
@@ -130,8 +134,8 @@ class SpaceLog:
         """size of the window at the first step, px; None without a window"""
         self.impulse_readers: set[int] = set()
         """numbers of the callbacks that read the impulse or the energy of a contact"""
-        self.running: int | None = None
-        """number of the callback that runs"""
+        self.cause: tuple[int, tuple[int, int]] | None = None
+        """callback that runs, and the numbers of its shapes"""
         self._buffer = Buffer()
 
     @property
@@ -196,21 +200,40 @@ class SpaceLog:
         if known is not None:
             return known
         kind = _kind(thing)
-        number = self._numbers[thing] = self._counts[kind]
-        self._counts[kind] += 1
+        if self.cause is None:
+            number = self._counts[kind]
+            self._counts[kind] += 1
+        else:
+            number = self._number_by_cause(kind, *self.cause)
+        self._numbers[thing] = number
         if isinstance(thing, pymunk.Body):
             self._by_id[thing.id] = number
         elif isinstance(thing, pymunk.Shape):
             body = thing.body
             is_world = body is None or (body.space is not None and body is body.space.static_body)
-            self.shape_bodies.append(WORLD if is_world or body is None else self._number(body))
-            self.shapes.append(ShapeForm.of(thing))
+            self.shape_bodies[number] = WORLD if is_world or body is None else self._number(body)
+            self.shapes[number] = ShapeForm.of(thing)
+        return number
+
+    def _number_by_cause(self, kind: str, callback: int, pair: tuple[int, int]) -> int:
+        """Return the number of an object that a callback adds, which follows from the contact.
+
+        Contacts may come in another order with other settings, and the objects that they add with them.
+        """
+        self._caused[kind, callback, pair] += 1
+        key = f"{kind} {callback} {pair} {self._caused[kind, callback, pair]}"
+        number = CAUSED + zlib.crc32(key.encode())
+        if kind == "Body":
+            function = list(self.callbacks)[callback].function
+            self._counts[function] += 1
+            self.body_names[number] = f"body {self._counts[function]} of {function}"
         return number
 
     def note_call(self, callback: int, arbiter: pymunk.Arbiter) -> None:
         """Note a call of a callback."""
         a, b = (self._number(shape) for shape in arbiter.shapes)
-        key = self.frame, callback, (min(a, b), max(a, b))
+        self.cause = callback, (min(a, b), max(a, b))
+        key = self.frame, *self.cause
         self.calls[key] = self.calls.get(key, 0) + 1
 
     def end_frame(self) -> None:
@@ -269,11 +292,10 @@ class LoggedCallback:
         if log is None:
             return self._function(arbiter, space, data)
         log.note_call(self._number, arbiter)
-        log.running = self._number
         try:
             return self._function(arbiter, space, data)
         finally:
-            log.running = None
+            log.cause = None
 
 
 @contextmanager
@@ -327,8 +349,8 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
         read = own.fget
 
         def value(arbiter: pymunk.Arbiter) -> Any:
-            if log.running is not None:
-                log.impulse_readers.add(log.running)
+            if log.cause is not None:
+                log.impulse_readers.add(log.cause[0])
             return read(arbiter)
 
         return property(value)

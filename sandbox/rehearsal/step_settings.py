@@ -7,9 +7,12 @@ from dataclasses import asdict, dataclass, field, fields
 from time import thread_time
 from typing import Any, Self
 from unittest.mock import patch
+from weakref import WeakSet
 
 import numpy as np
 import pymunk
+
+from sandbox.echo import short_repr, shorten
 
 MAX_SUBSTEPS = 4096
 WINDOW = 5
@@ -57,12 +60,12 @@ class RehearsalSettings:
         found: dict[str, Any] = {}
         for name, text in values.items():
             if name not in RANGES:
-                raise ValueError(f"{name}: is no setting of a game; settings are {', '.join(RANGES)}")
+                raise ValueError(f"{shorten(name)}: is no setting of a game; settings are {', '.join(RANGES)}")
             try:
                 found[name] = kinds.get(name, float)(text)
             except ValueError:
                 kind = "a whole number" if name in kinds else "a number"
-                raise ValueError(f"{name}: {text!r} is not {kind}") from None
+                raise ValueError(f"{name}: {short_repr(text)} is not {kind}") from None
         return cls(**found)
 
     @property
@@ -160,7 +163,7 @@ def steps_with(
         for name, attribute in SPACE_ATTRIBUTES.items()
         if getattr(settings, name) is not None
     ]
-    nudged: set[int] = set()
+    nudged: WeakSet[pymunk.Space] = WeakSet()
 
     def stepped(space: pymunk.Space, dt: float) -> None:
         for attribute, value in overrides:
@@ -168,8 +171,8 @@ def steps_with(
         if settings.joint_bias is not None:
             for joint in space.constraints:
                 joint.error_bias = settings.joint_bias
-        if nudge is not None and id(space) not in nudged:
-            nudged.add(id(space))
+        if nudge is not None and space not in nudged:
+            nudged.add(space)
             _move(space, nudge)
         count = settings.count(dt)
         forces = [] if count == 1 else _forces(space)

@@ -96,8 +96,8 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "callbacks": [[each.function, *each.types, each.phase] for each in log.callbacks],
         # The order of `separate` callbacks within a step follows the addresses of shapes in memory.
         "calls": [[frame, callback, *shapes, count] for (frame, callback, shapes), count in sorted(log.calls.items())],
-        "shape_bodies": log.shape_bodies,
-        "shapes": log.shapes,
+        "shape_bodies": list(log.shape_bodies.items()),
+        "shapes": list(log.shapes.items()),
         "changes": log.changes,
         "shape_changes": log.shape_changes,
         "body_names": sorted(log.body_names.items()),

@@ -440,3 +440,39 @@ def test_changed_program_is_the_cause_of_a_difference(record: Recorder) -> None:
     assert "differs from the recorded game: frame 0" in found.stdout
     cause = next(line for line in found.stdout.splitlines() if "cause" in line)
     assert "game.py has changed since the recording" in cause
+
+
+SPAWNING = """
+import pymunk
+space = pymunk.Space()
+space.gravity = (0, -900)
+floor = pymunk.Segment(space.static_body, (-500, 0), (500, 0), 1)
+floor.collision_type = 1
+space.add(floor)
+def land(arbiter, space, data):
+    ball, _ = arbiter.shapes
+    spark = pymunk.Body(1, 10)
+    spark.position = ball.body.position.x, 300
+    shape = pymunk.Circle(spark, 3)
+    space.remove(ball, ball.body)
+    space.add(spark, shape)
+space.on_collision(2, 1, begin=land)
+for x, y, speed in ((0, 101.0, 20), (300, 100.0, 30)):
+    body = pymunk.Body(1, 10)
+    body.position, body.velocity = (x, y), (0, speed)
+    shape = pymunk.Circle(body, 5)
+    shape.collision_type = 2
+    space.add(body, shape)
+for k in range(50):
+    space.step(1 / 60)
+"""
+
+
+def test_bodies_that_callbacks_add_are_found_again_by_their_contacts(record: Recorder) -> None:
+    """Both balls land within a frame of each other, in another order with substeps."""
+    inputs = record(game_file(SPAWNING))
+    own, fine = (rehearse("game.py", inputs, RehearsalSettings(substeps=each)) for each in (1, 8))
+    places = [dict(zip(run.frame(49)[0].tolist(), run.frame(49)[1][:, 0].tolist(), strict=True)) for run in (own, fine)]
+    assert places[0] == places[1]  # the sparks fall straight down at x = 0 and 300
+    assert sorted(places[0].values()) == [0.0, 300.0]
+    assert {own.body_name(each) for each in places[0]} == {"body 1 of land", "body 2 of land"}

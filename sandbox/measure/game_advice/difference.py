@@ -109,10 +109,9 @@ class GameTruth:
         bodies, rows = self.run.bodies, np.repeat(np.arange(self.run.frames), np.diff(self.run.offsets))
         if not len(bodies):
             return 1.0
-        horizons = np.full(int(bodies.max()) + 1, self.run.frames)
-        for body, frame in self.horizons.items():
-            horizons[body] = frame
-        return float(np.mean(rows < horizons[bodies]))
+        numbers, places = np.unique(bodies, return_inverse=True)
+        horizons = np.array([self.horizon(body) for body in numbers.tolist()])
+        return float(np.mean(rows < horizons[places]))
 
 
 def part_frames(run: Rehearsal, other: Rehearsal, distance: float) -> dict[int, int]:
@@ -261,7 +260,7 @@ def _callback_differences(truth: GameTruth, run: Rehearsal, frames: int) -> Iter
 
 
 def _body_of(truth: Rehearsal, run: Rehearsal, shape: int) -> int:
-    bodies = truth.shape_bodies if shape < len(truth.shape_bodies) else run.shape_bodies
+    bodies = truth.shape_bodies if shape in truth.shape_bodies else run.shape_bodies
     return bodies[shape]
 
 

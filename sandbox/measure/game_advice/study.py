@@ -492,11 +492,17 @@ def guessed_zoom(run: Rehearsal) -> float:
     It is 1 if the moving shapes have the sizes of pixel graphics, or if the level is about as many units wide as the
     window has pixels.
     """
-    sizes = [2.0 * _reach(shape) for shape, body in zip(run.shapes, run.shape_bodies, strict=True) if body >= 0]
+    sizes = [
+        2.0 * _reach(shape)
+        for shape, body in zip(run.shapes.values(), run.shape_bodies.values(), strict=True)
+        if body >= 0
+    ]
     if sizes and float(np.median(sizes)) >= MIN_PIXELS:
         return 1.0
     if run.window is not None:
-        static = [shape.points for shape, body in zip(run.shapes, run.shape_bodies, strict=True) if body < 0]
+        static = [
+            shape.points for shape, body in zip(run.shapes.values(), run.shape_bodies.values(), strict=True) if body < 0
+        ]
         points = np.concatenate([run.states[:, :2], *(np.reshape(each, (-1, 2)) for each in static)])
         extent = float(np.max(np.ptp(np.quantile(points, MIDDLE, axis=0), axis=0))) if len(points) else 0.0
         return 1.0 if extent >= MIN_WINDOW * max(run.window) else METRE

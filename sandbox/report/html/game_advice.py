@@ -13,7 +13,7 @@ from sandbox.measure.game_advice.result import GameAdvice, GameSetting
 from sandbox.measure.game_advice.step_code import StepCode
 from sandbox.measure.game_advice.text import contacts_text, setting_text
 from sandbox.measure.proportion import Proportion
-from sandbox.rehearsal.rehearse import Rehearsal
+from sandbox.rehearsal.rehearse import Rehearsal, densely_numbered
 from sandbox.report.game_advice_plot import game_error_chart
 from sandbox.report.html.game_replay import GameTrack, contact_marks, frame_times, game_replay
 from sandbox.report.html.inline_svg import time_chart
@@ -252,6 +252,7 @@ def _runs(advice: GameAdvice, runs: Mapping[str, Rehearsal], settings: Mapping[s
     """
     duration = advice.duration or 1.0  # a session of a single frame has none
     times = frame_times(runs.values(), duration)
+    runs = densely_numbered(runs)
     tracks = [GameTrack(TRUTH, TRUTH, runs[TRUTH])]
     for name, run in runs.items():
         if name in settings:

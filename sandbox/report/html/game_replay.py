@@ -211,7 +211,7 @@ class _Forms:
     def numbers(self, run: Rehearsal, bodies: IntArray) -> list[int]:
         """Return the number of the form of each body in a run."""
         by_body: dict[int, list[GameShape]] = {}
-        for body, shape in zip(run.shape_bodies, run.shapes, strict=True):
+        for body, shape in zip(run.shape_bodies.values(), run.shapes.values(), strict=True):
             by_body.setdefault(body, []).append(shape)
         return [self._number(by_body.get(body, [])) for body in bodies.tolist()]
 
@@ -235,7 +235,8 @@ def _geometry(
 ) -> dict[str, Any]:
     """Return the shapes of static bodies, and of others that never move, with position, angle, and number."""
     kinds: dict[bool, list[list[Any]]] = {False: [], True: []}
-    for number, (body, shape) in enumerate(zip(truth.shape_bodies, truth.shapes, strict=True)):
+    for number, shape in truth.shapes.items():
+        body = truth.shape_bodies[number]
         if body >= len(is_still) or (body >= 0 and not is_still[body]):
             continue
         x, y, angle = (0.0, 0.0, 0.0) if body < 0 else poses[0, body].tolist()
@@ -271,7 +272,7 @@ def _marks(
     found = []
     for contact, function in track.contacts:
         poses = pose if contact.kind == "extra" else truth
-        bodies = [track.run.shape_bodies[each] if each < len(track.run.shape_bodies) else -1 for each in contact.shapes]
+        bodies = [track.run.shape_bodies.get(each, -1) for each in contact.shapes]
         at = _contact_position(poses, contact.frame, bodies)
         if at is not None:
             x, y = (at - origin).tolist()

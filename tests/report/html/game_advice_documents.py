@@ -59,13 +59,17 @@ def rehearsal(
         states=np.concatenate(states),
         callbacks=(GameCallback(f"Game.{HOSTILE}", "bullet", "wall", "begin"),),
         calls=(CallbackCalls(HIT, 0, (WALL, BULLET_SHAPE), 1),) if hits else (),
-        shape_bodies=(-1, -1, BALL, POST, BULLET),
-        shapes=(
-            GameShape("segment", ((690.0, 0.0), (690.0, 600.0)), 4.0, False),
-            GameShape("circle", ((200.0, 100.0),), 9.0, True),
-            GameShape("circle", ((0.0, 0.0),), 20.0, False),
-            GameShape("polygon", ((-10.0, -5.0), (10.0, -5.0), (10.0, 15.0), (-10.0, 15.0)), 0.0, False),
-            GameShape("circle", ((0.0, 0.0),), 2.0, False),
+        shape_bodies=dict(enumerate((-1, -1, BALL, POST, BULLET))),
+        shapes=dict(
+            enumerate(
+                (
+                    GameShape("segment", ((690.0, 0.0), (690.0, 600.0)), 4.0, False),
+                    GameShape("circle", ((200.0, 100.0),), 9.0, True),
+                    GameShape("circle", ((0.0, 0.0),), 20.0, False),
+                    GameShape("polygon", ((-10.0, -5.0), (10.0, -5.0), (10.0, 15.0), (-10.0, 15.0)), 0.0, False),
+                    GameShape("circle", ((0.0, 0.0),), 2.0, False),
+                )
+            )
         ),
         changes=(),
         shape_changes=((FIRED, True, BULLET_SHAPE), (TAKEN, False, COIN)),

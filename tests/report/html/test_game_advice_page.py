@@ -229,8 +229,8 @@ def test_long_run_of_many_bodies_stays_below_three_megabytes() -> None:
         offsets=np.arange(frames + 1) * count,
         bodies=np.tile(np.arange(count), frames),
         states=states.reshape(-1, 6),
-        shape_bodies=tuple(range(count)),
-        shapes=(runs()["truth"].shapes[2],) * count,
+        shape_bodies=dict(enumerate(range(count))),
+        shapes=dict.fromkeys(range(count), runs()["truth"].shapes[2]),
     )
     shown = dict.fromkeys(("truth", "present", "recommended"), run)
     assert len(game_advice_page(game_advice(runs()), shown).html()) < 3_000_000
