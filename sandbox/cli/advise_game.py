@@ -22,6 +22,7 @@ from sandbox.measure.game_advice.study import (
     NotRepeatableError,
 )
 from sandbox.measure.game_advice.text import (
+    answer_text,
     callback_text,
     contacts_text,
     figures_text,
@@ -166,6 +167,7 @@ def print_game_advice(advice: GameAdvice, budget_ms: float | None) -> None:
         budget_ms: time of the physics in a frame that is available, ms; None if it was not given.
     """
     print_line(f"{advice.program}: {target_text(advice)}", style="bold")
+    print_item(answer_text(advice), "")
     for sentence in truth_sentences(advice):
         print_item(sentence, "")
     _print_heading(f"1. Present setting: {setting_text(advice.present)}")

@@ -17,7 +17,7 @@ from sandbox.game_inputs import GameInputs
 from sandbox.measure.game_advice.difference import IN_TIME, GameTruth, difference_from, part_frames, unmatched
 from sandbox.measure.game_advice.repeatability import Mismatch, first_mismatch, likely_causes
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting, GameSettingChange, PlaysHeld
-from sandbox.measure.game_advice.step_code import step_code
+from sandbox.measure.game_advice.step_code import StepCode, step_code
 from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
@@ -418,7 +418,10 @@ class GameStudy:
             changes=changes,
             plays=plays,
             code=code,
-            remarks=tuple(remarks_on(own, chosen, None if self._given_zoom is not None else self._zoom)),
+            remarks=(
+                *_remark_on_code(code),
+                *remarks_on(own, chosen, self._zoom if self._given_zoom is None else None),
+            ),
             tried=1 + len(changes) + len(tried),
             runs=self._count,
             seconds=time.monotonic() - self._start,
@@ -484,6 +487,14 @@ def mismatch_text(mismatch: Mismatch, program: str | Path, inputs: GameInputs) -
     causes = likely_causes(program, inputs)
     text = f"two runs with the same inputs and settings differ: {mismatch}"
     return "\n".join([text, *(f"likely cause: {each}" for each in causes)])
+
+
+def _remark_on_code(code: StepCode | None) -> Iterable[str]:
+    if code is not None and ".step(" not in code.old:
+        yield (
+            "this line makes the step through another function: the lines have the general names `space` and `dt`, "
+            "and belong where the game calls Space.step"
+        )
 
 
 def guessed_zoom(run: Rehearsal) -> float:

@@ -32,6 +32,21 @@ def setting_text(setting: GameSetting) -> str:
 COUNTS = ("substeps", "iterations")
 
 
+def answer_text(advice: GameAdvice) -> str:
+    """Return the answer in one sentence."""
+    chosen, present = advice.chosen, advice.present
+    if chosen is None or not chosen.changed:
+        within = "is within" if advice.recommended is not None else "is the closest to"
+        return f"The present setting {within} the tolerance: nothing to change."
+    errors = f"error {format_number(present.error_px)} → {format_number(chosen.error_px)} px"
+    contacts = f"contacts {contacts_text(present)} → {contacts_text(chosen)}"
+    changes = errors if contacts_text(present) == contacts_text(chosen) else f"{errors}, {contacts}"
+    ratio = f", ×{chosen.physics_ms / present.physics_ms:.2g} the physics" if present.physics_ms else ""
+    if advice.recommended is None:
+        return f"No setting that was tried is good enough; the closest is {setting_text(chosen)}: {changes}{ratio}."
+    return f"Use {setting_text(chosen)}: {changes}{ratio}."
+
+
 def truth_sentences(advice: GameAdvice) -> Iterator[str]:
     """Yield what errors are measured against, and how far it is known."""
     yield (
