@@ -1,6 +1,6 @@
 """Difference of two runs of a game: distances of its bodies, and collision callbacks that one of them lacks."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,6 +20,13 @@ WINDOW = 30
 STEP_PHASES = ("pre_solve", "post_solve")
 """Callbacks that are called in each step of a contact, and therefore more often with substeps"""
 
+IMPACT = 5
+"""Frames after the beginning of an impact in which positions may depend on the step, and contacts still count"""
+BACK = 10
+"""Frames for which a body has to be close to its place in another run to be there again"""
+
+Span = tuple[int, int]
+"""First frame, and frame after the last one"""
 CallbackPair = tuple[GameCallback, tuple[int, int]]
 """Callback and the numbers of two shapes"""
 
@@ -91,17 +98,29 @@ class GameTruth:
     """Run of a game with many substeps, and how far it can be relied on."""
 
     run: Rehearsal
-    horizons: Mapping[int, int]
-    """first frame from which on the position of a body is not known, by number; bodies that are known to the end have
-    none"""
+    unknown: Mapping[int, Sequence[Span]]
+    """frames in which the position of a body is not known, by number of the body"""
     uncertain: frozenset[tuple[CallbackPair, int]]
     """contacts, by their first frames, that a finer or a perturbed run does not have"""
     doubtful: frozenset[tuple[CallbackPair, int]] = frozenset()
     """contacts of these runs that the truth does not have"""
 
-    def horizon(self, body: int) -> int:
-        """Return the first frame from which on the position of a body is not known."""
-        return self.horizons.get(body, self.run.frames)
+    def is_known(self, body: int, frame: int) -> bool:
+        """Return whether the position of a body in a frame is known."""
+        return not any(start <= frame < end for start, end in self.unknown.get(body, ()))
+
+    def knows_contacts(self, body: int, frame: int) -> bool:
+        """Return whether contacts of a body in a frame count: it is known, or has not been so for a moment only.
+
+        Around an impact, positions depend on the step, although all runs have the contact.
+        """
+        return not any(start + IMPACT <= frame < end for start, end in self.unknown.get(body, ()))
+
+    def lost_from(self, body: int) -> int | None:
+        """Return the frame from which on the position of a body is not known to the end; None if it is known there."""
+        spans = self.unknown.get(body, ())
+        last = max((end for _, end in spans), default=0)
+        return max(start for start, end in spans if end == last) if last >= self.run.frames else None
 
     @property
     def known_fraction(self) -> float:
@@ -109,33 +128,42 @@ class GameTruth:
         bodies, rows = self.run.bodies, np.repeat(np.arange(self.run.frames), np.diff(self.run.offsets))
         if not len(bodies):
             return 1.0
-        numbers, places = np.unique(bodies, return_inverse=True)
-        horizons = np.array([self.horizon(body) for body in numbers.tolist()])
-        return float(np.mean(rows < horizons[places]))
+        is_known = np.ones(len(bodies), np.bool_)
+        for body, spans in self.unknown.items():
+            for start, end in spans:
+                is_known &= ~((bodies == body) & (start <= rows) & (rows < end))
+        return float(np.mean(is_known))
 
 
-def part_frames(run: Rehearsal, other: Rehearsal, distance: float) -> dict[int, int]:
-    """Return the first frame in which each body is farther from its place in another run than a distance.
+def apart_spans(run: Rehearsal, other: Rehearsal, distance: float) -> dict[int, list[Span]]:
+    """Return the frames in which each body is farther from its place in another run than a distance.
 
-    A body that one of the runs lacks for longer than a frame parts too. Bodies that never do are not in the result.
+    A body that one of the runs lacks for longer than a frame is apart too. It is back when it has been close for
+    `BACK` frames: bodies whose motion is chaotic pass each other now and then.
 
     Args:
         run: of a game.
         other: another one.
         distance: in units of the game.
     """
-    found: dict[int, int] = {}
+    found: dict[int, list[Span]] = {}
+    began: dict[int, int] = {}
+    last: dict[int, int] = {}
     absent: dict[int, int] = {}
     for frame in range(min(run.frames, other.frames)):
         bodies, apart, lacking = _apart(run, other, frame)
-        for body in bodies[apart > distance].tolist():
-            found.setdefault(body, frame)
         still = set(lacking.tolist())
-        for body in still:
-            absent.setdefault(body, frame)
-            if frame - absent[body] > IN_TIME:
-                found.setdefault(body, absent[body])
-        absent = {body: since for body, since in absent.items() if body in still}
+        absent = {body: absent.get(body, frame) for body in still}
+        here = dict.fromkeys(bodies[apart > distance].tolist(), frame)
+        here |= {body: since for body, since in absent.items() if frame - since > IN_TIME}
+        for body, since in here.items():
+            began.setdefault(body, since)
+            last[body] = frame
+        close = [body for body in bodies.tolist() if body in began and frame - last[body] >= BACK] if began else []
+        for body in close:
+            found.setdefault(body, []).append((began.pop(body), last[body] + 1))
+    for body, start in began.items():
+        found.setdefault(body, []).append((start, run.frames))
     return found
 
 
@@ -165,8 +193,8 @@ def difference_from(truth: GameTruth, run: Rehearsal, tolerance: float) -> GameD
     worst: tuple[float, int, int] | None = None
     for frame in range(frames):
         bodies, apart, _ = _apart(truth.run, run, frame)
-        if truth.horizons and len(bodies):
-            is_known = np.array([frame < truth.horizon(body) for body in bodies.tolist()])
+        if truth.unknown and len(bodies):
+            is_known = np.array([truth.is_known(body, frame) for body in bodies.tolist()])
             bodies, apart = bodies[is_known], apart[is_known]
         if len(bodies):
             largest = int(apart.argmax())
@@ -226,8 +254,12 @@ def _callback_differences(truth: GameTruth, run: Rehearsal, frames: int) -> Iter
         count = missed = late = extra = 0
         events: list[DifferingContact] = []
         for pair in pairs:
-            end = min(frames, *(_horizon(truth, run, shape) for shape in pair[1])) - IN_TIME
-            right = [frame for frame in expected.get(pair, []) if frame < end and (pair, frame) not in truth.uncertain]
+            bodies = [_body_of(truth.run, run, shape) for shape in pair[1]]
+            right = [
+                frame
+                for frame in expected.get(pair, [])
+                if _counts(truth, bodies, frame, frames) and (pair, frame) not in truth.uncertain
+            ]
             here = found.get(pair, [])
             count += len(right)
             used = set()
@@ -240,7 +272,9 @@ def _callback_differences(truth: GameTruth, run: Rehearsal, frames: int) -> Iter
                     late += match is not None
             known = [frame for each, frame in (*truth.uncertain, *truth.doubtful) if each == pair]
             for frame in here:
-                if frame in used or frame >= end or any(abs(frame - other) <= WINDOW for other in known):
+                if frame in used or any(abs(frame - other) <= WINDOW for other in known):
+                    continue
+                if not _counts(truth, bodies, frame, frames):
                     continue
                 extra += 1
                 events.append(DifferingContact(frame, "extra", pair[1]))
@@ -264,9 +298,9 @@ def _body_of(truth: Rehearsal, run: Rehearsal, shape: int) -> int:
     return bodies[shape]
 
 
-def _horizon(truth: GameTruth, run: Rehearsal, shape: int) -> int:
-    """Return the frame up to which the body of a shape is known."""
-    return truth.horizon(_body_of(truth.run, run, shape))
+def _counts(truth: GameTruth, bodies: Sequence[int], frame: int, frames: int) -> bool:
+    """Return whether a contact of two bodies in a frame counts."""
+    return frame < frames - IN_TIME and all(truth.knows_contacts(body, frame) for body in bodies)
 
 
 def _pair_text(truth: Rehearsal, run: Rehearsal, shapes: tuple[int, int]) -> str:

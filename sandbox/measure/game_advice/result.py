@@ -94,7 +94,7 @@ class GameAdvice:
     known_fraction: float
     """fraction of the positions of all bodies in all frames that are known"""
     unknown_from: Mapping[str, float]
-    """s, time from which on the position of a body is not known, by name"""
+    """s, time from which on the position of a body is not known to the end, by name"""
     present: GameSetting
     recommended: GameSetting | None
     """cheapest setting within the tolerance; None if none was found"""

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sandbox.game_inputs import GameInputs
-from sandbox.measure.game_advice.difference import IN_TIME, GameTruth, difference_from, part_frames, unmatched
+from sandbox.measure.game_advice.difference import IN_TIME, GameTruth, apart_spans, difference_from, unmatched
 from sandbox.measure.game_advice.repeatability import Mismatch, first_mismatch, likely_causes
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting, GameSettingChange, PlaysHeld
 from sandbox.measure.game_advice.step_code import StepCode, step_code
@@ -114,6 +114,8 @@ class GameStudy:
         self._plays_wanted, self._time_limit, self._on_progress = plays, time_limit, on_progress
         self._start = time.monotonic()
         self._draws = True
+        self.truth: GameTruth | None = None
+        """truth of the advice; None before"""
         self.shown: dict[str, Rehearsal] = {}
         """runs to look at: `truth`, `present` and `recommended` or `most accurate`"""
         self._runs: dict[_Play, Future[Rehearsal]] = {}
@@ -137,6 +139,7 @@ class GameStudy:
             tried = self._tried(own, changes, truth)
             candidates = [present, *(each.setting for each in changes), *tried]
             recommended, best, plays = self._recommended(own, candidates, truth)
+            self.truth = truth
             self.shown = {"truth": truth.run, "present": own}
             if best.changed:
                 name = "most accurate" if recommended is None else "recommended"
@@ -204,7 +207,7 @@ class GameStudy:
             has_gained = best is None or found.known_fraction > GAIN * best.known_fraction
             best = found if best is None or found.known_fraction >= best.known_fraction else best
             next_time = 2.0 * (time.monotonic() - begun)
-            is_known = not found.horizons and not found.uncertain
+            is_known = not found.unknown and not found.uncertain
             if is_known or not has_gained or substeps >= LAST_TRUTH or next_time > 0.2 * self._time_left:
                 break
             coarse, substeps = fine, 2 * substeps
@@ -398,7 +401,8 @@ class GameStudy:
             file, line = own.step_calls[0]
             has_forces = fine.has_forces
             code = step_code(file, line, chosen.substeps, chosen.changed, has_forces=has_forces)
-        unknown = sorted(truth.horizons.items(), key=lambda each: each[1])[:MAX_NAMED]
+        lost = [(body, frame) for body in truth.unknown if (frame := truth.lost_from(body)) is not None]
+        unknown = sorted(lost, key=lambda each: each[1])[:MAX_NAMED]
         return GameAdvice(
             program=str(self._program),
             frames=own.frames,
@@ -466,17 +470,17 @@ orders the settings that are tried; costs that are printed are measured."""
 def _truth_of(fine: Rehearsal, coarse: Rehearsal, limit: float) -> GameTruth:
     """Return a run as the truth, as far as a coarser run agrees with it."""
     uncertain = unmatched(fine, coarse)
-    return GameTruth(fine, part_frames(fine, coarse, limit), uncertain, unmatched(coarse, fine))
+    return GameTruth(fine, apart_spans(fine, coarse, limit), uncertain, unmatched(coarse, fine))
 
 
 def _without_chaos(truth: GameTruth, twin: Rehearsal, limit: float) -> GameTruth:
-    """Return a truth that ends for each body where a run perturbed by rounding parts from it."""
-    horizons = dict(truth.horizons)
-    for body, frame in part_frames(truth.run, twin, limit).items():
-        horizons[body] = min(frame, horizons.get(body, frame))
+    """Return a truth that does not know a body where a run perturbed by rounding is apart from it."""
+    unknown = {body: list(spans) for body, spans in truth.unknown.items()}
+    for body, spans in apart_spans(truth.run, twin, limit).items():
+        unknown.setdefault(body, []).extend(spans)
     return GameTruth(
         truth.run,
-        horizons,
+        unknown,
         truth.uncertain | unmatched(truth.run, twin),
         truth.doubtful | unmatched(twin, truth.run),
     )

@@ -57,7 +57,7 @@ def truth_sentences(advice: GameAdvice) -> Iterator[str]:
         named = ", ".join(f"{body} from {time:.3g} s on" for body, time in advice.unknown_from.items())
         yield (
             f"It knows {format_percent(advice.known_fraction)} of the positions; not those that rounding or finer "
-            f"steps change: {named}."
+            f"steps change: {named or 'moments of impacts'}."
         )
 
 

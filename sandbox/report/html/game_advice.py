@@ -139,7 +139,7 @@ def _measured_by(advice: GameAdvice) -> Markup:
         bodies = ", ".join(f"{name} from {time:.3g} s on" for name, time in advice.unknown_from.items())
         sentences.append(
             f"It is known for {100.0 * advice.known_fraction:.3g} % of the positions, and only these count. "
-            f"Not known: {bodies}."
+            f"Not known: {bodies or 'moments of impacts'}."
         )
     displacement = advice.zoom * advice.plays.displacement
     sentences.append(
