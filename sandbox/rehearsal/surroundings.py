@@ -228,13 +228,15 @@ def surroundings(
         log.end_frame()
         end_frame()
 
+    foreign = pygame.display.get_surface()  # a window that this process had before the program
+
     def open_window() -> None:
         nonlocal has_window
         has_window = True
 
     def before_step(space: pymunk.Space) -> None:
         # A program without a window has a frame for each step.
-        if log.has_stepped(space) and not has_window and pygame.display.get_surface() is None:
+        if log.has_stepped(space) and not has_window and pygame.display.get_surface() in (None, foreign):
             finish_frame()
         if max_steps is not None and log.steps >= max_steps:
             raise EndOfTape(0)

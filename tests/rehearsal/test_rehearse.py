@@ -10,7 +10,7 @@ import pytest
 from sandbox.game_inputs import GameInputs, inputs_from_json, inputs_to_json, jittered, load_inputs
 from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, first_difference, rehearse
 from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
-from tests.cli.calling import process
+from tests.cli.calling import call, process
 
 pytestmark = pytest.mark.fail_slow(60)  # each test starts the interpreter several times, with pygame and pymunk
 
@@ -476,3 +476,20 @@ def test_bodies_that_callbacks_add_are_found_again_by_their_contacts(record: Rec
     assert places[0] == places[1]  # the sparks fall straight down at x = 0 and 300
     assert sorted(places[0].values()) == [0.0, 300.0]
     assert {own.body_name(each) for each in places[0]} == {"body 1 of land", "body 2 of land"}
+
+
+def test_window_of_the_recording_process_is_none_of_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program without a window has a frame for each step, also where another one has left a window open."""
+    import pygame
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    pygame.display.init()
+    pygame.display.set_mode((20, 20))
+    game_file(FALLING)
+    assert call(["record", "--quiet", "--to", "inputs.json", "game.py"]) == 0
+    inputs = load_inputs("inputs.json")
+    assert (inputs.frames, inputs.steps) == (30, 30)
+    assert rehearse("game.py", inputs).hashes == inputs.frame_hashes
