@@ -197,6 +197,8 @@ def print_game_advice(advice: GameAdvice, budget_ms: float | None) -> None:
     click.echo()
     runs = format_plural(advice.runs, "run")
     print_item(f"{format_plural(advice.tried, 'setting')} tried, {runs} of the game, {advice.seconds:.3g} s.", "")
+    if advice.out_of_time:
+        print_item("The time limit ended the search; --time-limit gives it more.", "")
 
 
 def _print_setting(advice: GameAdvice, setting: GameSetting, budget_ms: float | None) -> None:

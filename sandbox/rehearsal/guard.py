@@ -47,7 +47,7 @@ _REMARKS = {
 
 
 class FileWatch:
-    """Notes which files a program reads and writes, and whether it connects, starts programs or threads.
+    """Notes which files a program reads and writes, and whether it connects to a network or starts programs.
 
     An audit hook cannot be removed; `stop` ends its work.
 

@@ -285,8 +285,7 @@ class TapedClock:
 
     def tick(self, framerate: float = 0) -> int:
         """Wait for the next frame, and return the time since the last call, ms."""
-        live = lambda: self.device.tick(self._clock, framerate)  # noqa: E731
-        time: Any = self.tape.result("tick", live, _in_milliseconds)
+        time: Any = self.tape.result("tick", lambda: self.device.tick(self._clock, framerate), _in_milliseconds)
         self._time = time
         self._times.append(self._time)
         if len(self._times) == FPS_TICKS:
@@ -368,7 +367,10 @@ def pygame_inputs_from(
         return joystick(*arguments)
 
     clock = type("Clock", (TapedClock,), {"tape": tape, "device": device, "make": staticmethod(pygame.time.Clock)})
-    ticks = lambda: int(tape.time("pygame.time.get_ticks", device.ticks, MILLISECONDS))  # noqa: E731
+
+    def ticks() -> int:
+        return int(tape.time("pygame.time.get_ticks", device.ticks, MILLISECONDS))
+
     replaced: list[tuple[Any, str, Any]] = [
         *(
             (pygame.event, name, getattr(queue, name))

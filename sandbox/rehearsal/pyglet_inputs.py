@@ -348,7 +348,7 @@ class _Patches:
             clipboard = text
 
         def do_nothing(*_: Any) -> None:
-            """Do nothing: nobody sees the window."""
+            """Do nothing: the window is hidden."""
 
         replaced: dict[str, Any] = {
             "set_size": resize,

@@ -12,6 +12,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.game_inputs import GameInputs, inputs_to_json
+from sandbox.rehearsal.space_log import GameCallback, GameChange, GameShape
 from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
 from sandbox.worker_process import ProcessEndedError, WorkerProcess, exit_text
 
@@ -28,43 +29,6 @@ _running: set[WorkerProcess] = set()
 
 class RehearsalError(Exception):
     """A rehearsal has no result."""
-
-
-class GameCallback(NamedTuple):
-    """Collision callback of a game."""
-
-    function: str
-    """qualified name"""
-    type_a: str
-    """name of the collision type in the game, or its number; `any` for any type"""
-    type_b: str
-    phase: str
-    """`begin`, `pre_solve`, `post_solve` or `separate`"""
-
-    def __str__(self) -> str:
-        """Return the callback as the game registers it."""
-        return f"on_collision({self.type_a}, {self.type_b}) {self.phase} {self.function}"
-
-
-class GameShape(NamedTuple):
-    """Form of a shape of a game, relative to its body."""
-
-    kind: str
-    """`circle`, `segment` or `polygon`"""
-    points: tuple[tuple[float, float], ...]
-    """centre of a circle, ends of a segment, vertices of a polygon, in units of the game"""
-    radius: float
-    is_sensor: bool
-
-
-class GameChange(NamedTuple):
-    """Body or joint that a game adds to a space, or removes from it, after its first step."""
-
-    frame: int
-    is_added: bool
-    is_joint: bool
-    number: int
-    """number of the body or of the joint, in the order in which the game adds them"""
 
 
 class CallbackCalls(NamedTuple):

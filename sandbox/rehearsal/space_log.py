@@ -10,7 +10,6 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from types import FrameType
 from typing import Any, ClassVar, NamedTuple
 from unittest.mock import patch
@@ -34,7 +33,7 @@ WORLD = -1
 """Number of the static body of a space"""
 
 
-class SpaceChange(NamedTuple):
+class GameChange(NamedTuple):
     """Body or joint that a game adds to a space, or removes from it, after its first step."""
 
     frame: int
@@ -44,18 +43,18 @@ class SpaceChange(NamedTuple):
     """number of the body or of the joint"""
 
 
-class ShapeForm(NamedTuple):
+class GameShape(NamedTuple):
     """Form of a shape, relative to its body."""
 
     kind: str
     """`circle`, `segment` or `polygon`"""
     points: tuple[tuple[float, float], ...]
-    """centre of a circle, ends of a segment, vertices of a polygon"""
+    """centre of a circle, ends of a segment, vertices of a polygon, in units of the game"""
     radius: float
     is_sensor: bool
 
     @classmethod
-    def of(cls, shape: pymunk.Shape) -> "ShapeForm":
+    def of(cls, shape: pymunk.Shape) -> "GameShape":
         """Return the form of a shape."""
         if isinstance(shape, pymunk.Circle):
             kind, points = "circle", [shape.offset]
@@ -76,16 +75,20 @@ class LoggedFrame(NamedTuple):
     """(N, 6) x, y, angle, velocity and angular velocity, in units of the game"""
 
 
-@dataclass(frozen=True)
-class CallbackName:
-    """Callback of a game."""
+class GameCallback(NamedTuple):
+    """Collision callback of a game."""
 
     function: str
     """qualified name"""
-    types: tuple[str, str]
-    """names of the collision types, as the game has them, or their numbers; `any` for any type"""
+    type_a: str
+    """name of the collision type in the game, or its number; `any` for any type"""
+    type_b: str
     phase: str
     """`begin`, `pre_solve`, `post_solve` or `separate`"""
+
+    def __str__(self) -> str:
+        """Return the callback as the game registers it."""
+        return f"on_collision({self.type_a}, {self.type_b}) {self.phase} {self.function}"
 
 
 class SpaceLog:
@@ -99,7 +102,7 @@ class SpaceLog:
         self.frame = 0
         self.frames: list[LoggedFrame] = []
         self.hashes: list[str] = []
-        self.callbacks: dict[CallbackName, int] = {}
+        self.callbacks: dict[GameCallback, int] = {}
         """number of each callback"""
         self.calls: dict[tuple[int, int, tuple[int, int]], int] = {}
         """calls by frame, callback and shapes, in order"""
@@ -109,9 +112,9 @@ class SpaceLog:
         self._stepped: dict[pymunk.Space, None] = {}  # since the end of the last frame
         self.shape_bodies: dict[int, int] = {}
         """number of the body of each shape; `WORLD` for the static body of a space"""
-        self.shapes: dict[int, ShapeForm] = {}
+        self.shapes: dict[int, GameShape] = {}
         """form of each shape, when the game adds it"""
-        self.changes: list[SpaceChange] = []
+        self.changes: list[GameChange] = []
         """bodies and joints that the game adds and removes, in order"""
         self.shape_changes: list[tuple[int, bool, int]] = []
         """frame, whether it is added, and number of each shape that the game adds or removes after the first step"""
@@ -188,7 +191,7 @@ class SpaceLog:
     def _note_change(self, thing: pymunk.Body | pymunk.Constraint, *, is_added: bool) -> None:
         if self.steps:
             is_joint = isinstance(thing, pymunk.Constraint)
-            self.changes.append(SpaceChange(self.frame, is_added, is_joint, self._number(thing)))
+            self.changes.append(GameChange(self.frame, is_added, is_joint, self._number(thing)))
 
     def _note_shape(self, shape: pymunk.Shape, *, is_added: bool) -> None:
         if self.steps:
@@ -212,7 +215,7 @@ class SpaceLog:
             body = thing.body
             is_world = body is None or (body.space is not None and body is body.space.static_body)
             self.shape_bodies[number] = WORLD if is_world or body is None else self._number(body)
-            self.shapes[number] = ShapeForm.of(thing)
+            self.shapes[number] = GameShape.of(thing)
         return number
 
     def _number_by_cause(self, kind: str, callback: int, pair: tuple[int, int]) -> int:
@@ -340,7 +343,7 @@ def spaces_logged(log: SpaceLog, before_step: Callable[[pymunk.Space], None]) ->
             if function is None or function is pymunk.empty_callback or isinstance(function, LoggedCallback):
                 continue
             text = getattr(function, "__qualname__", type(function).__qualname__)
-            name = CallbackName(text.replace("<locals>.", ""), types, phase)
+            name = GameCallback(text.replace("<locals>.", ""), *types, phase)
             given[phase] = LoggedCallback(function, log.callbacks.setdefault(name, len(log.callbacks)))
         on_collision(space, collision_type_a, collision_type_b, **given, data=data)
 

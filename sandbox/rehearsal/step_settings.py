@@ -99,7 +99,7 @@ RANGES: Mapping[str, tuple[float, float]] = {
     "joint_bias": (0.0, 1.0),
 }
 """Least and largest value of each setting"""
-SPACE_ATTRIBUTES = {
+SPACE_ATTRIBUTES: dict[str, str] = {
     "iterations": "iterations",
     "slop": "collision_slop",
     "bias": "collision_bias",

@@ -185,7 +185,7 @@ def replayed(inputs: GameInputs, log: SpaceLog, *, draws: bool = True) -> Iterat
 
 
 class _NoDevice(ScriptedDevice):
-    """Keyboard and mouse that nobody touches: for readings that the recording has none of."""
+    """Idle keyboard and mouse, for readings that the recording has none of."""
 
     def __init__(self) -> None:
         super().__init__(InputScript(frames=1))

@@ -93,7 +93,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         states=np.concatenate([frame.states for frame in log.frames] or [np.empty((0, 6))]),
     )
     return {
-        "callbacks": [[each.function, *each.types, each.phase] for each in log.callbacks],
+        "callbacks": list(log.callbacks),
         # The order of `separate` callbacks within a step follows the addresses of shapes in memory.
         "calls": [[frame, callback, *shapes, count] for (frame, callback, shapes), count in sorted(log.calls.items())],
         "shape_bodies": list(log.shape_bodies.items()),

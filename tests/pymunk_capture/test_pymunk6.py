@@ -88,7 +88,9 @@ def motion(space: pymunk.Space) -> list[tuple[float, ...]]:
 
 
 def test_begin_that_returns_false_lets_the_ball_through(names: None) -> None:
-    space, plain, log, expected = bounce(), bounce(), [], []  # type: ignore[var-annotated]
+    space, plain = bounce(), bounce()
+    log: list[Any] = []
+    expected: list[Any] = []
     handler = space.add_collision_handler(BALL, FLOOR)
     for phase, answers in (("begin", [False]), ("pre_solve", [True]), ("post_solve", []), ("separate", [])):
         setattr(handler, phase, noting(log, phase, *answers))
@@ -101,7 +103,9 @@ def test_begin_that_returns_false_lets_the_ball_through(names: None) -> None:
 
 @pytest.mark.parametrize("answers", [(True, False), (False,), (True, True, False)])
 def test_pre_solve_that_returns_false_ignores_one_step(answers: tuple[bool, ...], names: None) -> None:
-    space, plain, log, expected = bounce(), bounce(), [], []  # type: ignore[var-annotated]
+    space, plain = bounce(), bounce()
+    log: list[Any] = []
+    expected: list[Any] = []
     handler = space.add_collision_handler(FLOOR, OTHER)
     handler.pre_solve, handler.post_solve = noting(log, "pre_solve", *answers), noting(log, "post_solve")
     plain.on_collision(
@@ -115,7 +119,9 @@ def test_pre_solve_that_returns_false_ignores_one_step(answers: tuple[bool, ...]
 
 @pytest.mark.parametrize("kind", ["wildcard", "default"])
 def test_wildcard_and_default_handlers(kind: str, names: None) -> None:
-    space, plain, log, expected = bounce(), bounce(), [], []  # type: ignore[var-annotated]
+    space, plain = bounce(), bounce()
+    log: list[Any] = []
+    expected: list[Any] = []
     types = (OTHER, None) if kind == "wildcard" else (None, None)
     handler: Any = (
         space.add_wildcard_collision_handler(OTHER) if kind == "wildcard" else space.add_default_collision_handler()
@@ -130,7 +136,8 @@ def test_wildcard_and_default_handlers(kind: str, names: None) -> None:
 
 
 def test_handler_of_a_pair_answers_in_place_of_wildcards_in_the_phases_that_it_sets(names: None) -> None:
-    space, log = bounce(), []  # type: ignore[var-annotated]
+    space = bounce()
+    log: list[Any] = []
     pair, wildcard = space.add_collision_handler(BALL, FLOOR), space.add_wildcard_collision_handler(BALL)
     pair.begin = noting(log, "begin of the pair", True)
     for phase in PHASES:

@@ -8,7 +8,8 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.jsonable import in_json
-from sandbox.rehearsal.rehearse import GameCallback, Rehearsal
+from sandbox.rehearsal.rehearse import Rehearsal
+from sandbox.rehearsal.space_log import GameCallback
 
 CHATTER = 15
 """Frames within which calls for the same two shapes count as one contact: shapes at rest on each other part and meet

@@ -115,6 +115,8 @@ class GameAdvice:
     """number of runs of the game"""
     seconds: float
     """s, time of the advice"""
+    out_of_time: bool
+    """whether the time limit ended the search for settings or the plays"""
     machine: Mapping[str, Any]
     """description of the machine"""
     versions: Mapping[str, str]

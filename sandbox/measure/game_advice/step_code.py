@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 
+from sandbox.rehearsal.step_settings import SPACE_ATTRIBUTES
+
 
 @dataclass(frozen=True)
 class StepCode:
@@ -18,14 +20,6 @@ class StepCode:
     """the line, or the lines of a longer call; empty if the source could not be read"""
     new: tuple[str, ...]
     """lines that replace it"""
-
-
-_ATTRIBUTES = {
-    "iterations": "iterations",
-    "slop": "collision_slop",
-    "bias": "collision_bias",
-    "persistence": "collision_persistence",
-}
 
 
 def step_code(file: str, line: int, substeps: int, changed: Mapping[str, float], *, has_forces: bool) -> StepCode:
@@ -48,7 +42,9 @@ def step_code(file: str, line: int, substeps: int, changed: Mapping[str, float],
     old = "\n".join(lines[first - 1 : last]) if first > 0 else ""
     space, dt = ("space", "dt") if call is None else call[1:3]
     used = set(re.findall(r"\w+", text))
-    body = [f"{space}.{attribute} = {changed[name]:.10g}" for name, attribute in _ATTRIBUTES.items() if name in changed]
+    body = [
+        f"{space}.{attribute} = {changed[name]:.10g}" for name, attribute in SPACE_ATTRIBUTES.items() if name in changed
+    ]
     if "joint_bias" in changed:
         joint = _unused("joint", used)
         body += [f"for {joint} in {space}.constraints:", f"    {joint}.error_bias = {changed['joint_bias']:.10g}"]

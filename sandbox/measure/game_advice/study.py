@@ -22,7 +22,8 @@ from sandbox.measure.proportion import Proportion
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.provenance import machine, versions
 from sandbox.recording_remarks import MIN_PIXELS
-from sandbox.rehearsal.rehearse import GameShape, Rehearsal, RehearsalError, kill_rehearsals, rehearse
+from sandbox.rehearsal.rehearse import Rehearsal, RehearsalError, kill_rehearsals, rehearse
+from sandbox.rehearsal.space_log import GameShape
 from sandbox.rehearsal.step_settings import Nudge, RehearsalSettings
 
 FIRST_TRUTH = 16
@@ -120,6 +121,7 @@ class GameStudy:
         """runs to look at: `truth`, `present` and `recommended` or `most accurate`"""
         self._runs: dict[_Play, Future[Rehearsal]] = {}
         self._count = 0
+        self._is_out_of_time = False
         self._pool = ThreadPoolExecutor(max_workers=os.cpu_count() or 1)
 
     def advise(self) -> GameAdvice:
@@ -257,7 +259,7 @@ class GameStudy:
         for each in runs:
             try:
                 found.append(self._measured(each.result(), truth))
-            except RehearsalError:  # it exceeds the limits of time or memory: a setting that nobody would use
+            except RehearsalError:  # it exceeds the limits of time or memory, so that it is no candidate
                 continue
         return found
 
@@ -316,6 +318,7 @@ class GameStudy:
         while left_counts and self._time_left > end:
             batch, left_counts = left_counts[:cores], left_counts[cores:]
             tried += self._settings([RehearsalSettings(substeps=n, iterations=k) for n, k in batch], truth)
+        self._is_out_of_time |= self._time_left <= end
         return tried
 
     def _recommended(
@@ -341,6 +344,7 @@ class GameStudy:
             if best is None or held > best[0]:
                 best = held, each
             if self._time_left <= 0.0:
+                self._is_out_of_time = True
                 break
         if best is None:
             most_accurate = min(candidates, key=lambda each: (each.differing, _error(each)))
@@ -368,6 +372,7 @@ class GameStudy:
             coarse, exact = (each.result() for each in runs)
             plays.append((play, _truth_of(exact, coarse, TRUTH_FRACTION * self._tolerance)))
             if len(plays) >= MIN_PLAYS and self._time_left <= PLAYED * self._time_limit:
+                self._is_out_of_time |= len(plays) < self._plays_wanted
                 break
         return plays
 
@@ -429,6 +434,7 @@ class GameStudy:
             tried=1 + len(changes) + len(tried),
             runs=self._count,
             seconds=time.monotonic() - self._start,
+            out_of_time=self._is_out_of_time,
             machine=machine(),
             versions=versions(),
         )

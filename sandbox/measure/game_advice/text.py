@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from sandbox.formatting import format_number, format_percent, format_plural
 from sandbox.measure.game_advice.difference import CallbackDifference
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting
+from sandbox.rehearsal.step_settings import SPACE_ATTRIBUTES
 
 
 def target_text(advice: GameAdvice) -> str:
@@ -18,12 +19,7 @@ def target_text(advice: GameAdvice) -> str:
 
 def setting_text(setting: GameSetting) -> str:
     """Return a setting in a few words: `4 substeps, 10 iterations, collision_slop 0.01`."""
-    names = {
-        "slop": "collision_slop",
-        "bias": "collision_bias",
-        "persistence": "collision_persistence",
-        "joint_bias": "error_bias of joints",
-    }
+    names = SPACE_ATTRIBUTES | {"joint_bias": "error_bias of joints"}
     parts = [format_plural(setting.substeps, "substep"), format_plural(setting.iterations, "iteration")]
     parts += [f"{names.get(name, name)} {value:.3g}" for name, value in setting.changed.items() if name not in COUNTS]
     return ", ".join(parts)
@@ -36,8 +32,9 @@ def answer_text(advice: GameAdvice) -> str:
     """Return the answer in one sentence."""
     chosen, present = advice.chosen, advice.present
     if chosen is None or not chosen.changed:
-        within = "is within" if advice.recommended is not None else "is the closest to"
-        return f"The present setting {within} the tolerance: nothing to change."
+        if advice.recommended is not None:
+            return "The present setting is within the tolerance: nothing to change."
+        return "The present setting is not good enough, and none that was tried is better."
     errors = f"error {format_number(present.error_px)} → {format_number(chosen.error_px)} px"
     contacts = f"contacts {contacts_text(present)} → {contacts_text(chosen)}"
     changes = errors if contacts_text(present) == contacts_text(chosen) else f"{errors}, {contacts}"

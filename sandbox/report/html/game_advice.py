@@ -150,6 +150,8 @@ def _measured_by(advice: GameAdvice) -> Markup:
         f"{format_plural(advice.tried, 'setting')} tried in {format_plural(advice.runs, 'run')} of the game, "
         f"{advice.seconds:.0f} s."
     )
+    if advice.out_of_time:
+        sentences.append("The time limit ended the search.")
     return concatenated(*(paragraph(isolated(each)) for each in sentences))
 
 

@@ -14,7 +14,8 @@ from markupsafe import Markup
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.formatting import format_plural
 from sandbox.measure.game_advice.difference import DifferingContact
-from sandbox.rehearsal.rehearse import GameShape, Rehearsal
+from sandbox.rehearsal.rehearse import Rehearsal
+from sandbox.rehearsal.space_log import GameShape
 from sandbox.report.html.page import fragment
 from sandbox.report.html.replay import BUDGET, MAX_BODIES, MAX_FRAMES, MIN_FRAMES, SPEEDS, evenly_spread, initial_speed
 from sandbox.report.html.replay_data import (

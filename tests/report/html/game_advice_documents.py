@@ -12,7 +12,8 @@ from sandbox.measure.game_advice.difference import GameTruth, difference_from
 from sandbox.measure.game_advice.result import GameAdvice, GameSetting, GameSettingChange, PlaysHeld
 from sandbox.measure.game_advice.step_code import StepCode
 from sandbox.measure.proportion import Proportion
-from sandbox.rehearsal.rehearse import CallbackCalls, GameCallback, GameShape, Rehearsal
+from sandbox.rehearsal.rehearse import CallbackCalls, Rehearsal
+from sandbox.rehearsal.space_log import GameCallback, GameShape
 from sandbox.rehearsal.step_settings import RehearsalSettings
 from tests.report.html.page_documents import HOSTILE
 
@@ -146,6 +147,7 @@ def game_advice(shown: Mapping[str, Rehearsal]) -> GameAdvice:
         tried=7,
         runs=41,
         seconds=12.0,
+        out_of_time=False,
         machine={"cpu": "a <processor>"},
         versions={"python": "3"},
     )
